@@ -385,6 +385,6 @@ class _ToRos1(TopicPassing):
         except DeserializationError as error:
             self._report(error)
         except ROSException:
-            return  # the link was closed in the meantime
+            return  # the link was closed meanwhile
         else:
             self.passed += 1

@@ -27,7 +27,7 @@ def parse_domain(text: str) -> str:
 
 
 class Direction(Enum):
-    """The direction in which messages are sent."""
+    """The direction that messages are sent in."""
 
     TO_ROS2 = "1 -> 2"
     TO_ROS1 = "2 -> 1"

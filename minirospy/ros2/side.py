@@ -396,7 +396,7 @@ class TopicSubscription:
                 with handle:
                     taken = handle.take_message(self.message_class, True)
             except self._invalid_handle:
-                return  # the loop's thread closed the subscription in the meantime
+                return  # the loop's thread has closed the subscription
             if taken is None:
                 return
             data = taken[0]

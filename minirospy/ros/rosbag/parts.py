@@ -26,7 +26,7 @@ def migration_verbs() -> tuple[Verb, ...]:
 
 
 def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
-    """Return the programs that migrate messages, by name."""
+    """Return a dict of the programs that migrate messages, keyed by name."""
     module = _module("scripts")
     return module.SCRIPTS if module else {}
 

@@ -180,7 +180,7 @@ class RosoutNode:
         )
 
         parts: list[str] = []
-        # Keep line breaks in the message, as the real log file does, but not in the other fields.
+        # As in the real log file, keep line breaks in the message, but not in other fields.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
             for at in range(0, len(text), STEP_LETTERS):
                 parts.append(escaped(text[at : at + STEP_LETTERS], keep))

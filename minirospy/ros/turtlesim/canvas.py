@@ -26,9 +26,9 @@ class Canvas:
 
     def __init__(self, background: Color) -> None:
         self.pixels: NDArray[np.uint8] = np.empty((PIXELS, PIXELS, 3), np.uint8)
-        """The colours by row and column."""
+        """The colours, indexed by row and column."""
         self.marks: NDArray[np.bool_] = np.empty((PIXELS, PIXELS), np.bool_)
-        """True for each pixel on which a pen has drawn, by row and column."""
+        """True for each pixel that a pen has drawn on, indexed by row and column."""
         self.background = background
         self.version = 0  # incremented on each change
         self.fill(background)

@@ -1,4 +1,4 @@
-"""`rosbag compress`, `decompress` and `reindex` rewrite a bag and keep the original; `encrypt` and `decrypt` are refused.
+"""`rosbag compress`, `decompress` and `reindex` rewrite a bag and keep the original; `encrypt` and `decrypt` are not supported.
 
 Source: http://wiki.ros.org/rosbag/Commandline. As in ROS, an unreadable file is reported, and the next one is processed.
 """

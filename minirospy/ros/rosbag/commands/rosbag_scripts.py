@@ -146,4 +146,4 @@ SCRIPTS: dict[str, Script] = {
     "fix_md5sums.py": _fix_md5sums,
     "savemsg.py": _savemsg,
 }
-"""The programs by name; the programs for migration are in `migration/scripts.py`."""
+"""The programs, keyed by name. Those for migration are in `migration/scripts.py`."""

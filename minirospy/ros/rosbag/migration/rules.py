@@ -210,7 +210,7 @@ def qualified_name(name: str, top_name: str) -> str:
 
 
 def get_message_key(c: MessageClass) -> Key | None:
-    """Return a message class's key, which is its type and md5sum, or None if ``c`` is not a message class."""
+    """Return a message class's key (type and md5sum), or None if ``c`` is not a message class."""
     try:
         return c._type, c._md5sum
     except AttributeError:

@@ -264,7 +264,7 @@ class MessageMigrator:
     # -- loading
 
     def _load(self, path: Path, name: str) -> None:
-        """Execute a rule file, which is Python code, and add its rules."""
+        """Execute a rule file (Python code) and add its rules."""
         scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)

@@ -111,4 +111,4 @@ SCRIPTS: dict[str, Script] = {
     "fixbag_batch.py": _fixbag_batch,
     "makerule.py": _makerule,
 }
-"""The programs by name."""
+"""The migration programs, keyed by name."""

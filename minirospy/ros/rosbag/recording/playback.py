@@ -180,7 +180,7 @@ class Playback:
     def arrive(self, start: int, wall: int) -> None:
         """Continue at ``start``, where the files are now read from, unless another seek has been requested since."""
         if self.seek_to is None:
-            # Keep the steps that were requested in the meantime.
+            # Keep the steps requested meanwhile.
             self._running.seek(start, wall, keeps_steps=True)
 
     def offer(self, time: int, topic: str, wall: int) -> None:

@@ -215,7 +215,7 @@ class Player:
             self.on_change()
 
     def _wait_for_slow_subscribers(self) -> None:
-        """Wait until subscribers have read the queued messages, which would be lost when this process exits."""
+        """Wait until subscribers have read the queued messages; they would be lost when this process exits."""
         left, end = 0, 0.0
         while not self._playback.is_ended and (waiting := self._output.waiting_bytes()):
             now = time.monotonic()

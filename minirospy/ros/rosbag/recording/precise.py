@@ -18,7 +18,7 @@ _TIMER_SLACK = 29
 
 
 class PreciseWait:
-    """Waits until a time on ``time.perf_counter_ns()``, which is precise on every OS.
+    """Waits until a time of ``time.perf_counter_ns()``, a clock that is precise on every OS.
 
     Only the thread that creates it may wait; any thread, and a signal handler, may call ``wake``.
     """

@@ -66,7 +66,7 @@ class Schedule:
     def __init__(self, options: PlayOptions, first: int, last: int, wall: int) -> None:
         """Create a schedule. ``first`` and ``last`` are the bag times of the first and last message.
 
-        ``wall`` is the wall time at which the first message is due.
+        ``wall`` is the wall time when the first message is due.
         """
         self._options = options
         self._first = first
@@ -75,7 +75,7 @@ class Schedule:
         self._message = first
         self._is_due = False
         self._clock = first
-        self._since = wall  # wall time at which the current pause or delay started
+        self._since = wall  # wall time when the current pause or delay started
         self._paused = options.paused
         self._steps = 0
         self._delayed = False
@@ -138,7 +138,7 @@ class Schedule:
     def poll(self, wall: int) -> int | None:
         """Return None if the message is due now, else the wall time of the next poll.
 
-        Poll earlier if another method is called in the meantime.
+        Poll earlier if another method is called before that.
         """
         if self._is_due:
             self._clock = self._message
@@ -211,7 +211,7 @@ class Schedule:
         return min(wait, self._next_tick) if self._period else wait
 
     def _due(self) -> int:
-        """Return the wall time at which the message is due."""
+        """Return the wall time when the message is due."""
         return self._origin + self._scaled(self._message - self._first, 1 / self._rate)
 
     def _bag_time(self, wall: int) -> int:

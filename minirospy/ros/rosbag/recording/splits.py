@@ -62,7 +62,7 @@ class Splits:
 
 
 def file_name(options: RecordOptions, count: int, now: float) -> str:
-    """Return the name of file number ``count``. ``now`` (seconds since 1970) is the time at which it is opened."""
+    """Return the name of file number ``count``. ``now`` (seconds since 1970) is when it is opened."""
     parts = [options.prefix.removesuffix(options.extension)] if options.prefix else []
     if options.append_date:
         parts.append(time.strftime("%Y-%m-%d-%H-%M-%S", time.localtime(now)))

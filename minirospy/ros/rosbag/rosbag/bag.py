@@ -137,7 +137,7 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[bytes]):
-    """A buffer to which a message's ``serialize`` writes."""
+    """A buffer for a message's ``serialize`` to write to."""
 
     __slots__ = ()
     write = list.append

@@ -56,7 +56,7 @@ class OpenedBag(PrivateBag):
         return self._file
 
     def _current(self) -> BagReader:
-        """Return the reader, which also includes the connections and chunks written so far."""
+        """Return the reader, with the connections and chunks written so far."""
         stream = self._open_file()
         reader = self._source
         if reader is None:

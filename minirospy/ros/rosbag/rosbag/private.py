@@ -60,7 +60,7 @@ class PrivateBag(ABC):
 
     @abstractmethod
     def _current(self) -> BagReader:
-        """Return the reader, which also covers the connections and chunks written so far."""
+        """Return the reader, with the connections and chunks written so far."""
 
     @abstractmethod
     def flush(self) -> None:

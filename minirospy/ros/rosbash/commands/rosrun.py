@@ -160,7 +160,7 @@ def become(command: list[str]) -> int:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
-            # Run a script without a `#!` line with sh, as shells do.
+            # Like a shell, run a script without a `#!` line with sh.
             os.execv("/bin/sh", ["/bin/sh", *command])
 
         why = error.strerror or str(error)

@@ -52,7 +52,7 @@ class Master:
     """A proxy for the master at ``master_uri`` (default: from the environment); calls are made as node ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
-        # Remove the trailing slash, as ROS's rosgraph does.
+        # Remove the trailing slash, like ROS's rosgraph.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._reinit(master_uri or get_master_uri())
 

@@ -52,7 +52,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         self._is_closed = False
 
     def serve_forever(self, poll_interval: float = 0.5) -> None:
-        """Handle requests until :meth:`close` is called, which may already have happened."""
+        """Handle requests until :meth:`close` is called. Return immediately if it was called before."""
         with self._serving:
             if self._is_closed:
                 return

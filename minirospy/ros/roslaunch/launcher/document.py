@@ -68,12 +68,12 @@ class Tag:
 
     @property
     def name(self) -> str:
-        """The tag's name."""
+        """Return the tag's name."""
         return self.element.tag
 
     @property
     def line(self) -> int:
-        """The line on which the tag starts."""
+        """Return the line where the tag starts."""
         return self.element.line
 
     def children(self) -> Iterator[Tag]:

@@ -75,8 +75,7 @@ def read_launch_file(file: str) -> bytes:
 def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
     """Return a file's bytes.
 
-    Raise OSError if the file cannot be read, or ValueError if it has more than ``limit`` bytes, as devices such as /dev/zero
-    do.
+    Raise OSError if the file cannot be read, or ValueError if it has more than ``limit`` bytes, like the device /dev/zero.
     """
     with open(file, "rb") as stream:
         data = stream.read(limit + 1)

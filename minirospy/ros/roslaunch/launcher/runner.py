@@ -210,7 +210,7 @@ class Launcher:
                 self._output.warn(f"WARNING: {why}")
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the nodes' programs, except missing ones, which are reported when the node is started."""
+        """Yield the nodes' programs. Skip missing ones: they are reported when the node is started."""
         for node in nodes:
             with contextlib.suppress(MinirospyError):
                 yield Path(node_program(node, self._packages)[-1])

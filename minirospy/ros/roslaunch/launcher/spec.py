@@ -90,7 +90,7 @@ class TestSpec:
 
 @dataclass(frozen=True)
 class MachineSpec:
-    """A ``<machine>`` on which nodes run: its address for ssh, and the script that sets up ROS there (``env_loader``)."""
+    """A ``<machine>`` that runs nodes: its address for ssh, and the script that sets up ROS there (``env_loader``)."""
 
     name: str
     address: str
@@ -202,7 +202,7 @@ class LaunchSpec:
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine on which a node runs, or None for this machine. Raise LaunchError if the machine is unknown."""
+        """Return the machine that runs a node, or None for this machine. Raise LaunchError if the machine is unknown."""
         name = node.machine
         if name in ("", "localhost"):
             return None

@@ -188,7 +188,7 @@ def convert(text: str, type_: str) -> object:
         return text
     if kind == "int":
         return int(text)
-    if kind == "double":  # ROS refuses "float"
+    if kind == "double":  # ROS rejects "float"
         return float(text)
     if kind in ("bool", "boolean"):
         if text.strip().lower() not in ("true", "1", "false", "0"):

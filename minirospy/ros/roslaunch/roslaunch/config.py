@@ -141,7 +141,7 @@ class ROSLaunchConfig:
         return False
 
     def add_config_error(self, msg: str) -> None:
-        """Add a configuration error, which is printed as a warning."""
+        """Add a configuration error, to be printed as a warning."""
         self.config_errors.append(msg)
 
     @property

@@ -151,7 +151,7 @@ class ROSLaunchRunner:
         )
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Add a listener, which is notified when a process exits."""
+        """Add a listener that is notified when a process exits."""
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:

@@ -305,7 +305,7 @@ class LaunchedProcess(Process):
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Add the process to another launcher, which watches the process once it has started."""
+        """Add the process to another launcher. That launcher watches it once it has started."""
         self._launcher = launcher
 
 
@@ -441,11 +441,11 @@ class ProcessMonitor:
                 self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Add a listener, which is notified when a process exits."""
+        """Add a listener that is notified when a process exits."""
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Watch the processes in a thread, which terminates them when it stops.
+        """Watch the processes in a thread. When the thread stops, it terminates them.
 
         The thread stops after shutdown(), or after registrations_complete() when all processes have exited.
         """
@@ -456,7 +456,7 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, this thread stops, too, and the guardian terminates the nodes.
+        # If the program is killed, this thread also stops, and the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()

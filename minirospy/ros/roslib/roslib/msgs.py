@@ -238,7 +238,7 @@ def list_msg_types(package: str, include_depends: bool) -> list[str]:
 
 
 def msg_file(package: str, type_: str) -> str:
-    """Return the path to a message's definition file, which need not exist.
+    """Return the path to a message's definition file. The file need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """

@@ -59,7 +59,7 @@ def list_srv_types(package: str, include_depends: bool) -> list[str]:
 
 
 def srv_file(package: str, type_: str) -> str:
-    """Return the path to a service's definition file, which need not exist.
+    """Return the path to a service's definition file. The file need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """

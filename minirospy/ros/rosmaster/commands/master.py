@@ -75,7 +75,7 @@ class _MasterParser(Parser):
     """Ignores the remapping arguments that a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError if the arguments are invalid."""
+        """Parse the arguments to a dict keyed by name. Raise CommandLineError if the arguments are invalid."""
         return super().parse(split_assignments(words)[0])
 
 
@@ -302,7 +302,7 @@ def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, qu
 
 
 def _write_pid(path: Path) -> None:
-    """Write the process id to a file that scripts read, as ROS does."""
+    """As in ROS, write the process id to a file for scripts to read."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with private_files.open_text(path, "w") as file:

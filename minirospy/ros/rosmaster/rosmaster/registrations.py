@@ -23,7 +23,7 @@ class Pool(Protocol):
     """The method of MarkedThreadPool that a RegistrationManager uses."""
 
     def queue_task(self, marker: object, task: Callable[..., object], args: tuple[object, ...]) -> object:
-        """Call ``task(*args)`` in a thread; tasks with the same marker run one after another."""
+        """Call ``task(*args)`` in a thread; at most one task per marker runs at a time."""
 
 
 class Registrations:

@@ -270,7 +270,7 @@ def rosnode_cleanup() -> None:
 
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
-    """Run the command, and exit with its status, as ROS does. ``argv`` starts with the command's name."""
+    """As in ROS, run the command and exit with its status. ``argv`` starts with the command's name."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))

@@ -232,7 +232,7 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
+    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):

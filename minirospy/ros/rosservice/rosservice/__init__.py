@@ -174,7 +174,7 @@ def has_service_args(service_name: str, service_class: ServiceClass | None = Non
 
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
+    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     from minirospy.ros.rosservice.commands.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):

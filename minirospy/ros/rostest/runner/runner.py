@@ -55,7 +55,7 @@ class RosTest:
     is_interrupted: bool = False
 
     def run(self) -> None:
-        """Run all tests, one after the other, sorted by name; a signal stops the run."""
+        """Run all tests in sequence, sorted by name. A signal stops the run."""
         nodes = {node.name for node in self.spec.nodes}
         by_name: dict[str, list[TestSpec]] = {}
         for test in self.spec.tests:

@@ -46,7 +46,7 @@ class _PubParser(Parser):
     """Accepts negative numbers as values, despite the option `-1`."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, with negative numbers among the values."""
+        """Parse the arguments to a dict keyed by name. Accept negative numbers as values."""
         options = super().parse(
             [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
         )

@@ -287,7 +287,7 @@ def create_publisher(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
+    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 

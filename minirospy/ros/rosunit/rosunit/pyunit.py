@@ -1,4 +1,4 @@
-"""The names of rosunit.pyunit."""
+"""Provides the names in ROS's module rosunit.pyunit."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def unitrun(
 ) -> None:
     """Run a TestCase, given as a class or a name. A test file calls this as its main function.
 
-    With ``--text`` in ``sysargs`` (default: ``sys.argv``), print as unittest does; else write the results to
+    With ``--text`` in ``sysargs`` (default: ``sys.argv``), print like unittest; else write the results to
     ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or to the file given by ``--gtest_output=xml:FILE``. Raise
     SystemExit(1) if a test fails. ``coverage_packages`` has no effect: run the file under coverage.py instead.
     """
@@ -205,7 +205,7 @@ class _Recorder(unittest.TestResult):
         self._note(test, (TestFailure if is_failure else TestError)(kind, text))
 
     def addUnexpectedSuccess(self, test: unittest.TestCase) -> None:
-        # Count the unexpected success as a failure, as wasSuccessful() does.
+        # Like wasSuccessful(), count the unexpected success as a failure.
         super().addUnexpectedSuccess(test)
         text = "the test was expected to fail, and did not"
         self.failures.append((test, text))

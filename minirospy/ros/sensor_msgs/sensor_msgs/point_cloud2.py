@@ -197,7 +197,7 @@ def _get_struct_fmt(
 
 
 def _columns(fields: Iterable[PointField], field_names: Collection[str] | None) -> list[Column]:
-    """Return the columns for the fields with these names. As in ROS, read them one after another, even if they overlap."""
+    """Return the columns of the named fields. As in ROS, read them in sequence, even if they overlap."""
     columns, end = [], 0
     for field in sorted(fields, key=lambda each: each.offset):
         if field_names is not None and field.name not in field_names:

@@ -1,4 +1,4 @@
-"""A state machine whose states run in the order in which they are added."""
+"""A state machine whose states run in the order they were added."""
 
 from __future__ import annotations
 

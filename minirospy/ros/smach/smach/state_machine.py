@@ -328,7 +328,7 @@ class StateMachine(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Set the state in which the next execution starts, and add ``userdata`` to the machine's userdata."""
+        """Set the initial state for the next execution, and add ``userdata`` to the machine's userdata."""
         logdebug(f"Setting initial states to {initial_states}")
         if len(initial_states) > 1:
             logwarn(

@@ -148,7 +148,7 @@ class Transformer:
         return list(yaml.safe_load(self._buffer.all_frames_as_yaml()) or {})
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> rospy.Time:
-        """Return the newest time at which a lookup succeeds. Raise tf.Exception if there is no such time."""
+        """Return the latest time for which a lookup succeeds. Raise tf.Exception if there is no such time."""
         return self._buffer.get_latest_common_time(
             strip_leading_slash(source_frame), strip_leading_slash(dest_frame)
         )

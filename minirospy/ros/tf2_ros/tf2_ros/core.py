@@ -116,7 +116,7 @@ class BufferCore:
         )
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
-        """Return the newest time at which a lookup succeeds; zero if all transforms between the frames are static.
+        """Return the latest time for which a lookup succeeds; zero if all transforms between the frames are static.
 
         Raise LookupException if a frame is unknown, InvalidArgumentException if a frame name is invalid, TransformException if
         the frames are not connected.

@@ -14,7 +14,7 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)  # maximum time by which the wall clock may be set back without aborting a wait
+_JUMP = times.Duration(3)  # how far the wall clock may be set back without aborting a wait
 # seconds between checks in simulated time; a change of that time does not wake a blocked thread
 _SIMULATED_SLICE = 0.01
 

@@ -1,6 +1,6 @@
 """tf_monitor: measures the delay of each frame's transforms, and the rate at which each node sends them.
 
-Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by name, as the real program did before tf2.
+Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by name, as in the real program before tf2.
 """
 
 from __future__ import annotations
