@@ -134,7 +134,7 @@ def create_names_filter(names: Sequence[str]) -> Callable[[Any], list[str]]:
 
 
 def init_rosmsg_proto() -> None:
-    """Make `get_yaml_for_msg` keep the fields' order from now on, like `rosmsg-proto`.
+    """Make `get_yaml_for_msg` preserve the fields' order, like `rosmsg-proto`.
 
     ROS's function also changes PyYAML for the whole process; with Python 3.10 or later, loading YAML then fails.
     """

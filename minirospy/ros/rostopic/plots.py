@@ -86,7 +86,7 @@ def _cells(
                 field = convert_getattr(value, name, type_)
                 yield from _cells(field, f"{path}.{name}", time_offset, field_filter)
     elif type(value) in (list, tuple) and len(value):
-        # As in ROS, the first element's type is decisive: a list of lists has no cells.
+        # As in ROS, the first element's type decides: a list of lists has no cells.
         first = value[0]
         if type(first) in (*_PLAIN, str) or isinstance(first, TVal):
             for index, each in enumerate(value):

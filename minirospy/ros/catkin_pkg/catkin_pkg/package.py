@@ -570,7 +570,7 @@ def _text(element: Element) -> str:
 
 
 def _inside(element: Element) -> str:
-    """Return an element's content, including child elements, as XML."""
+    """Return the XML inside an element, including child elements."""
     return (
         escape(element.text or "")
         + "".join(tostring(each, encoding="unicode").replace(" />", "/>") for each in element)

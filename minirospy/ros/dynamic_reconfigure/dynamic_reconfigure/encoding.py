@@ -1,8 +1,8 @@
 """dynamic_reconfigure.encoding: converts configurations and descriptions to messages, and back.
 
-A configuration is a dict of values by name. Its key ``groups`` contains the tree of its groups, each a dict with ``id``,
-``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by ID; 0 is the
-root group.
+A configuration is a dict of values keyed by name. Its key ``groups`` contains the tree of its groups, each a dict with
+``id``, ``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by ID; 0 is
+the root group.
 """
 
 from __future__ import annotations

@@ -452,7 +452,7 @@ class Bag(OpenedBag):
     def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
         """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
 
-        Raise ROSBagException if the bag already has chunks, as the real module does.
+        Like the real module, raise ROSBagException if the bag already has chunks.
         """
         if self._current().chunks:
             raise ROSBagException("Cannot set encryptor after chunks are written")

@@ -57,7 +57,7 @@ class Master:
         self._reinit(master_uri or get_master_uri())
 
     def _reinit(self, master_uri: str) -> None:
-        """Call the master at another URI from now on."""
+        """Use the master at another URI for all later calls."""
         self.master_uri = master_uri
         try:
             parse_http_host_and_port(master_uri)

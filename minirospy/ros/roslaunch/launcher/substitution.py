@@ -129,7 +129,7 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """Return a Python expression's value as a string. Raise SubstitutionError if the expression is invalid.
+        """Evaluate a Python expression; return the value as a string. Raise SubstitutionError if the expression is invalid.
 
         The expression can run any Python code, as ``<param command=...>`` can run any program.
         """

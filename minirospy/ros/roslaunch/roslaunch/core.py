@@ -162,7 +162,7 @@ class Machine:
 
     @property
     def spec(self) -> MachineSpec:
-        """Return the machine as a MachineSpec."""
+        """Convert the machine to a MachineSpec."""
         return MachineSpec(
             self.name, self.address, self.env_loader or "", self.user or "", self.password or "", self.ssh_port,
             self.timeout,
@@ -341,7 +341,7 @@ class Node:
 
     @property
     def spec(self) -> NodeSpec:
-        """Return the node as a NodeSpec."""
+        """Convert the node to a NodeSpec."""
         return NodeSpec(
             name=f"{self.namespace}{self.name or ''}",
             package=self.package,

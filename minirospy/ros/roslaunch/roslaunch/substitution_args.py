@@ -312,7 +312,7 @@ class _DictWrapper:
 
 
 def _eval(s: str, context: Context) -> str:
-    """Return a Python expression's value as a string.
+    """Evaluate a Python expression; return the value as a string.
 
     Raise SubstitutionException if the expression contains a double underscore, or any exception from the expression.
     """

@@ -95,7 +95,7 @@ class MarkedThreadPool:
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:
-        """Return the first task whose marker is not in use, or None if this thread has to exit."""
+        """Return the first task whose marker is not in use, or None if this thread must exit."""
         with self._changed:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:

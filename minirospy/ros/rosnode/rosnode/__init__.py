@@ -193,7 +193,7 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
     """Unregister the nodes in ``blacklist`` from the master and print their names.
 
-    Raise ConnectionRefusedError, as ROS does, if no master responds.
+    As in ROS, raise ConnectionRefusedError if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         # Query the master even if the list is empty, because an unreachable master is an error.
@@ -206,7 +206,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
     """Unregister all nodes except those in ``whitelist`` from the master.
 
-    Raise ConnectionRefusedError, as ROS does, if no master responds.
+    As in ROS, raise ConnectionRefusedError if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):

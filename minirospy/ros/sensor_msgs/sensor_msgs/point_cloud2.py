@@ -273,7 +273,7 @@ def _values(
 
 
 def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
-    """Return the cloud as an array of shape (height, width, values)."""
+    """Convert the cloud to an array of shape (height, width, values)."""
     import numpy as np
 
     shape = cloud.height, cloud.width
@@ -310,7 +310,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the packed data if all points and fields are floats, or None if ``struct`` has to pack them."""
+    """Return the packed data if all points and fields are floats, or None if ``struct`` must pack them."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

@@ -129,7 +129,7 @@ class Concurrence(Container):
         return outcome
 
     def _run_states(self) -> None:
-        """Start a thread for each state, wait until the states have to finish, and join the threads."""
+        """Start a thread for each state, wait until the states must finish, and join the threads."""
         self._is_ending = self._user_code_exception = False
         self._child_outcomes = dict.fromkeys(self._states)
         self._threads = {

@@ -27,7 +27,7 @@ class Moment(Protocol):
 def nanoseconds(time: Moment) -> int:
     """Return a time in nanoseconds. The result is exact if the time has ``secs`` and ``nsecs``.
 
-    Raise TypeError if the argument is not a time, as tf2_py does.
+    Like tf2_py, raise TypeError if the argument is not a time.
     """
     try:
         return time.secs * _BILLION + time.nsecs  # type: ignore[attr-defined, no-any-return]
@@ -40,7 +40,7 @@ def nanoseconds(time: Moment) -> int:
 
 
 def transform_stamped(target: str, source: str, found: StampedTransform) -> TransformStamped:
-    """Return a lookup's result as a message."""
+    """Convert a lookup's result to a message."""
     # Create the message without constructors, which would take longer than the lookup.
     message: TransformStamped = _new(TransformStamped)
     message.header = header = _new(Header)

@@ -158,7 +158,7 @@ def read_records(listing: str) -> list[FrameRecord]:
 
 
 def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
-    """Return the frames as a graphviz graph, in the format of tf2_tools' view_frames.py."""
+    """Format the frames as a graphviz graph, like tf2_tools' view_frames.py."""
     if not records:
         return 'digraph G { "No tf data received" }'
 
