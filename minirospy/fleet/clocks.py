@@ -38,7 +38,7 @@ class Delay:
     count: int = 0
 
     def add(self, delay: int) -> None:
-        """Record a message's delay. A negative delay, which may result from an inexact offset, counts as 0."""
+        """Record a message's delay. A negative delay, possible if the offset is inexact, counts as 0."""
         delay = max(0, delay)
         self.mean = delay if not self.count else self.mean + _SHARE * (delay - self.mean)
         self.longest = max(self.longest, delay)

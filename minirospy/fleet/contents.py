@@ -27,7 +27,7 @@ MAX_TOKENS = 200_000
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that is visible to other gateways. ``duplicates`` are other claims to its name, which are ignored."""
+    """A robot that is visible to other gateways. ``duplicates`` are other claims to its name; they are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]

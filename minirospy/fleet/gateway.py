@@ -179,7 +179,7 @@ class Gateway:
             self._receiver.close()
 
     def status(self) -> dict[str, object]:
-        """Return this gateway's configuration and counters, as JSON-compatible values."""
+        """Return this gateway's configuration and counters as JSON-compatible values."""
         found: dict[str, object] = {
             "name": self.options.name,
             "gateway": self.id,

@@ -123,7 +123,7 @@ class ServiceToken(NamedTuple):
 
 
 class Want(NamedTuple):
-    """A reader's request for a topic to which it has subscribers."""
+    """A reader's request for a topic that its local nodes subscribe to."""
 
     topic: str
     reader: str

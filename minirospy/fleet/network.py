@@ -102,8 +102,7 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # A single thread preserves the order of calls, so that peers see declarations in the order in which they were
-        # made.
+        # A single thread preserves the order of calls, so that peers see declarations in the order they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(MAX_QUERIES)

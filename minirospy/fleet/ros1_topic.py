@@ -29,9 +29,9 @@ No gateway sends these publishers' messages back to the keys.
 """
 
 _REPLAY_SECONDS = 0.5
-"""Seconds to wait after a subscriber's first beacon before sending latched messages:
+"""Seconds to wait after a subscriber's first beacon before sending latched messages.
 
-its bridge may subscribe only after the beacon.
+The subscriber's bridge may subscribe only after the beacon.
 """
 _WRITER = ""
 

@@ -103,7 +103,7 @@ def write_overlay(folder: Path) -> list[str]:
 
 
 def overlay_files() -> dict[str, str]:
-    """Return the files in `overlay/`, except message modules, as a dict from path to text."""
+    """Return the contents of the files in `overlay/`, except message modules, keyed by path."""
     files = {_METADATA: _METADATA_TEXT}
     for name, source in modules().items():
         path = name.replace(".", "/")
@@ -212,7 +212,7 @@ def listed(source: Path) -> list[str]:
 
 
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
-    """Return the names from other modules that a star import also brings, as a dict to `MODULE` or `MODULE:NAME`."""
+    """Map the names that a star import brings from other modules to their `MODULE` or `MODULE:NAME`."""
     found = {}
     for place, names in PASSED_ON.get(module, {}).items():
         for each in names.split():

@@ -1,6 +1,6 @@
 """Functions shared by rosgraph.names and rospy.names.
 
-Source: http://wiki.ros.org/Names, and the behaviour of rosgraph.names, also for None and values of other types.
+Source: http://wiki.ros.org/Names, and the behaviour of rosgraph.names, including for None and values of other types.
 """
 
 from __future__ import annotations

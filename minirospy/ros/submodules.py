@@ -1,4 +1,4 @@
-"""Imports submodules and other names that ROS's modules import for themselves, each when a program first uses it."""
+"""Imports submodules and other names that ROS's own modules would import, each on first use."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _STANDARD_LIBRARY = {
     "xml.parsers": ("expat",),
     "xmlrpc": ("client", "server"),
 }
-"""The submodules of standard library packages that real ROS imports, so that programs use them without importing them."""
+"""Standard library submodules that real ROS imports, so programs use them without importing them."""
 
 _LARGE = {"http", "logging"}
 """Packages that are slow to import: their submodules are offered only if the packages have already been imported."""
@@ -49,7 +49,7 @@ def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
 
 
 def import_passed_on(namespace: dict[str, object], name: str, place: str) -> object:
-    """Import ``place`` (`MODULE` or `MODULE:NAME`), store it in a module's ``namespace`` as ``name``, and return it."""
+    """Import ``place`` (`MODULE` or `MODULE:NAME`), store it as ``name`` in ``namespace``, and return it."""
     module, _, inner = place.partition(":")
     found: object = import_module(module)
     if inner:

@@ -1,1 +1,1 @@
-"""A bridge between ROS 1 and ROS 2 for topics, services, actions and parameters, based on an installed ROS 2 or on Zenoh."""
+"""Bridges topics, services, actions and parameters between ROS 1 and ROS 2, with an installed ROS 2 or over Zenoh."""

@@ -1,4 +1,4 @@
-"""Convert action messages between their ROS 1 and ROS 2 types."""
+"""Converts action messages between their ROS 1 and ROS 2 types."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _WIDTHS = {"time": 8, "duration": 8, "string": 4}
 
 @dataclass(frozen=True)
 class ActionCodec:
-    """Converts an action's messages. ``classes`` maps the last part of each ROS 1 topic's name to the topic's message class."""
+    """Converts an action's messages. ``classes`` maps the last part of a ROS 1 topic name to the message class."""
 
     goal: Transcoder
     result: Transcoder
@@ -38,7 +38,7 @@ class ActionCodec:
 
 
 class ActionCodecs:
-    """Creates and caches action codecs by the action's ROS 1 and ROS 2 types."""
+    """Creates action codecs, and caches them keyed by the action's ROS 1 and ROS 2 types."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side

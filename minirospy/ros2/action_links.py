@@ -16,7 +16,7 @@ _GOAL_TYPE = "ActionGoal"
 
 @dataclass(frozen=True)
 class ActionLink:
-    """An action that one side offers and the other side uses. ``direction`` is the direction in which goals are sent."""
+    """An action that one side offers and the other uses. Goals are sent in ``direction``."""
 
     action: str
     direction: Direction
@@ -30,14 +30,14 @@ class ActionLink:
 
 
 def send_goal_service(action: str) -> str:
-    """Return the name of the service through which a ROS 2 action receives goals."""
+    """Return the name of the service on which a ROS 2 action receives goals."""
     return action + _SEND_GOAL
 
 
 def action_links(
     ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
 ) -> list[ActionLink]:
-    """Return the actions to bridge, which are those that only one side offers, ignoring bridges.
+    """Return the actions to bridge: those that only one side offers. Ignore those that bridges offer.
 
     ``ros2_services`` maps services to their types. ``partner(type, direction)`` returns the type on the side that sends goals.
     """

@@ -1,4 +1,4 @@
-"""Serializes and parses an action's ROS 1 messages. The embedded goals, feedback and results stay serialized. Pure.
+"""Serializes and parses ROS 1 action messages. Embedded goals, feedback and results stay serialized. Pure.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and the definitions of actionlib_msgs.
 """
@@ -30,7 +30,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class GoalId(NamedTuple):
-    """A goal's id and the time when it was sent, in seconds and nanoseconds."""
+    """A goal's id and its send time, in seconds and nanoseconds."""
 
     id: str
     secs: int = 0
@@ -43,7 +43,7 @@ class GoalId(NamedTuple):
 
 
 class Status(NamedTuple):
-    """A goal's status: the number of a GoalState, and a message for users."""
+    """A goal's status: the number of a GoalState, and a text for users."""
 
     goal: GoalId
     state: int

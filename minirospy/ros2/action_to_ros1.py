@@ -1,4 +1,4 @@
-"""A ROS 1 action that the bridge offers in ROS 2: sends goals to ROS 1, and feedback and results to ROS 2."""
+"""Offers a ROS 1 action in ROS 2: sends goals to ROS 1, and feedback and results to ROS 2."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 SERVER_SECONDS = 5.0
-"""Timeout in seconds for a ROS 1 server to connect, and to include a new goal in its statuses."""
+"""Timeout in seconds for a ROS 1 server to connect, and to list a new goal in its statuses."""
 MAX_GOALS = 1_000
 """Maximum number of goals forwarded concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5
@@ -49,7 +49,7 @@ _REFUSED = {GoalState.REJECTED, GoalState.RECALLED}
 
 
 class _Goal:
-    """A ROS 2 client's goal at a ROS 1 server."""
+    """A goal from a ROS 2 client, sent to a ROS 1 server."""
 
     def __init__(
         self, id: GoalId, feedback: Callable[[bytes], None], cancel: Callable[[_Goal], None]

@@ -1,4 +1,4 @@
-"""A ROS 2 action that the bridge offers in ROS 1: sends goals to ROS 2, and feedback and results to ROS 1."""
+"""Offers a ROS 2 action in ROS 1: sends goals to ROS 2, and feedback and results to ROS 1."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 REACH_SECONDS = 2.0
-"""Maximum number of seconds by which opening this link delays other links while it waits for the server."""
+"""Maximum seconds that opening this link, which waits for the server, may delay other links."""
 ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
 """Seconds to delay a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
-"""Maximum number of goals sent but not yet accepted: a server's queue has 10 places, and further goals would be lost."""
+"""Maximum number of goals sent but not yet accepted. A server's queue holds 10, and further goals would be lost."""
 MAX_GOALS = 1_000
 """Maximum number of stored goals, including recently ended ones; further goals are rejected."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
@@ -63,18 +63,18 @@ class _Goal:
         self.ended_at = 0.0
 
     def step(self, event: GoalEvent, text: str = "") -> None:
-        """Move to the next state, if the event leads to one."""
+        """Apply an event to the goal's state. Ignore an event that the state does not allow."""
         state = SERVER_STEPS[event].get(self.status.state)
         if state is not None:
             self.status = Status(self.status.goal, int(state), text)
 
     def fail(self, text: str) -> None:
-        """End the goal with a reason: reject it if it has not been accepted yet, otherwise abort it."""
+        """Reject the goal if it has not been accepted yet, otherwise abort it. ``text`` is the reason."""
         self.step(GoalEvent.REJECT if self.there is None else GoalEvent.ABORT, text)
 
 
 class GoalsToRos2:
-    """The action server in ROS 1. Runs on the node's loop."""
+    """The ROS 1 action server for a ROS 2 action. Runs on the node's loop."""
 
     def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
         self._node = node
@@ -172,7 +172,7 @@ class GoalsToRos2:
         self._changed.set()
 
     async def _run(self, goal: _Goal, request: bytes) -> None:
-        """Send a goal to ROS 2 and send its result back."""
+        """Send a goal to ROS 2, and its result back to ROS 1."""
         body = self._codec.empty_result
         self._changed.set()
         try:
@@ -237,7 +237,7 @@ class GoalsToRos2:
         except DeserializationError as error:
             self._misfits.error("feedback of action %s: %s", self._link.action, error)
         except ROSException:
-            return  # the action was closed in the meantime
+            return  # the action was closed meanwhile
 
     async def _publish_statuses(self) -> None:
         """Publish the statuses of all goals after each change and at regular intervals."""

@@ -1,4 +1,4 @@
-"""The whole bridge, which polls both graphs, and opens and closes links to match their endpoints."""
+"""The whole bridge: polls both graphs, and opens and closes links to match."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
-"""Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain sends the data back."""
+"""Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain returns it."""
 _MIN_REFRESH_INTERVAL = 0.25
 QUERY_SECONDS = 3.0
 """Timeout in seconds, after which topics are bridged even if publishers have not responded."""
@@ -66,7 +66,7 @@ class Ros2Options:
     """The bridge's settings.
 
     ``topics``, ``services`` and ``actions`` are filters that select what to bridge. ``call_seconds`` is the timeout for
-    service calls, ``max_refresh_interval`` the number of seconds between polls while the graphs do not change.
+    service calls, ``max_refresh_interval`` the seconds between polls while the graphs do not change.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
@@ -78,7 +78,7 @@ class Ros2Options:
 
 
 class _Types:
-    """Caches the specs, interface types and transcoders by the types on both sides."""
+    """Caches specs, interface types and transcoders, keyed by the types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -114,7 +114,7 @@ class _Types:
         return specs[name], lookup
 
     def transcoder(self, spec: MessageSpec, lookup: Lookup, ros2_type: str) -> Transcoder:
-        """Return the conversion functions. Raise TypesDiffer if the types cannot be converted."""
+        """Return the conversion functions for a message type. Raise TypesDiffer if the types cannot be converted."""
         allowed = self._rules.ros2_messages(spec.full_name)
         if ros2_type not in allowed:
             raise TypesDiffer(f"no rule makes [{spec.full_name}] a [{ros2_type}]: write one for --rules")
@@ -175,7 +175,7 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return the links to bridge without opening them, with the reason for each that cannot be bridged.
+        """Return the links to bridge without opening them. If a link cannot be bridged, include the reason.
 
         Raise the same errors as :meth:`look`.
         """
@@ -238,7 +238,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """Query new ROS 1 publishers on topics with ROS 2 subscribers for their definitions, and for whether they latch."""
+        """Query the definitions, and latching, of new ROS 1 publishers on topics with ROS 2 subscribers."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()
@@ -289,7 +289,7 @@ class TopicPassing:
         self._statics = StaticTransforms() if is_static else None
 
     def _with_statics(self, message: Frame) -> Frame:
-        """Return a message. On a static transform topic, merge it with all known static transforms."""
+        """Return the message to send. On a static transform topic, add all known static transforms."""
         if self._statics is None:
             return message
         left_out = self._statics.left_out
@@ -326,7 +326,7 @@ class PassingToRos2(TopicPassing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait until the existing subscribers are connected, because they would miss messages published earlier."""
+        """Wait until the existing subscribers are connected; they would miss messages published before that."""
         loop = asyncio.get_running_loop()
         end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
@@ -385,6 +385,6 @@ class _ToRos1(TopicPassing):
         except DeserializationError as error:
             self._report(error)
         except ROSException:
-            return  # the link was closed in the meantime
+            return  # the link was closed meanwhile
         else:
             self.passed += 1

@@ -1,7 +1,7 @@
-"""Encodes and decodes the ROS 2 messages that the bridge itself uses, in CDR, by their types' fields. Pure.
+"""Encodes and decodes CDR for the ROS 2 messages that the bridge itself uses, given their types' fields. Pure.
 
-Messages that are only forwarded are converted by ``core/idl/cdr.py``, which is faster. Numbers become int, float or bool,
-byte arrays bytes, other arrays lists, and messages dicts.
+Messages that are only forwarded are converted by ``core/idl/cdr.py``, which is faster. Numbers become int, float or bool;
+byte arrays become bytes, other arrays lists, and messages dicts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def decode(name: str, fields: Callable[[str], Fields], data: bytes) -> dict[str,
 
 
 def encode(name: str, fields: Callable[[str], Fields], values: Mapping[str, object]) -> bytes:
-    """Encode a message of type ``name``; fields without a value are zero or empty."""
+    """Encode a message of type ``name``. Fields missing from ``values`` are zero or empty."""
     writer = _Writer(fields)
     writer.message(name, values)
     return CDR_HEADER + bytes(writer.data)
@@ -66,7 +66,7 @@ class _Reader:
         if count is None:
             count = self._length()
         if count > len(self._data) - self._at:
-            # Each element takes at least one byte, so this many elements cannot follow.
+            # Each element takes at least one byte, so the data is too short for this number of elements.
             raise DeserializationError("the message ends too early")
         if base not in _LETTERS:
             return [self._one(base) for _ in range(count)]

@@ -112,7 +112,7 @@ _ADDED: dict[tuple[str, str], Fields] = {
     },
     ("visualization_msgs/Marker", "mesh_resource"): {"mesh_file": "visualization_msgs/MeshFile"},
 }
-"""The fields that ROS 2 adds, by message type and the name of the ROS 1 field that they follow."""
+"""The fields that ROS 2 adds, keyed by message type and the ROS 1 field that precedes them."""
 _ADDED_AFTER_HUMBLE = {("sensor_msgs/Range", "range")}
 _BOUNDED = {("shape_msgs/SolidPrimitive", "dimensions"): "sequence<double, 3>"}
 _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Duration"}
@@ -131,7 +131,7 @@ class Definitions:
         self._hashes: dict[str, str] = {}
 
     def message(self, name: str, *, is_humble: bool = False) -> Fields:
-        """Return the fields of a message; if ``is_humble``, as ROS 2 Humble defines them."""
+        """Return a message's fields; if ``is_humble``, those in ROS 2 Humble."""
         key = (name, is_humble)
         if key not in self._found:
             self._found[key] = _ONLY_IN_ROS2.get(name) or self._of_ros1(name, is_humble)
@@ -152,7 +152,7 @@ class Definitions:
         )
 
     def hash(self, name: str) -> str:
-        """Return the hash of a message, ``pkg/Name``, or of any type that :meth:`fields` accepts."""
+        """Return the hash of a message ``pkg/Name``, or of any type that :meth:`fields` accepts."""
         if name not in self._hashes:
             try:
                 self._hashes[name] = type_hash(name, self.fields)

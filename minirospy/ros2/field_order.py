@@ -16,7 +16,7 @@ from minirospy.base.errors import DeserializationError
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 
 _COUNT = struct.Struct("<I")
-# number of zero-size elements allowed in addition to one element per message byte, as in core/idl/cdr.py
+# number of zero-size elements allowed beyond one element per message byte, as in core/idl/cdr.py
 _SPARE = 10_000
 
 
@@ -42,7 +42,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Reordered:
-    """A message: its fields in reading order, and their indices in writing order."""
+    """A message whose fields are reordered: the fields in input order, and their indices in output order."""
 
     fields: tuple[Node, ...]
     order: tuple[int, ...]
@@ -52,7 +52,7 @@ Node: TypeAlias = Fixed | Text | Array | Reordered
 
 
 def inverse(node: Node) -> Node:
-    """Return the node for the reverse order."""
+    """Return the node that undoes the reordering."""
     if isinstance(node, Array):
         return Array(inverse(node.element), node.length)
     if isinstance(node, Reordered):

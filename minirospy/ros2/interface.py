@@ -1,4 +1,4 @@
-"""The bridge's interface to ROS 2, implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and in tests.
+"""The bridge's interface to ROS 2. Implemented with rclpy (``side.py``), with Zenoh (``zenoh_side.py``), and in tests.
 
 Callbacks run in ROS 2's own threads. Types are written as ``pkg/Name``; messages are serialized as CDR.
 """
@@ -44,13 +44,13 @@ class Ros2Publisher(Protocol):
 
 
 class Ros2Handle(Protocol):
-    """A subscription or a service whose callback is called until the handle is closed."""
+    """A subscription or service. Its callback is called until the handle is closed."""
 
     def close(self) -> None: ...
 
 
 class Ros2Probe(Protocol):
-    """Sends no-op requests to a client's servers. Methods may be called from any thread."""
+    """Probes a client's servers with no-op requests. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
@@ -112,16 +112,14 @@ class GoalOfRos1(Protocol):
 
     @property
     def ended(self) -> Future[tuple[int, bytes | None]]:
-        """Return the future of the final status (see action_msgs/GoalStatus) and the result, which is None if it is empty."""
+        """Return a future for the final status (see action_msgs/GoalStatus) and the result (None: empty)."""
 
     def cancel(self) -> None:
         """Send the server a cancel request. May be called from any thread."""
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
-"""Accepts a goal, given the goal and a function for its feedback; returns a future for the accepted goal, or for None if the
-goal is rejected.
-"""
+"""Takes a goal and a function for its feedback; returns a future for the accepted goal, or for None if the goal is rejected."""
 
 
 class Ros2Parameters(Protocol):
@@ -133,7 +131,7 @@ class Ros2Parameters(Protocol):
     def names(self, node: str) -> list[str]: ...
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter's value, which has type 0 if the parameter is not set."""
+        """Return a parameter's value. Its type is 0 if the parameter is not set."""
 
     def set(self, node: str, name: str, value: Value) -> None: ...
 

@@ -1,4 +1,4 @@
-"""Computes the common layout of a message from its ROS 1 and ROS 2 specs and the rules, or the reason why there is none. Pure.
+"""Computes the layout common to a message's ROS 1 and ROS 2 specs, or the reason why there is none. Pure.
 
 A ROS 2 spec is written as a ROS 1 spec: numeric types have their ROS 1 names, and times are ``builtin_interfaces/Time``.
 """
@@ -99,7 +99,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return the common layout of a message, with ROS 1's fields in ROS 2's order. Raise TypesDiffer if none exists."""
+    """Return a message's common layout, with ROS 1's fields in ROS 2's order. Raise TypesDiffer if there is none."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -196,7 +196,7 @@ class _Ordering:
         self._is_changed = False
 
     def message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered | None:
-        """Return the reordering from ROS 1's to ROS 2's order, or None if the orders are equal."""
+        """Return how to reorder ROS 1's fields to ROS 2's order, or None if the orders are equal."""
         found = self._message(ros1, ros2)
         return found if self._is_changed else None
 
@@ -243,7 +243,7 @@ def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
 
 
 def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
-    """Return ROS 1's fields, with the inlined field replaced by its own fields."""
+    """Return ROS 1's fields, with an inlined field replaced by the fields it contains."""
     found: list[Field] = []
     for each in spec.fields:
         if each.name != rule.inlined:
@@ -256,7 +256,7 @@ def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, 
 
 
 def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
-    """Return the indices of ROS 1's fields in ROS 2's order. A field that ROS 2 lacks stays after the field before it."""
+    """Return the indices of ROS 1's fields in ROS 2's order. A field missing in ROS 2 stays after its predecessor."""
     places = {each.name: number for number, each in enumerate(ros2.fields)}
     keys = []
     place = -1
@@ -276,7 +276,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Map the ROS 1 fields that ROS 2 has to the ROS 2 fields. Raise TypesDiffer if a field has no counterpart."""
+    """Map ROS 1 fields to their ROS 2 counterparts. Raise TypesDiffer if a required counterpart is missing."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}

@@ -1,4 +1,4 @@
-"""The links of one kind (topics, services or actions), which are opened and closed to match the wanted links."""
+"""Opens and closes links of one kind (topics, services or actions) to match the wanted links."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Pair:
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Return the links. For a link that cannot be opened, include the reason, which ``check(link)`` raises as TypesDiffer."""
+    """Return the links. If ``check(link)`` raises TypesDiffer, include the message as the reason."""
     found = []
     for link in wanted:
         try:

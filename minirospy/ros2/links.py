@@ -1,4 +1,4 @@
-"""Selects the topics to bridge, and their settings, from snapshots of both graphs. Pure."""
+"""Selects topics to bridge, and their settings, from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def parse_domain(text: str) -> str:
 
 
 class Direction(Enum):
-    """The direction in which messages are sent."""
+    """The direction that messages are sent in."""
 
     TO_ROS2 = "1 -> 2"
     TO_ROS1 = "2 -> 1"
@@ -83,7 +83,7 @@ def links(
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
-    """Return the topics to bridge, which are those with endpoints on both sides, not counting bridges' endpoints.
+    """Return the topics to bridge: those with endpoints on both sides, not counting bridges'.
 
     ``is_latched(topic, node)`` returns whether a ROS 1 publisher latches. ``ros1_type(ros2_type)`` returns the ROS 1 type for
     a ROS 1 subscriber to any type, such as `rostopic echo`.
@@ -118,7 +118,7 @@ def links(
 
 
 def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
-    """Return one type for endpoints whose types may differ: ROS 1's type name if an endpoint uses it, else the first by name."""
+    """Choose one type if endpoints' types differ: ROS 1's type name if an endpoint uses it, else the first by name."""
     types = sorted({end.type for end in ends})
     return ros1_type if ros1_type in types else types[0]
 

@@ -37,7 +37,7 @@ FIELDS = (
     "double_array_value",
     "string_array_value",
 )
-"""The names of the ParameterValue fields; the index is the ROS 2 parameter type."""
+"""The names of the ParameterValue fields, indexed by ROS 2 parameter type."""
 
 _BYTES, _STRINGS = 5, 9
 _SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
@@ -87,7 +87,7 @@ def leaves(value: object, name: str = "") -> Iterator[str]:
 
 
 def ros2_value(value: object) -> Value:
-    """Convert a ROS 1 value to ROS 2. If ROS 2 has no such type, return a string that contains JSON."""
+    """Convert a ROS 1 value to ROS 2. If ROS 2 has no such type, convert it to a JSON string."""
     if isinstance(value, Binary):
         value = value.data
     if isinstance(value, bytes | bytearray):
@@ -125,7 +125,7 @@ def _checked(value: object) -> object:
 
 
 def listed(names: Sequence[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
-    """Return the names and prefixes that a list request selects. ``depth`` is the number of levels below a prefix, 0 for all."""
+    """Return the names and prefixes that a list request selects, up to ``depth`` levels below a prefix (0: all)."""
     found = []
     for name in names:
         rests = [name] if not prefixes else []

@@ -32,7 +32,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class Ros1Parameters:
-    """The master's parameters, with names and values as in ROS 2.
+    """The master's parameters, under ROS 2 names and with ROS 2 values.
 
     Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
@@ -53,7 +53,7 @@ class Ros1Parameters:
         return found
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error message for each, which is "" for success.
+        """Set or delete parameters; return an error message for each ("" for success).
 
         If ``atomically``, change no parameter if any of them is rejected.
         """

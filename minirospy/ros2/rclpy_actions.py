@@ -1,4 +1,4 @@
-"""Clients and servers of ROS 2 actions, with rclpy's own classes. Goals, results and feedback are CDR.
+"""Clients and servers of ROS 2 actions, based on rclpy's classes. Goals, results and feedback are CDR.
 
 Everything runs in the executor's thread, except for methods whose docstrings say otherwise.
 """
@@ -127,7 +127,7 @@ class GoalOfRos2:
 class ActionClient:
     """A client of an action.
 
-    It subscribes to feedback itself, because rclpy's client drops feedback that has not been read when the result arrives.
+    It subscribes to feedback itself, because rclpy's client drops unread feedback when the result arrives.
     """
 
     def __init__(self, calls: Calls, name: str, class_: ActionClass) -> None:
@@ -164,8 +164,8 @@ class ActionClient:
     def probe(self) -> Ros2Probe:
         """Return a probe that cancels a nonexistent goal.
 
-        The cancel client is the action client's last endpoint, so its response proves that the earlier ones have been
-        discovered, too.
+        The cancel client is the action client's last endpoint, so its response proves that the earlier ones have also
+        been discovered.
         """
         return _CancelProbe(self)
 
@@ -230,7 +230,7 @@ class ActionClient:
             _fail(accepted, error)
 
     def _read_feedback(self) -> None:
-        """Deliver the queued feedback that was sent before the result that has arrived."""
+        """Deliver the queued feedback that was sent before the result."""
         handle = self._feedback.handle
         with handle:
             while taken := handle.take_message(self._feedback_class, True):
@@ -244,7 +244,7 @@ class ActionClient:
 
 
 class _CancelProbe:
-    """A probe of an action's servers through an existing action client. Closing the probe does not close the client."""
+    """Probes an action's servers through an existing action client. Closing the probe does not close the client."""
 
     def __init__(self, client: ActionClient) -> None:
         self._client = client
@@ -279,7 +279,7 @@ def _client_class() -> Callable[..., _RclpyActionClient]:
 
 
 class Feedback:
-    """A goal's feedback, which is buffered until the goal's handle exists, then published.
+    """Buffers a goal's feedback until the goal's handle exists, then publishes it.
 
     Methods may be called from any thread.
     """
@@ -337,7 +337,7 @@ class ActionServer:
         )
 
     def close(self) -> None:
-        """Close the action after sending known results and rejections. Call it from any thread but the executor's."""
+        """Close the action after sending known results and rejections. Must not be called in the executor's thread."""
         sent = threading.Event()
         self._calls.end(functools.partial(self._wait_until_sent, sent))
         sent.wait(CLOSE_SECONDS)
@@ -345,7 +345,7 @@ class ActionServer:
         self._calls.end(self._server.destroy)
 
     def _wait_until_sent(self, sent: threading.Event) -> None:
-        """Set the event in the first iteration of the executor in which no response is pending."""
+        """Set the event in the executor's first iteration without pending responses."""
         if self._is_closed:
             return
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):

@@ -183,7 +183,7 @@ class Calls:
         }
 
     def client(self, name: str, class_: ServiceClass) -> Client:
-        """Return a client."""
+        """Return a client for a service."""
         return Client(self, name, class_)
 
     def server(self, name: str, class_: ServiceClass, answer: Callable[[bytes], Future[bytes]]) -> Server:
@@ -215,11 +215,11 @@ class Calls:
         return ParameterProbe([self.client(name, class_) for name in sorted(names)])
 
     def _writers(self, service: str) -> Sequence[_EndpointInfo]:
-        """Return the publishers on the DDS topic that carries a service's responses."""
+        """Return the publishers of the DDS topic that carries a service's responses."""
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy an object in the executor's thread, because that thread may be about to wait for the object.
+        """Destroy an object in the executor's thread, because that thread may be about to wait on it.
 
         May be called from any thread. rclpy's executor fails if an object is destroyed while the executor builds its wait set.
         """
@@ -394,7 +394,7 @@ class Server:
 
 
 def _process(info: _EndpointInfo) -> bytes:
-    """Return the part of an endpoint's id that is common to all endpoints in a process. Source: RTPS 2.5, 9.3.1."""
+    """Return the part of an endpoint's id that all endpoints of a process share. Source: RTPS 2.5, 9.3.1."""
     return bytes(info.endpoint_gid)[:_GUID_PREFIX]
 
 

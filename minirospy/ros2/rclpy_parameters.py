@@ -24,7 +24,7 @@ _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
 
 class ParameterStore(Protocol):
-    """The ROS 1 parameters, with names and values as in ROS 2.
+    """The ROS 1 parameters, under ROS 2 names and with ROS 2 values.
 
     Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
@@ -35,7 +35,7 @@ class ParameterStore(Protocol):
         """Return the parameters' values. A value has type 0 if the parameter is not set."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error message for each, which is "" for success."""
+        """Set or delete parameters; return an error message for each ("" for success)."""
 
 
 class ParameterServer:
@@ -140,7 +140,7 @@ class NodeParameters:
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter's value, which has type 0 if the parameter is not set."""
+        """Return a parameter's value. Its type is 0 if the parameter is not set."""
         response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)

@@ -1,10 +1,9 @@
-"""Waits until ROS 2 servers have discovered the bridge's client, because earlier responses may be lost. Runs on the node's loop.
+"""Waits until ROS 2 servers have discovered the bridge's client; until then, responses may be lost. Runs on the node's loop.
 
-A server discovers a client's endpoints later than the client discovers the server. Until then, rmw_fastrtps and
-rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified when a server has discovered it,
-but a response proves it, so a no-op request is repeated until a response arrives. A process announces its endpoints in
-the order of their creation, so the response to a client that was created later shows that earlier endpoints have been
-discovered, too.
+A client may discover a server before the server discovers the client's endpoints. Until it does, rmw_fastrtps and
+rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified of its discovery, but a response
+proves it, so a no-op request is repeated until a response arrives. A process announces its endpoints in the order of
+their creation, so the response to a client that was created later shows that earlier endpoints have also been discovered.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _LOOK_SECONDS = 0.02
 AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
 MAX_SECONDS = 10.0
-"""Maximum number of seconds to wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
+"""Maximum seconds to wait. After that, requests are sent even if a busy server has not responded."""
 
 
 class Reach:
@@ -46,7 +45,7 @@ class Reach:
             self._reaching = asyncio.ensure_future(self._reach())
 
     async def wait(self, seconds: float = math.inf) -> None:
-        """Return once responses from the current servers can arrive, or after ``seconds``.
+        """Wait until responses from the current servers can arrive, or for ``seconds``.
 
         Wait for ten seconds at most, so that unresponsive servers do not delay every request.
         """

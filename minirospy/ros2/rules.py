@@ -23,9 +23,9 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 class TypeRule:
     """The special cases in how a ROS 1 type maps to ROS 2.
 
-    ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields.
-    If ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks.
-    ``inlined`` is a field that ROS 2 replaces by that field's own fields.
+    ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields. If
+    ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side
+    lacks. ``inlined`` is a field that ROS 2 replaces by the fields it contains.
     """
 
     names: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ _NO_RULE = TypeRule()
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules for messages, services and actions, by ``pkg/Name``.
+    """Rules for messages, services and actions, keyed by ``pkg/Name``.
 
     The requests and responses of services, and the goals, results and feedback of actions, count as messages, with ROS 1's
     names.
@@ -59,7 +59,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the ROS 1 type that a rule maps to a ROS 2 message type, otherwise the type with the same name."""
+        """Return the ROS 1 type for a ROS 2 message type: the one in a rule, else the type of the same name."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]
@@ -83,7 +83,7 @@ class Rules:
         return _of_ros1(self.services, ros2_type)
 
     def with_(self, other: Rules) -> Rules:
-        """Return these rules, overridden by those of ``other``."""
+        """Return these rules, overridden by those in ``other``."""
         return Rules(
             {**self.messages, **other.messages},
             {**self.services, **other.services},
@@ -120,7 +120,7 @@ BUILT_IN = Rules(
             ),
             "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
             "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
-            # Fields that ROS 2 has added. They are empty in messages from ROS 1, and dropped in messages to ROS 1.
+            # Fields added by ROS 2. They are empty in messages from ROS 1, and dropped in messages to ROS 1.
             "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
             "sensor_msgs/Range": _only(ros2=("variance",)),
             "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),

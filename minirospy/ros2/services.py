@@ -49,7 +49,7 @@ _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
 """Maximum number of concurrent calls from a ROS 2 service to ROS 1; further calls fail with an error."""
 _MAX_UNDER_WAY = 8
-"""Maximum number of concurrent requests to a ROS 2 server: its queue has 10 places, and further requests would be lost."""
+"""Maximum number of concurrent requests to a ROS 2 server. Its queue holds 10, and further requests would be lost."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class ServiceCodec:
 
 
 class _Types:
-    """Creates and caches service codecs by the service's ROS 1 and ROS 2 types."""
+    """Creates service codecs, and caches them keyed by the service's ROS 1 and ROS 2 types."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -167,7 +167,7 @@ class ServiceBridge:
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Return a server's connection header, which is needed because the ROS 1 master does not know service types."""
+        """Query a server's connection header, because the ROS 1 master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -319,7 +319,7 @@ class _InRos2:
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
-        """Forward a request, and set the response or the error in ``answered``, a future that belongs to another thread."""
+        """Forward a request. Set the response or error in ``answered``, a future that belongs to another thread."""
         try:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:

@@ -1,6 +1,6 @@
-"""The ROS 2 backend with rclpy, for topics, publishers and subscriptions of serialized messages.
+"""The ROS 2 backend based on rclpy, with publishers and subscriptions for serialized messages.
 
-Only this module and rclpy_*.py use rclpy. ROS 2 calls back in the thread of its executor.
+Only this module and rclpy_*.py use rclpy. Callbacks run in the executor's thread.
 """
 
 from __future__ import annotations
@@ -333,7 +333,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service that the bridge offers. It is listed as the bridge's own until it is closed."""
+    """A service that the bridge offers. Until it is closed, it is listed as the bridge's own."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls
@@ -386,7 +386,7 @@ class TopicSubscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message and the messages queued after it, because the executor delivers messages slowly, one at a time."""
+        """Deliver a message and those queued after it: the executor itself delivers one message at a time, slowly."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:
@@ -396,7 +396,7 @@ class TopicSubscription:
                 with handle:
                     taken = handle.take_message(self.message_class, True)
             except self._invalid_handle:
-                return  # the loop's thread closed the subscription in the meantime
+                return  # the loop's thread has closed the subscription
             if taken is None:
                 return
             data = taken[0]

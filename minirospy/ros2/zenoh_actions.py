@@ -1,4 +1,4 @@
-"""Clients and servers of ROS 2 actions over Zenoh, with three services and two topics that are named as in rcl_action.
+"""Clients and servers of ROS 2 actions over Zenoh: three services and two topics, named as in rcl_action.
 
 A goal is preceded by its id, which has 16 bytes, so that the alignment of the rest does not change. Source:
 https://design.ros2.org/articles/actions.html, and the definitions of action_msgs.
@@ -58,7 +58,7 @@ class ActionEnds(NamedTuple):
 
 
 class ActionType:
-    """The messages that contain an action's goals, results and feedback.
+    """Encodes and decodes the messages that contain an action's goals, results and feedback.
 
     ``name`` is ``pkg/action/Name``; ``fields`` is a function that returns a part's fields.
     """
@@ -166,7 +166,10 @@ class ZenohActionClient:
 
     @property
     def servers(self) -> None:
-        """Return None: a response takes the same route as its request, whose existence the tokens prove, so it cannot be lost."""
+        """Return None: responses cannot be lost.
+
+        A response takes the same route as its request, and the tokens prove that the route exists.
+        """
 
     def probe(self) -> None:
         """Return None, because no probe is needed."""
@@ -262,7 +265,7 @@ class _Goal:
 
 
 class ZenohActionServer:
-    """An action that the bridge offers in ROS 2. It runs in one thread, so that all messages are sent in order."""
+    """An action that the bridge offers in ROS 2. Runs in a single thread, so that all messages are sent in order."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType, accept: Accept) -> None:
         self._name = ends.send_goal.name.removesuffix("/_action/send_goal")

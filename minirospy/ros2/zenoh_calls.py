@@ -31,14 +31,17 @@ __all__ = ["MAX_UNDER_WAY", "ZenohClient", "ZenohServer"]
 _log = logging.getLogger(__name__)
 
 MAX_BYTES = 64 << 20
-MAX_UNDER_WAY = 200  # maximum number of requests to a service whose responses have not been written yet
+# maximum number of requests to a service that await a response, or whose response has not been written
+MAX_UNDER_WAY = 200
 _MAX_OF_ACTION = 2_000
 """Maximum number of pending requests to an action.
 
 This limit exceeds the number of goals, because a request for a result waits until its goal has ended.
 """
 _MAX_SECONDS = 10_000_000
-"""Timeout in seconds, practically unlimited: the bridge has its own timeouts, and a shorter one in Zenoh would end long goals."""
+"""Timeout in seconds; practically unlimited, because the bridge has its own timeouts and long goals must not time out in
+Zenoh.
+"""
 
 
 class ZenohClient:
@@ -60,7 +63,10 @@ class ZenohClient:
 
     @property
     def servers(self) -> None:
-        """Return None: a response takes the same route as its request, whose existence the tokens prove, so it cannot be lost."""
+        """Return None: responses cannot be lost.
+
+        A response takes the same route as its request, and the tokens prove that the route exists.
+        """
 
     def probe(self) -> None:
         """Return None, because no probe is needed."""

@@ -35,7 +35,7 @@ _DEFAULT_DEPTH = 42
 
 
 class Kind(Enum):
-    """The kinds of entities that tokens declare."""
+    """The kinds of entities declared by tokens."""
 
     NODE = "NN"
     PUBLISHER = "MP"

@@ -1,4 +1,4 @@
-"""The bridge's ROS 2 node on a Zenoh session, with its tokens and endpoints, and the graph from other sessions' tokens."""
+"""The bridge's ROS 2 node on a Zenoh session: its tokens and endpoints, and the graph of other sessions."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _MAX_ENTITIES = 50_000
 
 
 class Graph:
-    """All tokens from other sessions. Methods may be called from any thread."""
+    """The nodes and endpoints in other sessions, from their tokens. Methods may be called from any thread."""
 
     def __init__(self, own_session: str = "") -> None:
         self._own = own_session
@@ -127,7 +127,7 @@ class ZenohNode:
 
     def _opened(self, options: NetworkOptions) -> Session:
         config = configured(options)
-        # Enable time stamps, which messages that are stored for late subscribers need.
+        # Enable time stamps: messages stored for late subscribers need them.
         config.insert_json5("timestamping/enabled", "true")
         try:
             session: Session = self.zenoh.open(config)

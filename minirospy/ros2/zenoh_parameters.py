@@ -27,7 +27,7 @@ _Values = Mapping[str, object]
 
 
 class ZenohParameterServer:
-    """The parameter services of the bridge's node. ``fields`` returns the fields of a type, as ``Definitions.fields`` does."""
+    """The parameter services of the bridge's node. ``fields`` returns a type's fields, like ``Definitions.fields``."""
 
     def __init__(
         self,
@@ -121,7 +121,7 @@ class ZenohNodeParameters:
         return _texts(cast("_Values", result)["names"])
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter's value, which has type 0 if the parameter is not set."""
+        """Return a parameter's value. Its type is 0 if the parameter is not set."""
         found = self._call(node, ParameterService.GET, {"names": [name]})["values"]
         values = cast("list[_Values]", found)
         return _read(values[0]) if values else Value(0)

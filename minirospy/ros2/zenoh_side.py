@@ -1,7 +1,7 @@
 """The ROS 2 backend over Zenoh, for nodes that use rmw_zenoh. It requires no ROS 2 on this machine.
 
-Zenoh calls back in its own threads. Definitions are derived from ROS 1 definitions and the rules; a type is not bridged
-if its hash differs from the one in the other side's keys.
+Callbacks run in Zenoh's threads. Definitions are derived from ROS 1 definitions and the rules; a type is not bridged if
+its hash differs from the one in the other side's keys.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class ZenohSide:
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a publisher. Raise TypesDiffer as :meth:`fields` does."""
+        """Return a publisher. Raise TypesDiffer like :meth:`fields`."""
         end = self._topic_end(Kind.PUBLISHER, topic, type_, Qos(True, is_latched, depth))
         return ZenohPublisher(self._node, end)
 
@@ -98,7 +98,7 @@ class ZenohSide:
     ) -> Ros2Handle:
         """Call ``deliver`` for each serialized message, in one of Zenoh's threads.
 
-        Raise TypesDiffer as :meth:`fields` does.
+        Raise TypesDiffer like :meth:`fields`.
         """
         end = self._topic_end(Kind.SUBSCRIPTION, topic, type_, Qos(is_reliable, is_latched, depth))
         return subscribe(self._node, end, deliver)
@@ -109,23 +109,23 @@ class ZenohSide:
         return {end.name: end.short_type for end in ends if not is_bridge(end.node)}
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer as :meth:`fields` does."""
+        """Return the fields of a service's request and response. Raise TypesDiffer like :meth:`fields`."""
         self._service_end(Kind.CLIENT, "", type_.replace("/", "/srv/"))
         request, response = self._definitions.service(type_)
         return dict(request), dict(response)
 
     def client(self, service: str, type_: str) -> Ros2Client:
-        """Return a client. Raise TypesDiffer as :meth:`fields` does."""
+        """Return a client. Raise TypesDiffer like :meth:`fields`."""
         return ZenohClient(self._node, self._service_end(Kind.CLIENT, service, type_.replace("/", "/srv/")))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service. Raise TypesDiffer as :meth:`fields` does."""
+        """Offer a service. Raise TypesDiffer like :meth:`fields`."""
         response = self._definitions.service(type_)[1]
         end = self._service_end(Kind.SERVICE, service, type_.replace("/", "/srv/"))
         return ZenohServer(self._node, end, response, answer)
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer as :meth:`fields` does."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer like :meth:`fields`."""
         whole = type_.replace("/", "/action/")
         self._service_end(Kind.CLIENT, "", f"{whole}_SendGoal")
         self._service_end(Kind.CLIENT, "", f"{whole}_GetResult")
@@ -135,12 +135,12 @@ class ZenohSide:
         return dict(goal), dict(result), dict(feedback_fields)
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Return a client of an action. Raise TypesDiffer as :meth:`fields` does."""
+        """Return a client of an action. Raise TypesDiffer like :meth:`fields`."""
         ends = self._action_ends(action, type_, Kind.CLIENT, Kind.SUBSCRIPTION)
         return ZenohActionClient(self._node, ends, self._action_type(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action. Raise TypesDiffer as :meth:`fields` does."""
+        """Offer an action. Raise TypesDiffer like :meth:`fields`."""
         ends = self._action_ends(action, type_, Kind.SERVICE, Kind.PUBLISHER)
         return ZenohActionServer(self._node, ends, self._action_type(type_), accept)
 
@@ -180,7 +180,7 @@ class ZenohSide:
         return ActionType(type_.replace("/", "/action/"), self._definitions.fields)
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
-        """Return the hash of a type to use in keys: the local hash, or NO_HASH if the other side uses no hashes.
+        """Return a type's hash for use in keys: the local hash, or NO_HASH if the other side uses no hashes.
 
         Raise TypesDiffer if the other side's endpoints have a different hash.
         """

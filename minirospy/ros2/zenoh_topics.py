@@ -1,4 +1,4 @@
-"""ROS 2 publishers and subscriptions over Zenoh, which actions also use. Callbacks run in Zenoh's threads."""
+"""ROS 2 publishers and subscriptions over Zenoh, also used by actions. Callbacks run in Zenoh's threads."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class Log(Protocol):
 
 @dataclass
 class Item:
-    """A received status, and the time at which it was received."""
+    """A received status, and its arrival time."""
 
     name: str
     time: float
@@ -135,7 +135,10 @@ class _Items:
 
 
 class GenericAnalyzer(_Items):
-    """Accepts statuses by name. Parameters: path, find_and_remove_prefix, startswith, name, contains, expected, regex, ..."""
+    """Accepts statuses selected by name.
+
+    Parameters: path, find_and_remove_prefix, startswith, name, contains, expected, regex, ...
+    """
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
         """Read the parameters. If they do not define an analyzer, report the error and raise ValueError."""
@@ -147,7 +150,7 @@ class GenericAnalyzer(_Items):
             return _words(params.get(key, []), log)
 
         prefixes = words("find_and_remove_prefix")
-        # Both parameters apply, as they do in ROS.
+        # As in ROS, both parameters apply.
         self._starts = prefixes + words("startswith")
         self._removed = [_shown(word) for word in prefixes + words("remove_prefix")]
         self._names = words("name")
@@ -356,7 +359,7 @@ def strip_prefix(name: str, prefix: str) -> str:
     if not prefix:
         return name
     at = name.rfind("/") + 1
-    # Keep the prefix if it also occurs earlier in the name, as ROS does.
+    # As in ROS, keep the prefix if it also occurs earlier in the name.
     if name.find(prefix) == at:
         name = name[:at] + name[at + len(prefix) :]
     if at and name[at:].startswith(":"):

@@ -68,7 +68,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
     target = (f"bgr{8 if kind == 'jpeg' else bits}") if image.encoding in _COLORS else ""
     pixels = _pixels(image, target or "passthrough")
     if kind == "jpeg" and bits == 16 and not target:
-        # Clip 16-bit values that JPEG cannot store, as OpenCV does.
+        # Like OpenCV, clip 16-bit values that JPEG cannot store.
         pixels = pixels.clip(0, 255).astype("uint8")
     options = Options(
         settings.jpeg_quality,

@@ -28,7 +28,7 @@ _LOOK_SECONDS = 0.2  # maximum seconds until the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-# seconds after which motors are restarted: half the time for which the device runs them after each command
+# seconds after which to restart motors: half as long as the device runs them per command
 _RUMBLE_SECONDS = 0.5
 
 

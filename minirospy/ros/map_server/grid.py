@@ -161,7 +161,7 @@ def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians; 0 if the pitch is a right angle, like tf2's getEulerYPR.
+    """Return the rotation about z in radians. Like tf2's getEulerYPR, return 0 if the pitch is a right angle.
 
     Also return 0 for the unset quaternion 0, 0, 0, 0. The real program writes `-nan`, which no map_server can read.
     """

@@ -1,4 +1,4 @@
-"""joint_state_publisher_gui for the terminal: joint_state_publisher with sliders, which the user moves with keys.
+"""joint_state_publisher_gui for the terminal: joint_state_publisher with sliders controlled by keys.
 
 Without a terminal, as in roslaunch, it publishes the zeros and the joint states from its sources.
 Source: http://wiki.ros.org/joint_state_publisher_gui.

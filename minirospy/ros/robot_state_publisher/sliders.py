@@ -28,7 +28,7 @@ class Row(NamedTuple):
 
 
 class Sliders:
-    """The adjustable joints, one of which is selected. ``random_`` generates random positions."""
+    """The adjustable joints. One of them is selected. ``random_`` generates random positions."""
 
     def __init__(self, joints: Mapping[str, FreeJoint], random_: random.Random | None = None) -> None:
         self._joints = joints

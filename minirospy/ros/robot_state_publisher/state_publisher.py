@@ -114,7 +114,7 @@ class StatePublisher:
         last = min((self._published.get(name, rospy.Time()) for name in state.name), default=now)
         if not self._ignores_stamps and stamp < min(last, now) + self._period:
             return
-        # If a joint is named twice, use the first position, as ROS does.
+        # As in ROS, use the first position if a joint is named twice.
         positions = dict(zip(reversed(state.name), reversed(state.position), strict=True))
         for name in self._frames.unknown(positions):
             rospy.logwarn_throttle(10, f'Joint state with name: "{name}" was received but not found in URDF')

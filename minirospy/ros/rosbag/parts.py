@@ -1,7 +1,7 @@
-"""Finds rosbag's migration of messages; its modules are imported only if they are used.
+"""Finds rosbag's message migration, and imports its modules only when they are used.
 
-No other module refers to these modules. If their folder and `rosbag/migration.py` are deleted, the verbs and programs are
-missing.
+No other module refers to these modules. If their folder and `rosbag/migration.py` are deleted, only the verbs and
+programs for migration are missing.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def migration_verbs() -> tuple[Verb, ...]:
 
 
 def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
-    """Return the programs that migrate messages, by name."""
+    """Return a dict of the programs that migrate messages, keyed by name."""
     module = _module("scripts")
     return module.SCRIPTS if module else {}
 

@@ -1,4 +1,4 @@
-"""Messages as YAML, as `rosmsg-proto` prints them: styles, filters, and arrays with one element each.
+"""Formats messages as YAML, like `rosmsg-proto`: styles, filters, and one element in each array.
 
 Source: the output of ROS's `rosmsg.get_yaml_for_msg`. By default, flat values are in braces only after the first dictionary
 or list with more than four entries.
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 MAX_DEFAULT_NON_FLOW_ITEMS = (
-    4  # maximum number of entries of a dictionary or list; after a longer one, flat values are in braces
+    4  # maximum number of entries in a dictionary or list; after a longer one, flat values are in braces
 )
 _USAGE_ERROR = getattr(os, "EX_USAGE", 1)
 _NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte", "char"}
@@ -72,7 +72,7 @@ def dump(
     flow_style: bool | None,
     fill_arrays: bool,
 ) -> str:
-    """Return a message, dictionary or list as YAML. `rosmsg.get_yaml_for_msg` documents the arguments."""
+    """Format a message, dictionary or list as YAML. `rosmsg.get_yaml_for_msg` documents the arguments."""
 
     def represent(dumper: Any, value: Any) -> yaml.Node:
         entries: OrderedDict[str, object] = OrderedDict()
@@ -134,7 +134,7 @@ def create_names_filter(names: Sequence[str]) -> Callable[[Any], list[str]]:
 
 
 def init_rosmsg_proto() -> None:
-    """Make `get_yaml_for_msg` keep the order of fields from now on, as `rosmsg-proto` does.
+    """Make `get_yaml_for_msg` preserve the fields' order, like `rosmsg-proto`.
 
     ROS's function also changes PyYAML for the whole process; with Python 3.10 or later, loading YAML then fails.
     """
@@ -142,7 +142,7 @@ def init_rosmsg_proto() -> None:
 
 
 def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> OrderedDict[Any, Any]:
-    """Return a YAML node as an OrderedDict; can be used as the method `construct_mapping` of a PyYAML loader."""
+    """Convert a YAML node to an OrderedDict, for use as `construct_mapping` of a PyYAML loader."""
     if not isinstance(node, yaml.MappingNode):
         error = f"expected a mapping node, but found {node.id}"
         raise yaml.constructor.ConstructorError(None, None, error, node.start_mark)
@@ -160,7 +160,7 @@ def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> Order
 
 
 def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator[OrderedDict[Any, Any]]:
-    """Yield an OrderedDict, then fill it; can be used as a PyYAML constructor."""
+    """Yield an OrderedDict, then fill it, for use as a PyYAML constructor."""
     data: OrderedDict[Any, Any] = OrderedDict()
     yield data
     data.update(self.construct_mapping(node))
@@ -240,7 +240,7 @@ def _instance(mode: str, name: str) -> object:
 
 
 def _only_type(mode: str, name: str) -> str:
-    """Return the full name of the only type with the name ``name``."""
+    """Return the full name of the only type called ``name``."""
     from minirospy.base.errors import NotFoundError
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages

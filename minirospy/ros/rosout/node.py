@@ -47,16 +47,16 @@ Longer messages are dropped, so that no node can fill the memory of the master's
 """
 
 _MAX_SUBSCRIBERS = 200
-"""Maximum number of subscribers to /rosout_agg, because each may have a message of maximum size queued."""
+"""Maximum number of subscribers to /rosout_agg. It is limited because each may queue a message of maximum size."""
 
 _LARGE, _MAX_LARGE = 16 * 1024, 100
-"""Size in bytes, and number of messages. If a subscriber has this many queued messages, larger messages are not sent to it."""
+"""Size in bytes, and number of messages: larger messages are not sent to a subscriber with this many queued messages."""
 
-STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
+STEP_LETTERS = 1024  # characters of text to write per step; escaping one may take a microsecond
 
 
 class RosoutNode:
-    """Republishes each log message with unchanged bytes, on the event loop that starts the node."""
+    """Republishes log messages with unchanged bytes. Runs on the event loop that starts the node."""
 
     def __init__(
         self, environment: Environment, log_file: Path | None, omits_topics: Callable[[], bool]
@@ -180,7 +180,7 @@ class RosoutNode:
         )
 
         parts: list[str] = []
-        # Keep line breaks in the message, as the real log file does, but not in the other fields.
+        # As in the real log file, keep line breaks in the message, but not in other fields.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
             for at in range(0, len(text), STEP_LETTERS):
                 parts.append(escaped(text[at : at + STEP_LETTERS], keep))
@@ -196,7 +196,7 @@ def _bytes_of(message: Message) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """Return a Python logger's ROS name: ``ros`` and its children, as in roscpp nodes."""
+    """Convert a Python logger's name to ROS's style, ``ros`` and its children, as in roscpp nodes."""
     return "ros" + name.removeprefix("minirospy")
 
 

@@ -1,4 +1,4 @@
-"""rostopic's functions that format a message as comma-separated values, and its functions that parse field paths.
+"""rostopic's functions that format messages as comma-separated values and parse field paths.
 
 Source: the output of ROS's `rostopic._str_plot`. Each string is a cell; byte arrays and empty arrays are omitted.
 """
@@ -27,7 +27,7 @@ _PLAIN = (bool, int, float)
 
 
 def plot_fields(val: object, f: str, field_filter: FieldFilter | None) -> str:
-    """Return the line with the names of a value's cells: `time,`, then each path below ``f``."""
+    """Return the header line for a value's cells: `time,`, then each path below ``f``."""
     return f"time,{plot_field_cells(val, f, field_filter) or ''}"
 
 
@@ -86,7 +86,7 @@ def _cells(
                 field = convert_getattr(value, name, type_)
                 yield from _cells(field, f"{path}.{name}", time_offset, field_filter)
     elif type(value) in (list, tuple) and len(value):
-        # As in ROS, the first element's type is decisive: a list of lists has no cells.
+        # As in ROS, the first element's type decides: a list of lists has no cells.
         first = value[0]
         if type(first) in (*_PLAIN, str) or isinstance(first, TVal):
             for index, each in enumerate(value):
@@ -103,7 +103,7 @@ def _text(value: Any, time_offset: Time | None) -> str:
 
 
 def convert_getattr(val: object, f: str, t: str) -> Any:
-    """Return a field; return a string in a field of type uint8[] as a list of numbers."""
+    """Return a field's value. Convert a string in a uint8[] field to a list of numbers."""
     value = getattr(val, f)
     return [ord(each) for each in value] if isinstance(value, str) and "uint8[" in t else value
 

@@ -1,4 +1,4 @@
-"""rostopic's functions for publishing values from a program, from stdin or a file, and from a parameter.
+"""rostopic's functions that publish values from a program, from stdin or a file, or from a parameter.
 
 Source: the behaviour of ROS's rostopic.
 """
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 SUBSCRIBER_TIMEOUT = 5.0  # seconds after which stdin_publish publishes even without a subscriber
-_LATCH_SECONDS = 3.0  # seconds for which a process that publishes one message continues to run, as in ROS
+_LATCH_SECONDS = 3.0  # seconds to keep running after publishing a single message, as in ROS
 _POLL_SECONDS = 0.05  # seconds between checks of a parameter's cached value
 
 
@@ -140,7 +140,7 @@ def argv_publish(
     verbose: bool,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish values as `rostopic pub` publishes the values on its command line; if ``once``, wait 3 seconds afterwards."""
+    """Publish values like those on the command line of `rostopic pub`. If ``once``, wait 3 seconds afterwards."""
     import rospy
 
     publish_message(pub, msg_class, pub_args, rate, once, verbose, substitute_keywords)

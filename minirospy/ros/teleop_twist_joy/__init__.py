@@ -1,4 +1,4 @@
-"""The ROS package teleop_twist_joy, which converts joystick states to Twists. Source: http://wiki.ros.org/teleop_twist_joy."""
+"""The ROS package teleop_twist_joy: converts joystick states to Twists. Source: http://wiki.ros.org/teleop_twist_joy."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 

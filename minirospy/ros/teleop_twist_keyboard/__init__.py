@@ -1,4 +1,4 @@
-"""The ROS package teleop_twist_keyboard, which converts keys to Twists. Source: http://wiki.ros.org/teleop_twist_keyboard."""
+"""The ROS package teleop_twist_keyboard: converts keys to Twists. Source: http://wiki.ros.org/teleop_twist_keyboard."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 

@@ -46,7 +46,7 @@ e/c : increase/decrease only angular speed by 10%
 CTRL-C to quit
 """
 
-_HELP_EVERY = 15  # number of speed changes after which the help text is printed again
+_HELP_EVERY = 15  # number of speed changes between repeats of the help text
 
 _QUIT = "\x03"
 
@@ -105,13 +105,13 @@ class KeyTeleop:
 
     @property
     def motion(self) -> Motion:
-        """The motion that results from all keys so far."""
+        """Return the motion that results from all keys so far."""
         x, y, z, turn = self._direction
         return Motion(x * self._speed, y * self._speed, z * self._speed, turn * self._turn)
 
     @property
     def speeds(self) -> str:
-        """The line that shows the speeds."""
+        """Return the line that shows the speeds."""
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:

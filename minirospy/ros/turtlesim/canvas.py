@@ -1,4 +1,4 @@
-"""The canvas under the turtles: draws pen strokes, and returns pixel colours. Pure."""
+"""The turtles' canvas: draws pen strokes, and returns pixel colours. Pure."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Canvas:
 
     def __init__(self, background: Color) -> None:
         self.pixels: NDArray[np.uint8] = np.empty((PIXELS, PIXELS, 3), np.uint8)
-        """The colours by row and column."""
+        """The colours, indexed by row and column."""
         self.marks: NDArray[np.bool_] = np.empty((PIXELS, PIXELS), np.bool_)
-        """True for each pixel on which a pen has drawn, by row and column."""
+        """True for each pixel that a pen has drawn on, indexed by row and column."""
         self.background = background
         self.version = 0  # incremented on each change
         self.fill(background)
@@ -43,7 +43,7 @@ class Canvas:
     def stroke(
         self, start: tuple[float, float], end: tuple[float, float], color: Color, width: float
     ) -> None:
-        """Draw a straight line whose square ends extend ``width`` / 2 beyond its end points, clipped to the canvas."""
+        """Draw a straight line, clipped to the canvas. Its square ends extend ``width`` / 2 beyond the end points."""
         (x0, y0), (x1, y1) = start, end
         length = math.hypot(x1 - x0, y1 - y0)
         along_x, along_y = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)

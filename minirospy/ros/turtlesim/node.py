@@ -42,7 +42,7 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2  # seconds of suspension after which the node skips the missed steps
+_LATE_SECONDS = 0.2  # if the node is suspended for longer than this, in seconds, it skips the missed steps
 
 _T = TypeVar("_T")
 
@@ -193,7 +193,7 @@ class Simulator:
 
 
 def refusing(request: Callable[[], _T]) -> _T:
-    """Return the result of a request to the world; if the world refuses it, log the error and raise ServiceException."""
+    """Pass a request to the world and return the result. If the world rejects it, log the error and raise ServiceException."""
     try:
         return request()
     except WorldError as error:

@@ -15,7 +15,7 @@ __all__ = ["Order", "Square"]
 
 _SIDE_METRES = 2.0
 _NEAR_METRES, _NEAR_RADIANS = 0.1, 0.01
-_STILL = 0.0001  # metres or radians per second, below which the turtle counts as stopped
+_STILL = 0.0001  # metres or radians per second below which the turtle counts as stopped
 
 
 class Order(NamedTuple):

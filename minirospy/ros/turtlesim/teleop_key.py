@@ -23,7 +23,7 @@ _QUIT = "q"
 _USUAL_SCALE = 2.0
 
 DIRECTIONS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, 1.0), "right": (0.0, -1.0)}
-"""The signs of (forward motion, turn to the left) by key."""
+"""The signs of (forward motion, turn to the left), keyed by key name."""
 
 
 def main() -> int:

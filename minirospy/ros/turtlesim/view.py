@@ -1,4 +1,4 @@
-"""Draws the turtles' world with characters, live in a terminal."""
+"""Draws the turtles' world live in a terminal, with characters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PERIOD_SECONDS = 0.1
 _LINES_BESIDE = 4  # number of terminal lines reserved for the log and the picture's frame
 
 _ROWS = range(8, 41)
-"""Allowed numbers of rows: with fewer rows, too little would be visible; more rows would take too much CPU time."""
+"""Allowed numbers of rows: fewer would show too little, more would take too much CPU time."""
 
 _ARROWS, _ASCII_ARROWS = "→↗↑↖←↙↓↘", ">/^\\</v\\"
 _STYLES = ("bright_green", "bright_yellow", "bright_red", "bright_cyan", "bright_magenta", "bright_white")
@@ -33,7 +33,7 @@ _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 
 class Picture:
-    """The current picture of a world, for rich: pen lines as dots, turtles as arrows, and each turtle's pose below."""
+    """A rich renderable that draws a world: pen lines as dots, turtles as arrows, and each turtle's pose below."""
 
     def __init__(self, world: World) -> None:
         self._canvas = world.canvas
@@ -73,7 +73,7 @@ class Picture:
         )
 
     def _turtles(self, rows: int, *, is_ascii: bool) -> dict[tuple[int, int], tuple[str, str]]:
-        """Return each turtle's arrow and style by row and column. If several turtles are in a cell, the last one is shown."""
+        """Return turtles' arrows and styles, keyed by row and column. Only a cell's last turtle is shown."""
         arrows = _ASCII_ARROWS if is_ascii else _ARROWS
         found = {}
         for index, pose in enumerate(self._poses.values()):

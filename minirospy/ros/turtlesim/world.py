@@ -20,7 +20,7 @@ BACKGROUND = Color(69, 86, 255)  # background if the parameters set no other col
 
 STEP_SECONDS = 0.016  # seconds between two steps
 
-_COMMAND_SECONDS = 1.0  # seconds for which a velocity command applies
+_COMMAND_SECONDS = 1.0  # seconds that a velocity command stays in effect
 
 _PIXELS_PER_METRE = 45.0
 
@@ -122,7 +122,7 @@ class _Turtle:
 
 
 class World:
-    """The turtles by name, and their canvas. Initially there are no turtles."""
+    """The turtles, keyed by name, and their canvas. Initially, there are no turtles."""
 
     def __init__(self, background: Color = BACKGROUND) -> None:
         self.canvas = Canvas(background)
@@ -131,7 +131,7 @@ class World:
 
     @property
     def names(self) -> list[str]:
-        """The turtles' names, sorted."""
+        """Return the turtles' names, sorted."""
         return sorted(self._turtles)
 
     def pose(self, name: str) -> Pose:

@@ -1,4 +1,4 @@
-"""The names of actionlib.action_client."""
+"""Provides the names in ROS's module actionlib.action_client."""
 
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from std_msgs.msg import Header

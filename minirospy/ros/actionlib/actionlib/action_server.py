@@ -1,4 +1,4 @@
-"""The names of actionlib.action_server."""
+"""Provides the names in ROS's module actionlib.action_server."""
 
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 

@@ -1,4 +1,4 @@
-"""The names of actionlib.exceptions."""
+"""Provides the names in ROS's module actionlib.exceptions."""
 
 from minirospy.ros.actionlib.actionlib.spec import ActionException
 

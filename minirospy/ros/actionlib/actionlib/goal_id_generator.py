@@ -1,4 +1,4 @@
-"""The names of actionlib.goal_id_generator."""
+"""Provides the names in ROS's module actionlib.goal_id_generator."""
 
 from minirospy.ros.actionlib.actionlib.goal_id import GoalIDGenerator
 

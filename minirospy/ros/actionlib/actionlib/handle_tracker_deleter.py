@@ -1,4 +1,4 @@
-"""The names of actionlib.handle_tracker_deleter."""
+"""Provides the names in ROS's module actionlib.handle_tracker_deleter."""
 
 from minirospy.ros.actionlib.actionlib.handle import HandleTrackerDeleter
 

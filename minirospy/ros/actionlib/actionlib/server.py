@@ -361,7 +361,7 @@ class _StatusThread:
 
 
 def _status_frequency(name: str) -> float:
-    """Return the rate in Hz at which a server publishes all statuses.
+    """Return the rate, in Hz, of publishing all statuses.
 
     Raise ActionException if the parameter is not a number above 0.
     """

@@ -1,4 +1,4 @@
-"""The names of actionlib.server_goal_handle."""
+"""Provides the names in ROS's module actionlib.server_goal_handle."""
 
 from minirospy.ros.actionlib.actionlib.handle import ServerGoalHandle
 

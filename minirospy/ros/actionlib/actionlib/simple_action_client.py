@@ -1,4 +1,4 @@
-"""The names of actionlib.simple_action_client."""
+"""Provides the names in ROS's module actionlib.simple_action_client."""
 
 from actionlib_msgs.msg import GoalStatus
 

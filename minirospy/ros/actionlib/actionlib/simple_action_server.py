@@ -1,4 +1,4 @@
-"""The names of actionlib.simple_action_server."""
+"""Provides the names in ROS's module actionlib.simple_action_server."""
 
 from actionlib_msgs.msg import GoalStatus
 

@@ -131,7 +131,7 @@ class SimpleActionServer:
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()``, which is called when a goal arrives. If the server has an execute callback, log a warning instead."""
+        """Set ``cb()`` to be called when a goal arrives. If the server has an execute callback, log a warning instead."""
         if self.execute_callback:
             rospy.logwarn(
                 "Cannot call SimpleActionServer.register_goal_callback() because an executeCallback exists. "
@@ -141,7 +141,7 @@ class SimpleActionServer:
             self.goal_callback = cb
 
     def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()``, which is called when preemption of the active goal is requested."""
+        """Set ``cb()`` to be called when preemption of the active goal is requested."""
         self.preempt_callback = cb
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:

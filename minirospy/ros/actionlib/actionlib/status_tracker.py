@@ -1,4 +1,4 @@
-"""The names of actionlib.status_tracker."""
+"""Provides the names in ROS's module actionlib.status_tracker."""
 
 from minirospy.ros.actionlib.actionlib.handle import StatusTracker
 

@@ -33,10 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class NodeParser(Parser):
-    """A parser that skips remapping arguments, which the node parses itself."""
+    """A parser that skips remapping arguments, because the node parses them."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
+        """Parse the arguments to a dict keyed by name. Raise CommandLineError if an argument is invalid."""
         from minirospy import client as rospy
 
         return super().parse(rospy.myargv(["", *words])[1:])

@@ -1,6 +1,6 @@
 """The package index that PyPI's xacro uses to resolve `$(find PACKAGE)`. It finds the same packages as minirospy.
 
-xacro supports both ROS 1 and 2, and its PyPI release looks packages up as ROS 2 does. In an environment with ROS 2, the
+xacro supports both ROS 1 and 2, and its PyPI release uses ROS 2's API to find packages. In an environment with ROS 2, the
 real module takes precedence.
 """
 

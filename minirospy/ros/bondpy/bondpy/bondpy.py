@@ -67,7 +67,7 @@ class Timeout:
 
 
 class Bond:
-    """One endpoint of a bond. ``start`` waits for the peer, which is a Bond with the same topic and ID in another node."""
+    """One endpoint of a bond. ``start`` waits for the peer: a Bond with the same topic and ID in another node."""
 
     def __init__(
         self, topic: str, id: str, on_broken: Callback | None = None, on_formed: Callback | None = None

@@ -48,7 +48,7 @@ def catkin_find(argv: Sequence[str] | None = None) -> int:
 
 
 def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 2, as catkin does, if the package does not exist."""
+    """Run the command. As in catkin, return 2 if the package does not exist."""
     return FIND_PKG.main(argv)
 
 

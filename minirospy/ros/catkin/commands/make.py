@@ -48,7 +48,7 @@ class _MakeParser(Parser):
     """A parser that removes CMake arguments, and returns the variables they set as the argument ``variables``."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
+        """Parse the arguments to a dict keyed by name. Raise CommandLineError if an argument is invalid."""
         return {**super().parse(without_cmake(words)), "variables": cmake_variables(words)}
 
 

@@ -96,7 +96,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 
 
 def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
-    """Return the folder in which to run a test; create the folder if it is the package's build folder.
+    """Return the folder to run a test in. If it is the package's build folder, create it.
 
     As in catkin, ``nosetests --where=FOLDER`` runs in the given folder; other programs run in the build folder.
     """

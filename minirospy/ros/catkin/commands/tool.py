@@ -65,7 +65,7 @@ class _Settings(NamedTuple):
         return cls(**{name: found[name] for name in cls._fields if name in found})
 
     def updated(self, new: _Settings) -> _Settings:
-        """Return a copy in which the settings in ``new`` override these."""
+        """Return a copy of these settings, overridden by those in ``new``."""
         return _Settings(
             self.install if new.install is None else new.install,
             self.blacklist if new.blacklist is None else new.blacklist,
@@ -103,7 +103,7 @@ class _CatkinParser(Parser):
         )
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
+        """Parse the arguments to a dict keyed by name. Raise CommandLineError if an argument is invalid."""
         if not self._takes_cmake_words:
             return super().parse(words)
         options = super().parse(without_cmake(words))

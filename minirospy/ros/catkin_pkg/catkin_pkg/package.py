@@ -69,7 +69,7 @@ _DEPENDENCIES = {
     "replace": "replaces",
 }
 """Maps each tag to the package's attribute that lists its dependencies."""
-# attributes to which the tag <depend> adds a dependency
+# attributes that the tag <depend> adds a dependency to
 _GENERIC = ("build_depends", "build_export_depends", "exec_depends")
 _SINGLE = ("name", "version", "description")
 _COMMON = {*_SINGLE, "maintainer", "license", "author", "url", "export", "conflict", "replace"}
@@ -302,7 +302,7 @@ class Package:
         return [each.content or "" for each in exports]
 
     def is_metapackage(self) -> bool:
-        """Return whether the package is a metapackage, which only lists other packages."""
+        """Return whether the package is a metapackage, a mere list of other packages."""
         return "metapackage" in (each.tagname for each in self.exports)
 
     def has_invalid_metapackage_dependencies(self) -> bool:
@@ -570,7 +570,7 @@ def _text(element: Element) -> str:
 
 
 def _inside(element: Element) -> str:
-    """Return an element's content, including child elements, as XML."""
+    """Return the XML inside an element, including child elements."""
     return (
         escape(element.text or "")
         + "".join(tostring(each, encoding="unicode").replace(" />", "/>") for each in element)

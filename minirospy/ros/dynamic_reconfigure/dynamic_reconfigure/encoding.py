@@ -1,8 +1,8 @@
-"""dynamic_reconfigure.encoding: conversion of configurations and descriptions to messages, and back.
+"""dynamic_reconfigure.encoding: converts configurations and descriptions to messages, and back.
 
-A configuration is a dict of values by name. Its key ``groups`` contains the tree of its groups, each a dict with ``id``,
-``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by ID; 0 is the
-root group.
+A configuration is a dict of values keyed by name. Its key ``groups`` contains the tree of its groups, each a dict with
+``id``, ``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by ID; 0 is
+the root group.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def decode_description(msg: ConfigDescription) -> Config:
 
 
 def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None = None) -> Config:
-    """Return a message's groups as a tree; if ``group`` is given and not the root, return only its subgroups by name."""
+    """Return a message's groups as a tree; if ``group`` is given and not the root, return only a dict of its subgroups."""
     if group is None or group.id == 0:
         return _tree(m.groups, group_dict)
     return _children(m.groups, group.id, group_dict, set())
@@ -189,7 +189,7 @@ def _tree(groups: Iterable[_G], decode: Callable[[_G], Config]) -> Config:
 
 
 def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config], above: set[int]) -> Config:
-    """Return a group's subgroups by name. Groups that contain themselves are omitted."""
+    """Return a dict of a group's subgroups, keyed by name. Omit groups that contain themselves."""
     children = Config()
     for each in groups:
         if each.id != 0 and each.parent == parent and each.id not in above:
@@ -200,7 +200,7 @@ def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config],
 
 
 def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a server's first configuration, in which the groups have the states from the type's description."""
+    """Return a server's initial configuration. The groups' states are those in the type's description."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)

@@ -310,7 +310,7 @@ class ParameterGenerator:
 
 
 def _source_line() -> tuple[str, int]:
-    """Return the .cfg file's name and its current line, which are stored in each parameter's description."""
+    """Return the .cfg file's name and its current line, to store in a parameter's description."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

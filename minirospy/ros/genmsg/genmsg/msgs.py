@@ -138,7 +138,7 @@ class MsgSpec:
         return [Field(name, type_) for type_, name in self.fields()]
 
     def has_header(self) -> bool:
-        """Return whether the first field is a header, which publishers fill in."""
+        """Return whether the first field is a header. Publishers fill it in."""
         return self.fields()[:1] == [(HEADER_FULL_NAME, "header")]
 
     def __eq__(self, other: object) -> bool:

@@ -1,4 +1,4 @@
-"""The names of genpy.rostime."""
+"""Provides the names in ROS's module genpy.rostime."""
 
 from minirospy.base.times import Duration, Time, TVal
 

@@ -95,7 +95,7 @@ class PinholeCameraModel:
         return undistorted(uv_raw, self.K, self._distortion(), self.R, self.P)
 
     def unrectifyPoint(self, uv_rect: Point) -> Array:
-        """Convert a pixel in the rectified image to the raw image, as the C++ class does; return an array (u, v)."""
+        """Convert a pixel in the rectified image to the raw image, like the C++ class; return an array (u, v)."""
         import numpy as np
 
         self._check()
@@ -235,7 +235,7 @@ class StereoCameraModel:
         self.Q[3, 2] = _ratio(1.0, baseline)
 
     def tfFrame(self) -> str | None:
-        """Return the left camera's frame ID, which is also the frame of the points."""
+        """Return the left camera's frame ID. The points are also in this frame."""
         return self.left.tfFrame()
 
     def project3dToPixel(self, point: Point) -> tuple[tuple[float, float], tuple[float, float]]:

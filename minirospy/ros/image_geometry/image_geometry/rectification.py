@@ -59,7 +59,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels for rectified pixels, as two arrays u and v.
+    """Map rectified pixels to raw pixels; return two arrays u and v.
 
     Raise ValueError if the number of coefficients in D is not supported.
     """

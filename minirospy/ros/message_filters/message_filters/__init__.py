@@ -30,7 +30,7 @@ _NO_HEADER = (
 
 
 class Input(Protocol):
-    """An object to which a filter can be connected."""
+    """An object that a filter can be connected to."""
 
     def registerCallback(self, cb: Callback, *args: object) -> object:
         """Register ``cb``, which is called with each message, followed by ``args``."""
@@ -271,7 +271,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             if is_stale:
                 return
 
-            # Skip the search if an input has no messages, which is the most frequent case.
+            # Skip the search if an input has no messages, the most frequent case.
             if self.queues is self._stamp_queues and not all(self._orders):
                 return
             found = self._match(my_queue_index, nanoseconds)
@@ -280,7 +280,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     @property
     def last_added(self) -> Time:
-        """Return the time at which the last message arrived."""
+        """Return the last message's arrival time."""
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:

@@ -45,7 +45,7 @@ class StampQueue(MutableMapping[Time, object]):
         return repr(dict(self))
 
     def put(self, nanoseconds: int, stamp: Time, message: object) -> None:
-        """Store a message under its stamp, which is given both in nanoseconds and as a Time."""
+        """Store a message under its stamp, given both in nanoseconds and as a Time."""
         entries, order = self._entries, self.order
         if nanoseconds in entries:
             # As in a dict, storing under an existing key keeps the key's position and the key object.

@@ -1,4 +1,4 @@
-"""PyKDL's functions on frames, and placeholders for kinematic chains and their solvers, which are not implemented."""
+"""PyKDL's functions on frames, and placeholders for kinematic chains and solvers, which are not implemented."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ class Vector:
 
 
 class Screw:
-    """The base class of Twist and Wrench, which consist of two vectors and can be indexed as six numbers."""
+    """The base class of Twist and Wrench: two vectors, also indexed as six numbers."""
 
     _NAMES: tuple[str, str]
     __hash__ = None  # type: ignore[assignment]

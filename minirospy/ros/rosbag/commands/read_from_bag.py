@@ -81,7 +81,7 @@ def _topics_in_order(reader: BagReader) -> list[str]:
 
 
 class EchoOptions(NamedTuple):
-    """Options for printing the messages of a bag.
+    """Options for printing a bag's messages.
 
     ``make`` returns the Echo for a topic or field; ``keep`` filters messages; at most ``limit`` messages are printed,
     each after ``prefix``.
@@ -94,7 +94,10 @@ class EchoOptions(NamedTuple):
 
 
 def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
-    """Print a bag's messages on the topic ``name``, or one field of them if ``name`` ends in a field; None prints all topics."""
+    """Print a bag's messages on the topic ``name`` (None: all topics).
+
+    If ``name`` ends in a field, print only that field.
+    """
     from minirospy.introspect.messages import Received
     from minirospy.introspect.topics import TopicField
 
@@ -106,7 +109,8 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
         for message in reader.messages(paths) if options.limit != 0 else ():
             connection = message.connection
             field = paths[connection.id]
-            # Topics without a field share one Echo: the output of -p starts with a single line of column names.
+            # Topics without a field share one Echo, so that the output of -p starts with a single line of column
+            # names.
             if field not in echoes:
                 echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
             echo = echoes[field]
@@ -129,7 +133,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
 
 
 def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
-    """Return the IDs of the connections to print, each with the path of the field to print, which is "" for the whole message."""
+    """Return a dict of connection IDs to print, with the path of the field to print ("": the whole message)."""
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")

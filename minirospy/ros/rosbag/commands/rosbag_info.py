@@ -1,4 +1,7 @@
-"""`rosbag info` and `rosbag filter`: summarize a bag, or copy a part of it. Source: http://wiki.ros.org/rosbag/Commandline."""
+"""`rosbag info` and `rosbag filter`: summarize a bag, or copy part of it.
+
+Source: http://wiki.ros.org/rosbag/Commandline.
+"""
 
 from __future__ import annotations
 

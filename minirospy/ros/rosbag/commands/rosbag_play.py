@@ -24,7 +24,7 @@ _FOREVER = 1e12
 
 
 class PlayArguments(NamedTuple):
-    """The command line of rosbag play."""
+    """The parsed command line of rosbag play."""
 
     bagfiles: list[str]
     prefix: str
@@ -182,7 +182,7 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
             for path in paths:
                 client.loginfo("Opening %s", path)
             if options.prefix:
-                # Print two closing quotes, as the C++ program does.
+                # Print two closing quotes, like the C++ program.
                 client.loginfo("Using prefix '%s'' for topics ", options.prefix)
             player = Player(bags, options, serve if foxglove_port is not None else None)
             return player.run()

@@ -18,7 +18,7 @@ _BESIDE_PATH = 37  # number of columns in ROS's progress line, excluding the pat
 
 @contextlib.contextmanager
 def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """Yield a function to be called with the number of bytes done, out of ``total``.
+    """Yield a function that takes the number of bytes done, out of ``total``, and shows the progress.
 
     The output ends with a newline, even if the block raises an exception.
     """

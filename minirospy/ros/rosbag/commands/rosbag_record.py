@@ -20,7 +20,7 @@ __all__ = ["COMMAND", "VERB", "main", "without_split_size"]
 
 
 class RecordArguments(NamedTuple):
-    """The command line of rosbag record."""
+    """The parsed command line of rosbag record."""
 
     topics: list[str]
     all: bool
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Yield the words, replacing ``--split=N`` and ``--split N``, which old launch files use, by ``--split --size N``."""
+    """Replace ``--split=N`` and ``--split N``, used in old launch files, by ``--split --size N``. Yield the new words."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()

@@ -1,4 +1,4 @@
-"""`rosbag compress`, `decompress` and `reindex` rewrite a bag and keep the original; `encrypt` and `decrypt` are refused.
+"""`rosbag compress`, `decompress` and `reindex` rewrite a bag and keep the original; `encrypt` and `decrypt` are not supported.
 
 Source: http://wiki.ros.org/rosbag/Commandline. As in ROS, an unreadable file is reported, and the next one is processed.
 """
@@ -110,7 +110,7 @@ def _rewrite(
     *,
     unindexed: bool = False,
 ) -> int:
-    """Rewrite each bag with ``write(source, target)``, either into a folder, or in place with a backup of the original.
+    """Rewrite each bag with ``write(source, target)``, into a folder, or in place with a backup of the original.
 
     Return the exit status.
     """

@@ -33,9 +33,9 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> Script:
-    """Return a program that copies a bag.
+    """Return a program that copies a bag with changes.
 
-    The bags are its first and second argument or, of four arguments, the second and last.
+    The bags are its first two arguments or, if there are four, the second and the last.
     """
 
     def script(words: list[str]) -> int:
@@ -146,4 +146,4 @@ SCRIPTS: dict[str, Script] = {
     "fix_md5sums.py": _fix_md5sums,
     "savemsg.py": _savemsg,
 }
-"""The programs by name; the programs for migration are in `migration/scripts.py`."""
+"""The programs, keyed by name. Those for migration are in `migration/scripts.py`."""

@@ -1,4 +1,4 @@
-"""Migrates bags that contain messages whose types have changed: finds the required migrations, and writes a migrated bag."""
+"""Migrates bags whose message types have changed: finds the required migrations, and writes a migrated bag."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["check_bag", "check_classes", "fix_bag"]
 
 
 def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) -> list[Migration]:
-    """Return the migrations required by messages with these classes, one per class."""
+    """Return the migrations that messages of these classes require, one per class."""
     found = []
     seen = set()
     for each in classes:
@@ -47,7 +47,9 @@ def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object
 def fix_bag(
     migrator: MessageMigrator, source: str, target: str, warn: Callable[[str], object], *, force: bool = False
 ) -> list[Migration]:
-    """Write a bag with its messages migrated; return the migrations that lack a rule. If a rule is missing, write nothing.
+    """Migrate a bag's messages into a new bag; return the migrations without a rule.
+
+    If any rule is missing, write nothing.
 
     ``force``: write the bag anyway, and copy messages that cannot be migrated. Raise BagError if the bag is invalid,
     OSError if a file cannot be read or written, BagMigrationException if a message cannot be migrated.

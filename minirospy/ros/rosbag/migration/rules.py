@@ -210,7 +210,7 @@ def qualified_name(name: str, top_name: str) -> str:
 
 
 def get_message_key(c: MessageClass) -> Key | None:
-    """Return a message class's key, which is its type and md5sum, or None if ``c`` is not a message class."""
+    """Return a message class's key (type and md5sum), or None if ``c`` is not a message class."""
     try:
         return c._type, c._md5sum
     except AttributeError:
@@ -326,7 +326,7 @@ def _rule(
     valid: bool,
     update: Step | None = None,
 ) -> type[MessageUpdateRule]:
-    """Return a rule class that also contains its own source code for a .bmr file."""
+    """Return a rule class that includes its own source code for a .bmr file."""
     old_type, old_text = (old_class._type, old_class._full_text.strip()) if old_class else ("", "")
     new_type, new_text = (new_class._type, new_class._full_text.strip()) if new_class else ("", "")
     pairs = "".join(f'\n\t\t("{old}","{new}"),' for old, new in migrated)
@@ -423,7 +423,7 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
-    """Return the classes for a full definition, and the class of its main type.
+    """Generate the classes for a full definition; return them, and the class of the main type.
 
     Return ({}, None) if there is no type or the definition is invalid.
     """

@@ -53,7 +53,7 @@ class RuleChain:
 
 
 class ScaffoldNode:
-    """A step on a path, which converts one class to another with a rule; ``next`` is the following step."""
+    """A step on a path. Converts one class to another with a rule; ``next`` is the following step."""
 
     def __init__(
         self, old_class: MessageClass, new_class: MessageClass, rule: MessageUpdateRule | None
@@ -79,14 +79,14 @@ class ScaffoldNode:
 
 
 class Migration(NamedTuple):
-    """A type that needs migration, with its path and the rules that are missing on the path."""
+    """A type that needs migration, with its path and the rules missing from that path."""
 
     path: list[ScaffoldNode]
     missing: list[MessageUpdateRule]
 
 
 class MessageMigrator:
-    """Migrates messages with the rules in .bmr files, and with those that packages export (``plugins``).
+    """Migrates messages by the rules in .bmr files and those exported by packages (``plugins``).
 
     Raise BagMigrationException if a rule is marked as not valid.
     """
@@ -180,7 +180,7 @@ class MessageMigrator:
         return found
 
     def find_target(self, old_class: MessageClass) -> MessageClass:
-        """Return the installed class to which messages with this class are migrated, or None if no such class is installed."""
+        """Return the installed class to which messages of ``old_class`` are migrated, or None if none is installed."""
         from minirospy.core.idl.load import get_message_class
 
         key = get_message_key(old_class)
@@ -227,7 +227,10 @@ class MessageMigrator:
         return msg_to[0], body, msg_to[2], msg_to[3], msg_to[4]
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill a message with a new type from one with an old type. Raise BagMigrationException if there is no valid path."""
+        """Fill a message of a new type from a message of an old type.
+
+        Raise BagMigrationException if there is no valid path.
+        """
         path = self._valid_path(type(msg_from), type(msg_to), msg_from._type, msg_to._type)
         if not path or msg_from._md5sum == msg_to._md5sum:
             copy_message(msg_from, msg_to)
@@ -237,7 +240,7 @@ class MessageMigrator:
         copy_message(self._apply(path, message), msg_to)
 
     def migrate_array(self, msg_from_array: Sequence[Message], msg_to_array: Sequence[Message]) -> None:
-        """Fill messages with a new type from as many messages with an old type.
+        """Fill messages of a new type from the same number of messages of an old type.
 
         Raise BagMigrationException if the lengths differ, or there is no valid path.
         """
@@ -261,7 +264,7 @@ class MessageMigrator:
     # -- loading
 
     def _load(self, path: Path, name: str) -> None:
-        """Execute a rule file, which is Python code, and add its rules."""
+        """Execute a rule file (Python code) and add its rules."""
         scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)

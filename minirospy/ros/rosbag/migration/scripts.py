@@ -22,7 +22,7 @@ __all__ = ["SCRIPTS"]
 
 
 def _with_definition_of_md5sum(connection: Connection) -> Connection:
-    """Return the connection with the definition that matches its md5sum, if rules or packages contain it."""
+    """Replace the connection's definition by the one for its md5sum, if rules or packages have one."""
     from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import class_of_connection
 
@@ -111,4 +111,4 @@ SCRIPTS: dict[str, Script] = {
     "fixbag_batch.py": _fixbag_batch,
     "makerule.py": _makerule,
 }
-"""The programs by name."""
+"""The migration programs, keyed by name."""

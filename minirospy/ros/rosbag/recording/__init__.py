@@ -1,4 +1,4 @@
-"""Records topics into bags and plays bags, with two nodes based on `client/`, and pure code that makes their decisions.
+"""Records and plays bags: two nodes based on `client/`, and the pure code that makes their decisions.
 
 `options` and `splits` (which topics to record, into which files) and `schedule` (when to publish which message) are pure;
 `recorder` and `player` are the nodes, `disk` writes files in a thread, `keys` reads single keys from a terminal.

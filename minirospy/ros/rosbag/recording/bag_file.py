@@ -32,7 +32,7 @@ class FileWriter(Protocol):
 
     @property
     def gathered(self) -> int:
-        """Return the number of bytes in memory that have not been passed to the stream yet."""
+        """Return the number of bytes in memory that have not yet been passed to the stream."""
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Add a connection and return its number."""
@@ -47,13 +47,13 @@ class FileWriter(Protocol):
         """Write the end of the file."""
 
     def salvage(self, written: int | None = None) -> int:
-        """Complete a file whose stream has failed; return the number of lost messages."""
+        """Complete a file after its stream has failed; return the number of lost messages."""
 
 
 class BagFile:
     """A bag that is being recorded. Call its methods with ``lock`` held.
 
-    ``on_error(file, error, lost)`` is called in the disk thread if the disk or a compression fails. By then the file has
+    ``on_error(file, error, lost)`` is called in the disk thread if the disk or a compression fails. By then, the file has
     its final name and is readable, but ``lost`` messages are missing (-1: the file could not be completed). Raise OSError
     if the file cannot be created.
     """
@@ -92,7 +92,7 @@ class BagFile:
 
     @property
     def gathered(self) -> int:
-        """Return the number of bytes in memory, not counting those in the disk thread's queue."""
+        """Return the number of buffered bytes, not counting those in the disk thread's queue."""
         return self._writer.gathered
 
     def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:

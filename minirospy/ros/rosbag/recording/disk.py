@@ -63,7 +63,7 @@ class DiskThread:
 
 
 class QueuedFile:
-    """A new file with the stream methods that a bag's writer needs.
+    """A new file with the stream methods that a bag writer needs.
 
     Calls are queued, except that a call from the disk thread runs immediately.
 
@@ -77,8 +77,8 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # Use open_file, which follows no symbolic links, because an attacker can guess the name, which contains the
-        # time.
+        # Use open_file, which does not follow symbolic links: the name contains the time, so an attacker could guess
+        # it.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 

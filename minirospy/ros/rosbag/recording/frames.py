@@ -1,4 +1,4 @@
-"""Message classes that contain serialized bytes unchanged, for recording and playing."""
+"""Message classes that keep the serialized bytes unchanged, for recording and playing."""
 
 from __future__ import annotations
 
@@ -33,6 +33,6 @@ def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:
-    """Return a message class with this type whose messages are published from their serialized bytes, ``_buff``."""
+    """Return a message class of this type. Its messages are published from their serialized bytes, ``_buff``."""
     fields = {"_type": type_, "_md5sum": md5sum, "_full_text": definition, "__slots__": []}
     return type("StoredFrame", (AnyMsg,), fields)

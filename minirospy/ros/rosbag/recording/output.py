@@ -1,4 +1,4 @@
-"""The output of a player: by default this process's node, for `rosbag play`, or another output for a player in a program."""
+"""A player's output: this process's node for `rosbag play`, or another output for players inside programs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
-# GIL switch interval in seconds: the maximum time by which the reading thread may delay a due message
+# GIL switch interval in seconds: how long the reading thread may delay a due message
 _SWITCH_SECONDS = 0.00005
 
 _STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the time stamp
@@ -49,13 +49,13 @@ class Output(Protocol):
     """The destination of a player's messages. All methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
-        """Prepare the output, so that the player ends when the connection to the graph is shut down.
+        """Prepare the output, and end the player when the connection to the graph is shut down.
 
         This method is called first.
         """
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """Advertise the topics to be played, given as connections, each with its bag's number."""
+        """Advertise the topics of these connections. Each connection comes with its bag's number."""
 
     def offer(self, player: Controls) -> None:
         """Offer controls for the player, such as a service."""
@@ -64,7 +64,7 @@ class Output(Protocol):
         """Return whether each topic has a subscriber."""
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """Return the context manager within which messages are played; meanwhile, ``on_key`` is called with each typed key."""
+        """Return a context manager within which messages are played. Inside it, ``on_key`` is called with each typed key."""
 
     def publish(self, number: int, message: StoredMessage) -> None:
         """Publish a message from the bag with this number."""
@@ -73,7 +73,7 @@ class Output(Protocol):
         """Publish the bag time on /clock."""
 
     def waiting_bytes(self) -> int:
-        """Return how many bytes are queued for subscribers."""
+        """Return the number of bytes queued for subscribers."""
 
     def print(self, text: str, end: str = "\n") -> None:
         """Print a line for the user."""
@@ -96,7 +96,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Sends late subscribers the last message from each latched recorded publisher, because a topic stores only one message."""
+    """Sends late subscribers each latched publisher's last message, because a topic itself stores only one message."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []

@@ -1,4 +1,4 @@
-"""The state of `rosbag play` and the effects of requests, as a state machine. Pure: wall times are arguments.
+"""`rosbag play` as a state machine: its state, and the effects of requests. Pure: wall times are arguments.
 
 ========= ============================================== ===================================================
 phase     meaning                                        left for
@@ -26,7 +26,7 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, Statu
 
 __all__ = ["Phase", "Playback", "PlayerState"]
 
-# ns; delay before the first message, so that it is not late because threads are still starting
+# delay in ns before the first message, so that threads that are still starting do not make it late
 _LEAD = 10**9 // 500
 
 
@@ -54,9 +54,9 @@ class Playback:
     def __init__(self, options: PlayOptions) -> None:
         self.phase = Phase.OPENING
         self.is_fresh = True  # True if no message has been published since the start or the last seek
-        # shutdown was requested; this is possible in any phase, and set without the lock
+        # set, without the lock, if a shutdown was requested; possible in any phase
         self.is_ended = False
-        self.options = options  # control() changes its settings for looping and /clock
+        self.options = options  # control() changes the settings for looping and /clock
         self.seek_to: int | None = None  # the requested bag time, until the reader takes it
         self._span = (0, 0)  # bag times of the first and last message; set in OPENING
         self._starts_paused = options.paused  # used before PLAYING
@@ -178,9 +178,9 @@ class Playback:
         return start
 
     def arrive(self, start: int, wall: int) -> None:
-        """Continue at ``start``, from which the files are now read, unless another seek has been requested in the meantime."""
+        """Continue at ``start``, where the files are now read from, unless another seek has been requested since."""
         if self.seek_to is None:
-            # Keep the steps that were requested in the meantime.
+            # Keep the steps requested meanwhile.
             self._running.seek(start, wall, keeps_steps=True)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
@@ -195,8 +195,7 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Set is_fresh together with the new time, because a client that sees this time counts its steps from
-            # here.
+            # Set is_fresh together with the new time: a client that sees this time counts its steps from here.
             self.is_fresh = False
         return wait
 

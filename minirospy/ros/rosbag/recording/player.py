@@ -23,14 +23,14 @@ __all__ = ["Player"]
 _SECOND = 10**9
 _TICK = _SECOND // 10  # interval in ns between status lines and between shutdown checks
 
-# seconds after which, at the end, to give up on a subscriber that has read nothing in that time
+# at the end, seconds to wait for a subscriber that reads nothing
 _STALLED_SECONDS = 5.0
 
 
 class Player:
     """Plays bags through this process's node, or through another ``output``; init_node() must have been called for a node.
 
-    A :class:`Playback` decides the effect of requests; this class provides the lock, the time and the messages.
+    A :class:`Playback` decides what requests do; this class provides the lock, the time and the messages.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class Player:
         self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
-        """Wait for the delay and for subscribers, as the options require; publish messages latched before the start."""
+        """Wait for the delay and for subscribers, according to the options; publish messages latched before the start."""
         options = self._options
         self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
         self._sleep(options.delay)
@@ -215,7 +215,7 @@ class Player:
             self.on_change()
 
     def _wait_for_slow_subscribers(self) -> None:
-        """Wait until subscribers have read the queued messages, which would be lost when this process exits."""
+        """Wait until subscribers have read the queued messages; they would be lost when this process exits."""
         left, end = 0, 0.0
         while not self._playback.is_ended and (waiting := self._output.waiting_bytes()):
             now = time.monotonic()
@@ -238,7 +238,7 @@ class Player:
             self._playback.leave_end()
 
     def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
-        """Return the messages from ``start`` on, after publishing those that were latched before ``start``."""
+        """Publish the messages latched before ``start``; return those from ``start`` on."""
         messages.join()
         selection = selection._replace(start=start)
         for number, message in self._bags.last_latched(selection):

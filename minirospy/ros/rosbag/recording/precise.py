@@ -13,12 +13,12 @@ __all__ = ["PreciseWait"]
 # SignalSafeEvent.wait() is imprecise, so sleep instead for the last N ns before the deadline.
 _EVENT_NS = 5_000_000
 
-# Linux's PR_SET_TIMERSLACK, which sets by how much the kernel may delay a thread's wake-up; by default 50 us
+# Linux's PR_SET_TIMERSLACK: how long the kernel may delay a thread's wake-up, 50 us by default
 _TIMER_SLACK = 29
 
 
 class PreciseWait:
-    """Waits until a time on ``time.perf_counter_ns()``, which is precise on every OS.
+    """Waits until a time of ``time.perf_counter_ns()``, a clock that is precise on every OS.
 
     Only the thread that creates it may wait; any thread, and a signal handler, may call ``wake``.
     """

@@ -1,7 +1,7 @@
 """The node that records topics: `rosbag record`. Messages are written as received, without deserializing.
 
 The workers that receive messages write them into the current chunk; complete chunks are queued for the disk thread.
-Therefore only the disk limits the recording. If the disk is too slow, messages are dropped and counted per topic.
+Therefore, only the disk limits the recording rate. If the disk is too slow, messages are dropped and counted per topic.
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
 
@@ -184,7 +184,7 @@ class Recorder:
                     self._subscribe(name)
 
     def _check_space(self) -> bool:
-        """Return whether there is disk space left.
+        """Return whether there is enough disk space left.
 
         Warn if there is little, and stop recording if there is less than the minimum.
         """
@@ -285,14 +285,14 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Give latched messages the time of this file's first message, because they are written first.
+        # Give latched messages the time of this file's first message, because they precede it.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
             self._announcement.publish(self._announcement.data_class(name))
 
     def _waiting(self, file: BagFile) -> int:
-        """Return how many bytes are not yet on disk."""
+        """Return the number of bytes not yet on disk."""
         return self._disk.pending + file.gathered
 
     def _close(self) -> None:

@@ -48,7 +48,7 @@ class State(enum.Enum):
 
 
 class Status(NamedTuple):
-    """The contents of the status line: the bag time, and how much of the total length has been played."""
+    """The contents of the status line: the bag time, and how much of the bag has been played."""
 
     state: State
     time: int
@@ -66,7 +66,7 @@ class Schedule:
     def __init__(self, options: PlayOptions, first: int, last: int, wall: int) -> None:
         """Create a schedule. ``first`` and ``last`` are the bag times of the first and last message.
 
-        ``wall`` is the wall time at which the first message is due.
+        ``wall`` is the wall time when the first message is due.
         """
         self._options = options
         self._first = first
@@ -75,7 +75,7 @@ class Schedule:
         self._message = first
         self._is_due = False
         self._clock = first
-        self._since = wall  # wall time at which the current pause or delay started
+        self._since = wall  # wall time when the current pause or delay started
         self._paused = options.paused
         self._steps = 0
         self._delayed = False
@@ -136,9 +136,9 @@ class Schedule:
                 self._delayed = True
 
     def poll(self, wall: int) -> int | None:
-        """Return None if the message is due now, or the wall time until which to wait before the next poll.
+        """Return None if the message is due now, else the wall time of the next poll.
 
-        Poll earlier if another method is called in the meantime.
+        Poll earlier if another method is called before that.
         """
         if self._is_due:
             self._clock = self._message
@@ -175,7 +175,7 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now or, if there is no current message, the next one to be offered."""
+        """If paused, make the current message due now, or the next one offered if there is no current message."""
         if self._paused:
             self._steps += 1
 
@@ -211,7 +211,7 @@ class Schedule:
         return min(wait, self._next_tick) if self._period else wait
 
     def _due(self) -> int:
-        """Return the wall time at which the message is due."""
+        """Return the wall time when the message is due."""
         return self._origin + self._scaled(self._message - self._first, 1 / self._rate)
 
     def _bag_time(self, wall: int) -> int:

@@ -73,7 +73,7 @@ class Bags:
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
 
     def last_time(self, selection: Selection) -> int:
-        """Return the time of the last message in a non-empty selection. This reads only a few chunks."""
+        """Return the time of the last message in a non-empty selection. Read only a few chunks."""
         return max(_last_time(reader, selection) for reader in self.readers)
 
     def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
@@ -131,11 +131,11 @@ class ReadAhead:
         self._first.wait()
 
     def close(self) -> None:
-        """Request the thread to stop."""
+        """Ask the thread to stop."""
         self._stop.set()
 
     def join(self) -> None:
-        """Wait, after :meth:`close`, until the thread has stopped; the caller may then use the files again."""
+        """After :meth:`close`, wait until the thread has stopped. The caller may then use the files again."""
         self._thread.join()
 
     def _read(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:

@@ -10,7 +10,7 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MAX_EMPTY = 100  # maximum number of empty files to write after a long time without messages, as in ROS
+_MAX_EMPTY = 100  # maximum number of empty files written after a long time without messages, as in ROS
 
 
 class Next(enum.Enum):
@@ -33,7 +33,7 @@ class Splits:
     def check(self, size: int, now: int) -> Next:
         """Return the action for a file with ``size`` bytes.
 
-        After SPLIT, call this method again, because several splits may be due after a time without messages.
+        After SPLIT, call this method again: several splits may be due after a time without messages.
         """
         options = self._options
         if options.max_size and size > options.max_size:
@@ -62,7 +62,7 @@ class Splits:
 
 
 def file_name(options: RecordOptions, count: int, now: float) -> str:
-    """Return the name of file number ``count``. ``now`` (seconds since 1970) is the time at which it is opened."""
+    """Return the name of file number ``count``. ``now`` (seconds since 1970) is when it is opened."""
     parts = [options.prefix.removesuffix(options.extension)] if options.prefix else []
     if options.append_date:
         parts.append(time.strftime("%Y-%m-%d-%H-%M-%S", time.localtime(now)))

@@ -27,7 +27,7 @@ __getattr__ = on_first_use("rosbag", "bag", "migration", "rosbag_main")
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> int:
-    """Run the command rosbag with ``argv``, whose first item is the program's name; return its exit status."""
+    """Run the command rosbag; return its exit status. ``argv`` starts with the program's name."""
     from minirospy.ros.rosbag.commands import rosbag
 
     return rosbag.main((sys.argv if argv is None else argv)[1:])

@@ -137,7 +137,7 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[bytes]):
-    """A buffer to which a message's ``serialize`` writes."""
+    """A buffer for a message's ``serialize`` to write to."""
 
     __slots__ = ()
     write = list.append
@@ -178,7 +178,7 @@ class Bag(OpenedBag):
         self._skip_index = skip_index
         self._written: dict[
             tuple[str, str], int
-        ] = {}  # connection numbers of written messages, by topic and md5sum
+        ] = {}  # connection numbers of written messages, keyed by topic and md5sum
         self._pieces = _Pieces()
 
         if not f:
@@ -344,8 +344,7 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # Convert the body first, so that an unsuitable one raises an error before part of it is written to the
-            # chunk.
+            # Convert the body first, so that an invalid one raises an error before anything is written to the chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
@@ -364,7 +363,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _write_connection_record(self, connection_info: _ConnectionInfo, encrypt: bool = False) -> None:
-        """Add a connection for the messages of its topic and type that are written from now on."""
+        """Add a connection, used for later messages with its topic and type."""
         if self._file is None:
             raise ValueError(CLOSED)
         if self._writer is None:
@@ -408,7 +407,7 @@ class Bag(OpenedBag):
             self._close_file()
 
     def get_compression_info(self) -> CompressionTuple:
-        """Return the most frequent compression, and the total size of the chunks: compression, uncompressed, compressed."""
+        """Return (compression, uncompressed, compressed): the most frequent compression, and the chunks' total sizes."""
         with as_ros_errors():
             stored = info.compression_of(self._current())
         name = stored[0].compression if stored else self.compression
@@ -432,7 +431,10 @@ class Bag(OpenedBag):
         return self._times()[1]
 
     def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
-        """Return (msg_types, topics): md5sums by type, and (msg_type, message_count, connections, frequency) by topic."""
+        """Return (msg_types, topics).
+
+        ``msg_types`` maps types to md5sums, ``topics`` maps topics to (msg_type, message_count, connections, frequency).
+        """
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=self._skip_index) as bag:
                 return bag.get_type_and_topic_info(topic_filters)
@@ -450,7 +452,7 @@ class Bag(OpenedBag):
     def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
         """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
 
-        Raise ROSBagException if the bag already has chunks, as the real module does.
+        Like the real module, raise ROSBagException if the bag already has chunks.
         """
         if self._current().chunks:
             raise ROSBagException("Cannot set encryptor after chunks are written")
@@ -461,7 +463,7 @@ class Bag(OpenedBag):
         return info.as_text(self._summary(frequencies=not self._skip_index))
 
     def _get_yaml_info(self, key: str | None = None) -> str | None:
-        """Return the info as YAML, or the value for a key such as ``topics[0].type``, or None if the info has no such key."""
+        """Return the info as YAML, or the value of a key such as ``topics[0].type`` (None: no such key)."""
         text = info.as_yaml(self._summary(frequencies=not self._skip_index))
         if not key:
             return text
@@ -472,7 +474,7 @@ class Bag(OpenedBag):
             return None
 
     def _create_reader(self) -> None:
-        """Create ``_reader``, which programs use to access the bag's internals; a subclass may set a different reader."""
+        """Create ``_reader``. Programs use it to access the bag's internals, and subclasses may set a different one."""
         self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
 
     # -- internal -------------------------------------------------------------------------------------------------

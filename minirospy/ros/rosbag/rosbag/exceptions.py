@@ -60,7 +60,7 @@ class ROSBagEncryptException(ROSBagException):
 
 @contextmanager
 def as_ros_errors() -> Iterator[None]:
-    """Convert minirospy's bag errors to rosbag's exceptions, which programs catch."""
+    """Convert minirospy's bag errors to rosbag's exceptions, because programs catch those."""
     try:
         yield
     except BagError as error:

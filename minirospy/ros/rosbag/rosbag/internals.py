@@ -1,4 +1,4 @@
-"""The private parts of rosbag.bag: records as objects, which rqt_bag and other programs use."""
+"""The private parts of rosbag.bag: records as objects, used by rqt_bag and other programs."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ class _IndexEntry200(_IndexEntry):
 
 
 class _Index(Sequence[_IndexEntry]):
-    """A connection's index entries as objects, which are created on access."""
+    """A connection's index entries as objects, created on access."""
 
     def __init__(self, index: ConnectionIndex) -> None:
         self.source = index
@@ -195,7 +195,7 @@ class _Index(Sequence[_IndexEntry]):
 
 
 _message_types: dict[str, type[Message]] = {}
-"""Message classes by md5sum; the dict has the same name in ROS's rosbag."""
+"""Message classes keyed by md5sum. The name is the same as in ROS's rosbag."""
 
 
 def _get_message_type(info: _ConnectionInfo) -> type[Message]:

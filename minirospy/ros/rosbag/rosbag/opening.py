@@ -1,4 +1,4 @@
-"""The base class of rosbag.Bag, which opens a file to read, write or append, and creates its reader and writer."""
+"""The base class of rosbag.Bag. Opens a file to read, write or append, and creates its reader and writer."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class OpenedBag(PrivateBag):
 
     @property
     def _index_data_pos(self) -> int:
-        """The position of the connection records and chunk infos; 0 while the bag is being written, or if it has no index."""
+        """Return the position of the connection records and chunk infos; 0 if the bag is being written or has no index."""
         return (
             self._source.index_position
             if isinstance(self._source, ChunkedReader) and self._mode == "r"
@@ -52,11 +52,11 @@ class OpenedBag(PrivateBag):
 
     @property
     def _output_file(self) -> BinaryIO | None:
-        """The file to write to, as in the real module if no chunk is open."""
+        """Return the file to write to. In the real module, this is the file if no chunk is open."""
         return self._file
 
     def _current(self) -> BagReader:
-        """Return the reader, which also includes the connections and chunks written so far."""
+        """Return the reader, with the connections and chunks written so far."""
         stream = self._open_file()
         reader = self._source
         if reader is None:

@@ -34,7 +34,7 @@ ConnectionFilter = Callable[[str, str, str, str, Header], object]
 
 
 class BagMessage(NamedTuple):
-    """A message; if ``raw``, the message is a tuple: type, bytes, md5sum, position and class."""
+    """A message with its topic and time. If ``raw``, the message is a tuple: type, bytes, md5sum, position and class."""
 
     topic: str
     message: object
@@ -56,11 +56,11 @@ class PrivateBag(ABC):
     _file: BinaryIO | None
     _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
-    """The list of chunks that a program has assigned in place of the bag's own, or None."""
+    """The chunks that a program has assigned in place of the bag's own, or None."""
 
     @abstractmethod
     def _current(self) -> BagReader:
-        """Return the reader, which also covers the connections and chunks written so far."""
+        """Return the reader, with the connections and chunks written so far."""
 
     @abstractmethod
     def flush(self) -> None:
@@ -107,7 +107,7 @@ class PrivateBag(ABC):
 
     @property
     def _topic_connections(self) -> dict[str, _ConnectionInfo]:
-        """The newest connection of each topic, for writing."""
+        """Return each topic's newest connection, for writing."""
         return {connection.topic: connection for connection in self._connections.values()}
 
     def _clear_index(self) -> None:
@@ -116,7 +116,10 @@ class PrivateBag(ABC):
 
     @contextlib.contextmanager
     def _position_kept(self) -> Iterator[None]:
-        """Restore the file's position: the program may read records there, and in the real module, this data is in memory."""
+        """Restore the file's position after the block.
+
+        The program may be reading records there; the real module has this data in memory.
+        """
         position = self._file.tell() if self._file else 0
         yield
         if self._file:
@@ -145,7 +148,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position, given in the format used in index entries and raw messages."""
+        """Return the message at a position in the format of index entries and raw messages."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)
@@ -236,7 +239,7 @@ class PrivateBag(ABC):
 
 
 def nanoseconds_of(stamp: Time | None) -> int | None:
-    """Return a time limit in nanoseconds, or None for time 0, as the real module does.
+    """Convert a time limit to nanoseconds; return None for time 0, like the real module.
 
     Raise TypeError if the limit is not a rospy.Time.
     """

@@ -1,4 +1,4 @@
-"""The classes of rosbag.Bag's ``_reader``, which programs use to read single messages or show the indexing progress."""
+"""The classes of rosbag.Bag's ``_reader``. Programs use them to read single messages or show the indexing progress."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class _BagReader200(_BagReader):
     """The reader for a version 2.0 bag."""
 
     def prepare(self) -> None:
-        """Read the index now if a subclass overrides how it is read."""
+        """Read the index now if a subclass overrides the method that reads it."""
         if type(self)._read_connection_index_records is not _BagReader200._read_connection_index_records:
             self._read_connection_index_records()
 

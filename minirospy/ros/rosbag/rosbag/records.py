@@ -191,12 +191,15 @@ def _unpacked(data: bytes, name: str, unpack: Callable[[bytes], _T]) -> _T:
 
 
 def _read_sized(f: BinaryIO) -> bytes:
-    """Read a length and return that many bytes. Raise ROSBagException or ROSBagFormatException at the end of the file."""
+    """Read a length prefix and return the bytes that follow.
+
+    Raise ROSBagException or ROSBagFormatException at the end of the file.
+    """
     return _read(f, _read_uint32(f))
 
 
 def _skip_sized(f: BinaryIO) -> None:
-    """Read a length and skip that many bytes."""
+    """Read a length prefix and skip the bytes that follow it."""
     f.seek(_read_uint32(f), os.SEEK_CUR)
 
 
@@ -291,7 +294,7 @@ def _read_time_field(header: Mapping[str, bytes], field: str) -> Time:
 
 
 def _write_sized(f: BinaryIO, v: bytes | str) -> None:
-    """Write the length of the bytes, then the bytes."""
+    """Write the bytes with a length prefix."""
     data = v.encode() if isinstance(v, str) else v
     f.write(_pack_uint32(len(data)))
     f.write(data)
@@ -310,7 +313,7 @@ def _write_header(f: BinaryIO, header: Mapping[str, bytes | str]) -> bytes:
 def _write_record(
     f: BinaryIO, header: Mapping[str, bytes | str], data: bytes | str = "", padded_size: int | None = None
 ) -> None:
-    """Write a record. If ``padded_size`` is given, pad the data so that both together take that many bytes."""
+    """Write a record. If ``padded_size`` is given, pad the data with spaces so that header and data take that many bytes."""
     written = _write_header(f, header)
     if padded_size is not None:
         data = " " * max(0, padded_size - len(written))

@@ -1,4 +1,4 @@
-"""rosbag.rosbag_main: the verbs of `rosbag` as functions that accept a command line, whose first item is the program's name."""
+"""rosbag.rosbag_main: the verbs of `rosbag` as functions. ``argv`` starts with the program's name."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def _remove(path: Path) -> None:
 
 
 def _statuses(path: Path) -> Iterator[os.stat_result]:
-    """Yield the stat results for a path and for everything below it; skip entries that disappear in the meantime."""
+    """Yield the stat results for a path and everything below it. Skip entries that disappear meanwhile."""
     for each in (path, *path.rglob("*")):
         try:
             yield each.lstat()
@@ -140,7 +140,7 @@ def _size(path: Path) -> int:
 
 
 def disk_usage(folder: Path) -> int:
-    """Return a folder's size in disk blocks, as bytes; on Windows, assume a block size."""
+    """Return a folder's size on disk in bytes, rounded up to blocks. On Windows, assume a block size."""
     return sum(
         status.st_blocks * 512
         if hasattr(status, "st_blocks")
@@ -150,7 +150,7 @@ def disk_usage(folder: Path) -> int:
 
 
 def human_size(size: float) -> str:
-    """Return a size as `du -h` prints it, rounded up: 4.0K, 11M."""
+    """Format a size like `du -h`, rounded up: 4.0K, 11M."""
     if size < 1024:
         return f"{size:.0f}"
     for unit in "KMGT":

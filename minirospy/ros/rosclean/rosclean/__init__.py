@@ -23,7 +23,7 @@ def get_disk_usage(d: str) -> int:
 
 
 def get_human_readable_disk_usage(d: str) -> str:
-    """Return a folder's disk usage as `du -h` prints it. Raise CleanupException if the folder does not exist."""
+    """Return a folder's disk usage in the format of `du -h`. Raise CleanupException if the folder does not exist."""
     return human_size(get_disk_usage(d))
 
 

@@ -1,4 +1,4 @@
-"""rosdep: list the dependencies of packages that are missing on this machine, and how to install them.
+"""rosdep: list packages' dependencies that are missing on this machine, and how to install them.
 
 Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. ROS's rosdep queries a database on the network and
 runs the system's package manager. This command downloads and installs nothing, because minirospy provides ROS's packages.
@@ -40,7 +40,7 @@ _PYTHON_PACKAGES: dict[str, tuple[str, str]] = {
     "yaml": ("yaml", "PyYAML"),
     "zmq": ("zmq", "pyzmq"),
 }
-"""Python packages in rosdep keys whose module or PyPI name differs from the name in the key, as (module, PyPI name)."""
+"""(module, PyPI name) of Python packages for which these differ from the name in the rosdep key."""
 _TOOLS = frozenset(
     """
     cmake python python3 python-catkin-pkg python3-catkin-pkg python3-catkin-pkg-modules python-catkin-tools

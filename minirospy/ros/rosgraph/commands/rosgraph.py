@@ -1,4 +1,4 @@
-"""rosgraph: print the connections between nodes, and the services, every second until Ctrl-C.
+"""rosgraph: every second until Ctrl-C, print the connections between nodes, and the services.
 
 Source: http://wiki.ros.org/rosgraph. The output is identical to that of ROS, with sorted names. All data comes from the
 master, so a node that hangs causes no delay.
@@ -37,7 +37,7 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """Prints ROS's help before its own help, and also on a usage error, as ROS does."""
+    """Prints ROS's help before its own. Like ROS, also prints it on a usage error."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()

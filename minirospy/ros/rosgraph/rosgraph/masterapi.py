@@ -1,7 +1,8 @@
 """The Master API for Python programs: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 # mypy: disable-error-code="no-any-return"
-# The annotations state what a master returns; the values are returned unchanged, because a program may replace the master.
+# The annotations state what a master should return. Values are returned unchanged, because a program may replace the
+# master.
 
 from __future__ import annotations
 
@@ -51,12 +52,12 @@ class Master:
     """A proxy for the master at ``master_uri`` (default: from the environment); calls are made as node ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
-        # Remove the trailing slash, as ROS's rosgraph does.
+        # Remove the trailing slash, like ROS's rosgraph.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._reinit(master_uri or get_master_uri())
 
     def _reinit(self, master_uri: str) -> None:
-        """Call the master at another URI from now on."""
+        """Use the master at another URI for all later calls."""
         self.master_uri = master_uri
         try:
             parse_http_host_and_port(master_uri)
@@ -69,7 +70,7 @@ class Master:
 
     @cached_property
     def handle(self) -> Any:
-        """Return the master as Python's `xmlrpc.client.ServerProxy`, whose methods return (code, text, value).
+        """Return the master as an `xmlrpc.client.ServerProxy`, with methods that return (code, text, value).
 
         From then on, all calls use this proxy, because a program may replace the proxy or one of its methods.
         """
@@ -95,7 +96,7 @@ class Master:
             raise MasterException(str(error)) from error
 
     def _succeed(self, args: tuple[int, str, Any]) -> Any:
-        """Return the value in a response. Raise MasterError or MasterFailure if the call failed."""
+        """Return the value from a response. Raise MasterError or MasterFailure if the call failed."""
         code, text, value = args
         if code == 1:
             return value
@@ -154,7 +155,7 @@ class Master:
         return self._call("deleteParam", key)
 
     def searchParam(self, key: str) -> str:
-        """Return the name of the closest parameter called ``key``, searching upwards from the caller's namespace."""
+        """Search upwards from the caller's namespace for a parameter called ``key``; return its full name."""
         return self._call("searchParam", key)
 
     def getParamNames(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Functions for graph names, with the names used in ROS's rosgraph.names. Source: http://wiki.ros.org/Names."""
+"""Functions for graph names, named as in ROS's rosgraph.names. Source: http://wiki.ros.org/Names."""
 
 from __future__ import annotations
 

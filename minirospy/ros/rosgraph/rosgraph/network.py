@@ -47,7 +47,7 @@ class ROSHandshakeException(Exception):
 
 
 def get_address_override() -> str | None:
-    """Return the command line's ``__hostname:=`` or ``__ip:=``, or ROS_HOSTNAME, or ROS_IP, or None if none is set.
+    """Return the value of ``__hostname:=``, ``__ip:=``, ROS_HOSTNAME or ROS_IP, or None if none of these is set.
 
     With MINIROSPY_LOCAL=1, return localhost. Programs may change sys.argv and the environment at any time, so both are read
     at each call. Raise ValueError if the argument contains a second ``:=``.

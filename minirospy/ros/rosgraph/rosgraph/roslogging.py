@@ -1,4 +1,4 @@
-"""rosgraph.roslogging: the names used in logging configuration files, and by programs that subclass this module's classes."""
+"""rosgraph.roslogging: names used in logging configuration files, and by programs that subclass its classes."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class LoggingException(Exception):
 
 
 class RospyLogger(logging.Logger):
-    """rospy's logger class. minirospy does not need it to find the line of a log call, but programs patch it."""
+    """rospy's logger class. minirospy does not need it, but programs patch it."""
 
 
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder and log the records of `rosout` also to the terminal; return the file's path.
+    """Log to a file in the log folder, and records of `rosout` also to the terminal; return the file's path.
 
     Replace the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file
     (ROS_PYTHON_LOG_CONFIG_FILE, or a file in ROS_HOME) takes precedence over these settings. Set ROS_LOG_FILENAME to the path.
@@ -73,7 +73,7 @@ def configure_logging(
         return path
 
     class RotatingFileHandler(LogFileHandler):
-        """A handler with the class name that programs written for ROS expect among the root logger's handlers."""
+        """A log file handler under the class name that ROS programs expect among the root logger's handlers."""
 
     try:
         file = RotatingFileHandler(Path(path), _FILE_BYTES, _FILE_BACKUPS)
@@ -110,7 +110,7 @@ def makedirs_with_parent_perms(p: str) -> None:
 
 
 def renew_latest_logdir(logfile_dir: str) -> bool:
-    """Create the link `latest` to a run's folder, next to that folder. Return False if `latest` exists and is not a link."""
+    """Create a link `latest` next to a run's folder, pointing to that folder. Return False if `latest` is not a link."""
     latest = os.path.join(os.path.dirname(logfile_dir), "latest")
     if os.path.lexists(latest):
         if not os.path.islink(latest):

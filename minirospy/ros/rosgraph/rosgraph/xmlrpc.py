@@ -52,7 +52,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         self._is_closed = False
 
     def serve_forever(self, poll_interval: float = 0.5) -> None:
-        """Handle requests until :meth:`close` is called; return immediately if :meth:`close` was called before."""
+        """Handle requests until :meth:`close` is called. Return immediately if it was called before."""
         with self._serving:
             if self._is_closed:
                 return
@@ -73,13 +73,13 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class XmlRpcHandler:
-    """The base class for objects whose methods an :class:`XmlRpcNode` serves, except names with a leading underscore."""
+    """The base class of objects served by an :class:`XmlRpcNode`: all methods without a leading underscore."""
 
     def _ready(self, uri: str) -> None:
-        """Handle the server's start at ``uri``; subclasses override this method."""
+        """Respond to the server's start at ``uri``; subclasses override this method."""
 
     def _shutdown(self, reason: str) -> None:
-        """Handle the server's shutdown; subclasses override this method."""
+        """Respond to the server's shutdown; subclasses override this method."""
 
 
 class XmlRpcNode:

@@ -38,7 +38,7 @@ class LaunchOptions(NamedTuple):
 
     what: list[str]
     args: dict[str, str]
-    """The value for each ``name:=value`` on the command line, by name."""
+    """The command line's ``name:=value`` arguments, keyed by name."""
     nodes: bool
     files: bool
     find_node: str | None
@@ -379,7 +379,7 @@ _SHOWS: dict[str, Callable[[LaunchSpec, str, Packages], None]] = {
     "dump_params": _show_params,
     "node_args": _show_command,
 }
-"""The options that print information, with their functions. If several are given, the first one in this table applies."""
+"""Maps the options that print information to their functions. If several are given, the first one in this table applies."""
 
 COMMAND = Command("roslaunch", _parser, with_options(LaunchOptions, _roslaunch))
 

@@ -1,4 +1,4 @@
-"""`roslaunch-deps`: print the packages on which launch files depend.
+"""`roslaunch-deps`: print the packages that launch files depend on.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """

@@ -18,7 +18,7 @@ __all__ = ["COMMAND", "get_run_id", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0. If no master responds, print the folder that contains all runs and return 2, as ROS does."""
+    """Run the command; return 0. If no master responds, print the parent folder of all runs and return 2, like ROS."""
     return COMMAND.main(argv)
 
 

@@ -1,4 +1,4 @@
-"""The arguments that a launch file declares, read without loading the files that it includes."""
+"""Finds the arguments that a launch file declares, without loading the files that it includes."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def describe_args(file: str) -> list[ArgDoc]:
 def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
     """Return describe_args() with the defaults resolved for ``args``.
 
-    Declarations that an ``if`` or ``unless`` excludes are left out. A default that cannot be resolved is returned as written.
-    Raise LaunchError if the file cannot be read or parsed.
+    Declarations that an ``if`` or ``unless`` excludes are left out. A default that cannot be resolved is returned
+    unresolved. Raise LaunchError if the file cannot be read or parsed.
     """
     substitution = Substitution(packages, os.environ, file, dict(args))
     found: dict[str, ArgDoc] = {}

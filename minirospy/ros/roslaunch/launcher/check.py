@@ -29,7 +29,7 @@ def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[
 def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
     """Return a launch file's errors.
 
-    If ``ignore_unset_args``, return no errors if an arg has no value, because the missing value may cause other errors.
+    If ``ignore_unset_args`` and an arg has no value, return no errors at all: the missing value may have caused them.
     """
     _, problems = find_problems([LaunchSource(file, None, {})], packages)
     is_unset = any(problem.text.startswith("requires the '") for problem in problems)
@@ -37,6 +37,6 @@ def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False)
 
 
 def problem_line(problem: LaunchError, kind: str = "error") -> str:
-    """Return an error in the format that editors parse: FILE:LINE: KIND: TEXT."""
+    """Format an error as editors expect: FILE:LINE: KIND: TEXT."""
     where = f"{problem.file}:{problem.line}" if problem.line else problem.file
     return f"{where}: {kind}: {problem.text}"

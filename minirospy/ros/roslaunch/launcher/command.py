@@ -29,7 +29,7 @@ def node_program(node: NodeSpec, packages: Packages) -> list[str]:
 def node_command(node: NodeSpec, packages: Packages) -> list[str]:
     """Return the command that runs a node, with its name and remappings.
 
-    Raise MinirospyError as node_program does, or if ``args`` or ``launch-prefix`` cannot be split.
+    Raise MinirospyError like node_program, or if ``args`` or ``launch-prefix`` cannot be split.
     """
     program = node_program(node, packages)
     try:
@@ -56,14 +56,14 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the working folder for a node's process. If cwd is "node", raise MinirospyError as node_program does."""
+    """Return the working folder for a node's process. If cwd is "node", raise MinirospyError like node_program."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """Return a node's command as `roslaunch --args` prints it, with the environment variables that it sets.
+    """Format a node's command like `roslaunch --args`, with the environment variables that it sets.
 
-    Raise MinirospyError as node_command does.
+    Raise MinirospyError like node_command.
     """
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
@@ -74,6 +74,6 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
 
 
 def _fault(node: NodeSpec, text: str) -> MinirospyError:
-    """Return an error about a node, with the file and line if a launch file declares the node."""
+    """Return an error about a node. Include the file and line if a launch file declares the node."""
     message = f"node [{node.base_name}]: {text}"
     return LaunchError(node.file, node.line, message) if node.file else MinirospyError(message)

@@ -1,4 +1,4 @@
-"""Finds the dependencies of launch files: nodes, files and packages, and packages missing in package.xml.
+"""Finds launch files' dependencies (nodes, files, packages), and those missing from package.xml.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """
@@ -57,7 +57,9 @@ def file_needs(
 
 
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
-    """Return the packages that launch files need but package.xml does not declare, sorted, by the package that lacks them.
+    """Return the packages that launch files need but package.xml does not declare.
+
+    The result is a dict of sorted lists, keyed by the package whose package.xml is incomplete.
 
     If ``tests``, test dependencies also count as declared. Raise ManifestError if a package.xml is invalid.
     """

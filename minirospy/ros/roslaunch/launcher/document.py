@@ -38,7 +38,7 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
         "master": ["auto", "type", "uri"],
     }.items()
 }
-"""The attributes that each tag may have, by tag name."""
+"""The allowed attributes, keyed by tag name."""
 
 _TRUTH = {"true": True, "false": False}
 _CONDITIONS = {**_TRUTH, "1": True, "0": False}
@@ -59,7 +59,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An XML element whose attributes are returned with substitutions resolved, and whose errors contain its line number."""
+    """An XML element. Resolves substitutions in its attributes, and adds its line number to errors."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element
@@ -68,12 +68,12 @@ class Tag:
 
     @property
     def name(self) -> str:
-        """The tag's name."""
+        """Return the tag's name."""
         return self.element.tag
 
     @property
     def line(self) -> int:
-        """The line on which the tag starts."""
+        """Return the line where the tag starts."""
         return self.element.line
 
     def children(self) -> Iterator[Tag]:
@@ -136,7 +136,7 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
-        """Return a numeric attribute of type ``kind``, or the default if it is empty. Raise LaunchError if it is not a number."""
+        """Return a numeric attribute as ``kind``, or the default if it is empty. Raise LaunchError if it is not a number."""
         text = self.optional(key)
         try:
             return kind(text) if text else default

@@ -1,4 +1,4 @@
-"""Finds the launch files named on a command line or in an ``<include>``, and suggests similar names if a file is missing."""
+"""Finds the launch files named on a command line or in an ``<include>``. Suggests similar names for a missing file."""
 
 from __future__ import annotations
 
@@ -75,8 +75,7 @@ def read_launch_file(file: str) -> bytes:
 def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
     """Return a file's bytes.
 
-    Raise OSError if the file cannot be read, or ValueError if it has more than ``limit`` bytes, as devices such as /dev/zero
-    do.
+    Raise OSError if the file cannot be read, or ValueError if it has more than ``limit`` bytes, like the device /dev/zero.
     """
     with open(file, "rb") as stream:
         data = stream.read(limit + 1)
@@ -106,7 +105,7 @@ def near_files(file: str) -> str:
 
 
 def hidden_hint(file: str, packages: Packages) -> str:
-    """Return the hint for a file that is missing in a package, if another package with the same name contains it."""
+    """Return the hint for a file missing from a package if another package with the same name contains it."""
     with suppress(OSError, ValueError):
         folder = _package_of(Path(file))
         if folder:
@@ -119,7 +118,7 @@ def _package_of(file: Path) -> Path | None:
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
-    """Return the hint for a file that is missing in its package: the package's launch files."""
+    """Return the hint for a file missing from its package: the package's launch files."""
     try:
         files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
     except NotFoundError:

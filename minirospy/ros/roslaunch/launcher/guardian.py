@@ -1,10 +1,11 @@
 """A script that briefly outlives roslaunch: if roslaunch is killed, it terminates the remaining nodes.
 
-The script reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master, which is
-terminated last, has started; ``-PID`` when a process has exited. At EOF, roslaunch has exited, for whatever reason: the
-script sends SIGINT, SIGTERM and SIGKILL to the remaining groups, and unregisters their nodes from a master that continues
-to run. On Windows, the system terminates the processes together with roslaunch, so the script only unregisters the nodes.
-The script imports only a few standard modules, because it starts at the same time as the first nodes.
+The script reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master,
+which is terminated last, has started; ``-PID`` when a process has exited. EOF means that roslaunch has exited, for
+whatever reason. The script then sends SIGINT, SIGTERM and SIGKILL to the remaining groups, and unregisters their nodes
+from a master that continues to run. On Windows, the system terminates the processes together with roslaunch, so the
+script only unregisters the nodes. The script imports only a few standard modules, because it starts at the same time as
+the first nodes.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""The last command-line argument if the system terminates a killed roslaunch's processes, as Windows does."""
+"""The last command-line argument if the system terminates the processes of a killed roslaunch, like Windows."""
 
 
 def watch(
@@ -98,6 +99,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Leave the processes alone, because other processes may already have reused their process ids.
+        # Leave the processes alone: other processes may already have reused their ids.
         (lambda *_: None) if leaves_them else end_groups,
     )

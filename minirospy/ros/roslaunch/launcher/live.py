@@ -86,7 +86,7 @@ class LiveTable:
         with contextlib.suppress(psutil.Error):
             top = psutil.Process(pid)
             for each in (top, *top.children(recursive=True)):
-                # Reuse the object, because psutil reports the CPU load since the previous call on the same object.
+                # Reuse the object: psutil reports the CPU load since the previous call on the same object.
                 known = self._known.setdefault(each.pid, each)
                 with contextlib.suppress(psutil.Error):
                     cpu += known.cpu_percent()
@@ -125,5 +125,5 @@ def last_line(file: Path | None) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return the text without control characters and with rich's markup escaped."""
+    """Remove control characters from a text and escape rich's markup."""
     return "".join(each for each in text if each.isprintable()).replace("[", r"\[")

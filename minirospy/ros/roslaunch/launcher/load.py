@@ -39,8 +39,8 @@ __all__ = [
 
 STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
-# maximum number of files per launch; in a chain of 26 files, each of which includes the next twice, 67,108,863 files
-# would be read
+# maximum number of files per launch; a chain of 26 files that each include the next one twice means reading
+# 67,108,863 files
 _MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
@@ -60,7 +60,7 @@ class LaunchSource(NamedTuple):
 
 @dataclass(frozen=True)
 class _Scope:
-    """The settings that a tag inherits from the enclosing tags. ``private``: parameters that every following node receives.
+    """The settings that a tag inherits from its enclosing tags. ``private``: parameters set for all following nodes.
 
     ``machine`` is the default machine. Unlike other settings, it still applies after the end of the group or include that
     declares it.
@@ -75,7 +75,7 @@ class _Scope:
 
 @dataclass
 class _Args:
-    """The values for a file's args: those ``given`` by name, and those ``passed`` by an including file with ``pass_all_args``."""
+    """Values of a file's args: ``given`` by name, or ``passed`` by an including file with ``pass_all_args``."""
 
     given: dict[str, str]
     passed: dict[str, str] = field(default_factory=dict)
@@ -86,7 +86,7 @@ class _Args:
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load launch files one after another, with ``args`` from the command line. Raise LaunchError if a file is invalid."""
+    """Load launch files in order, with ``args`` from the command line. Raise LaunchError if a file is invalid."""
     return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
@@ -104,7 +104,7 @@ def load_sources(
     problems: Problems | None = None,
     spec: LaunchSpec | None = None,
 ) -> LaunchSpec:
-    """Load launch files one after another. Raise LaunchError on an error, or append all errors to ``problems`` if given.
+    """Load launch files in order. Raise LaunchError on an error, or append all errors to ``problems`` if given.
 
     If ``spec`` is given, add the content to it, without checking that its nodes' names are unique.
     """
@@ -149,7 +149,7 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
 
 
 class _File:
-    """Reads one file into the shared spec. ``problems``: list to which errors are appended; None: raise errors."""
+    """Reads one file into the shared spec. Errors are appended to ``problems``, or raised if it is None."""
 
     def __init__(
         self,
@@ -217,7 +217,7 @@ class _File:
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
-            # Abort loading; otherwise, every open file would report the error once for each of its includes.
+            # Abort loading; otherwise, every file being read would report the error once per include.
             raise
         except LaunchError as error:
             self.report(error)
@@ -375,7 +375,7 @@ class _File:
         return param_value(tag)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Store a parameter set inside a node as private to the node, even if its name starts with a slash or tilde."""
+        """Store a parameter set inside a ``<node>`` as private, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", self._value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:

@@ -1,4 +1,4 @@
-"""Finds or starts the master of a launch, and sets /run_id and the parameters of the launch file."""
+"""Finds or starts the master for a launch, and sets /run_id and the launch file's parameters."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _START_SECONDS = 60.0
 class LaunchMaster:
     """The master that a launch's nodes use.
 
-    ``pause(seconds)`` must wait, and raise KeyboardInterrupt if the run is stopped in the meantime.
+    ``pause(seconds)`` must sleep, and raise KeyboardInterrupt if the run is stopped meanwhile.
     """
 
     def __init__(self, environment: Environment, output: Output, pause: Callable[[float], None]) -> None:
@@ -42,7 +42,7 @@ class LaunchMaster:
 
     @property
     def log_folder(self) -> Path:
-        """The folder for the run's log files."""
+        """Return the folder for the run's log files."""
         return self._environment.log_dir / self.run_id
 
     def is_online(self) -> bool:
@@ -66,8 +66,8 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # Make this call for its error message, which contains the reason, such as an unknown host name or a
-            # suspended master.
+            # Make this call for its error message: it states the reason, such as an unknown host name or a suspended
+            # master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")

@@ -1,4 +1,4 @@
-"""The settings for a launch, from the options of `roslaunch`."""
+"""The settings of a launch, from the options of `roslaunch`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages of roslaunch: printed on the terminal in ROS's colours, and written to its log file."""
+"""roslaunch's messages: prints them on the terminal in ROS's colours, and writes them to its log file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Output:
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
-    """Functions from the user's program that receive (level, text) for each line."""
+    """The user program's functions that receive (level, text) for each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -69,7 +69,7 @@ class Output:
         stream = sys.stderr if level == ERROR else sys.stdout
         # Write each line in a single call, because nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # If the process that reads the output (`| head`) has exited, still terminate the nodes in order.
+        # Even if the process that reads the output (`| head`) has exited, terminate the nodes in order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()
@@ -89,7 +89,7 @@ class Output:
 
 
 def warn_of_large_logs(folder: Path, output: Output) -> None:
-    """Warn if the log folder exceeds one gigabyte; its size is measured in the background."""
+    """Warn if the log folder exceeds one gigabyte. Measure its size in the background."""
 
     def look() -> None:
         size = 0

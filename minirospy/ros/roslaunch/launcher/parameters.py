@@ -29,7 +29,7 @@ __all__ = ["param_value", "rosparam_values"]
 _XACRO = ("xacro", "xacro.py")
 _STYLE = re.compile(r"\x1b\[[0-9;]*m")  # matches terminal colours
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-# number of bytes at the end of a command's stderr to search for the reason of a failure
+# bytes at the end of a command's stderr to search for the reason for a failure
 _ERRORS_KEPT = 65_536
 _ERRORS_SECONDS = 1.0
 # maximum size in bytes of a file or of a command's output; the master rejects larger requests
@@ -122,7 +122,7 @@ def _output_of(tag: Tag, command: str) -> str:
 
 
 def _run(words: list[str]) -> tuple[int, bytes, str]:
-    """Run a command; return its status, its output, and the line in its stderr that states the reason.
+    """Run a command; return its exit status, its output, and the line of stderr that states the reason for a failure.
 
     The command's stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
     """
@@ -175,7 +175,7 @@ def _pass_on(reading: int, end: bytearray) -> None:
 def _command_words(words: list[str]) -> list[str]:
     """Return the command to run. As for nodes, Python programs run with this interpreter; `xacro` runs minirospy's xacro.
 
-    A launch file thus finds xacro even if no virtual environment is active, and never uses the xacro from ROS 2.
+    Thus, launch files find xacro even if no virtual environment is active, and never use ROS 2's xacro.
     """
     if not words:
         return words

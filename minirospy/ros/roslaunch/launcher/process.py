@@ -1,4 +1,4 @@
-"""Processes that roslaunch starts, each in its own process group. They are terminated in steps, and never left running."""
+"""Processes that roslaunch starts, each in its own process group. They are stopped in steps, and never left running."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # set after the process's exit was requested, so that the exit is not reported
+    is_ending: bool = False  # set once the process has been told to exit, so that its exit is not reported
 
-    # set if the process is to be restarted after its exit, because its file has changed
+    # set if the process will be restarted after its exit because its file has changed
     is_restarting: bool = False
 
     @property
     def pid(self) -> int:
-        """The process id."""
+        """Return the process id."""
         return self.popen.pid
 
     @property
     def exit_code(self) -> int | None:
-        """The exit status, as in subprocess; None while the process is running."""
+        """Return the exit status as in subprocess, or None while the process is running."""
         return self.popen.poll()
 
     @property
@@ -74,7 +74,7 @@ class _Group(TypedDict, total=False):
 
 
 class Guardian:
-    """Receives the start and exit of processes; if roslaunch is killed, it terminates the remaining processes.
+    """Is told of processes' starts and exits, and terminates the remaining ones if roslaunch is killed.
 
     On Windows the system terminates them (`minirospy.base.child_lifetime`). There the guardian only unregisters nodes from a
     master that this launch did not start; otherwise its process is not started.
@@ -200,7 +200,7 @@ def end_processes(
 
 
 def _own_group() -> _Group:
-    """Return the options that shield a process from Ctrl-C, because roslaunch terminates its nodes in order."""
+    """Return the options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}

@@ -1,4 +1,4 @@
-"""Removes the registrations at the master of nodes that have exited.
+"""Removes exited nodes' registrations from the master.
 
 The guardian of a killed roslaunch runs this module as a program:
 
@@ -21,15 +21,15 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-# seconds to wait for a node; if its process has exited, the connection is refused immediately, so only hanging
-# processes take this long
+# seconds to wait for a node; only hanging processes take this long, because an exited process refuses the connection
+# immediately
 _ANSWER_SECONDS = 5.0
 
 _MAX_CONCURRENT = 16
 
 
 class DeadNodes:
-    """Unregisters nodes whose processes have exited, in a thread. One pass handles all exits since the previous pass."""
+    """Unregisters exited nodes in a thread. One pass handles all exits since the previous one."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -44,7 +44,7 @@ class DeadNodes:
         self._exited.put(node)
 
     def close(self) -> None:
-        """Wait until the added nodes are unregistered, or the master does not respond. Idempotent."""
+        """Wait until the added nodes are unregistered, or give up if the master does not respond. Idempotent."""
         if self._thread:
             self._exited.put(None)
             self._thread.join()

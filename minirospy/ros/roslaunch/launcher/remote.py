@@ -49,7 +49,7 @@ Method = Callable[..., object]
 
 
 class Api:
-    """XML-RPC methods served in a thread: ``{name: function}``, run in workers; return values are wrapped as in ROS."""
+    """Serves XML-RPC methods (``{name: function}``) in a thread. They run in workers; results are wrapped as in ROS."""
 
     def __init__(self, environment: Environment, methods: Mapping[str, Method]) -> None:
         self._methods = dict(methods)

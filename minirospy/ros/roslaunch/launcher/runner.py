@@ -41,7 +41,7 @@ class Launcher:
     """Runs a spec's nodes until all have exited or a caller stops them."""
 
     _numbers: ClassVar[Iterator[int]] = itertools.count(1)
-    """A counter shared by all launches in this program, so that process names and log files are unique."""
+    """A counter shared by all launches in this program, to make process names and log files unique."""
 
     def __init__(
         self,
@@ -79,12 +79,12 @@ class Launcher:
 
     @property
     def processes(self) -> list[Process]:
-        """The started nodes that are watched, including those that will be restarted."""
+        """Return the processes being watched, including those that will be restarted."""
         return self.supervisor.processes
 
     @property
     def run_id(self) -> str:
-        """The name of the run's log folder, and the master's /run_id."""
+        """Return the name of the run's log folder, which is the master's /run_id."""
         return self._master.run_id
 
     @run_id.setter
@@ -154,7 +154,7 @@ class Launcher:
         return f"{node.name.lstrip('/')}-{next(self._numbers)}"
 
     def start_node(self, node: NodeSpec, name: str = "") -> Process | None:
-        """Start a node as the process ``name`` (empty: a new name). If the node cannot be started, warn and return None."""
+        """Start a node as the process ``name`` ("": a new name). If it cannot be started, warn and return None."""
         self._has_run = True
         try:
             process = self._start_process(node, name or self.process_name(node))
@@ -210,7 +210,7 @@ class Launcher:
                 self._output.warn(f"WARNING: {why}")
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the nodes' programs, except missing ones, which are reported when the node is started."""
+        """Yield the nodes' programs. Skip missing ones: they are reported when the node is started."""
         for node in nodes:
             with contextlib.suppress(MinirospyError):
                 yield Path(node_program(node, self._packages)[-1])
@@ -259,7 +259,7 @@ class Launcher:
 
     @property
     def stopped_by(self) -> str:
-        """The signal or stop() caller that stopped the run; empty if the nodes exited by themselves."""
+        """Return the signal or stop() caller that stopped the run; "" if the nodes exited by themselves."""
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
@@ -337,7 +337,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Unregister what exited nodes have left at the master, unless the master exits together with the nodes."""
+        """Remove exited nodes' registrations from the master, unless the master exits together with the nodes."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)

@@ -38,12 +38,12 @@ class NodeSpec:
 
     @property
     def base_name(self) -> str:
-        """The name without its namespace."""
+        """Return the name without its namespace."""
         return self.name.rpartition("/")[2]
 
     @property
     def namespace(self) -> str:
-        """The namespace, with a trailing slash."""
+        """Return the namespace, with a trailing slash."""
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
@@ -90,7 +90,7 @@ class TestSpec:
 
 @dataclass(frozen=True)
 class MachineSpec:
-    """A ``<machine>`` on which nodes run: its address for ssh, and the script that sets up ROS there (``env_loader``)."""
+    """A ``<machine>`` that runs nodes: its address for ssh, and the script that sets up ROS there (``env_loader``)."""
 
     name: str
     address: str
@@ -124,9 +124,9 @@ class ArgDoc:
 class LaunchSpec:
     """The combined content of all files.
 
-    ``params``: values by name; ``clear``: namespaces to delete; ``commands``: run at the parameter server
-    before the parameters are set; ``files``: the files that were read, each once; ``includes``: (file, included
-    file); ``args``: declarations of the first file; ``machines``: by name; ``warnings``: content that was ignored.
+    ``params``: values by name; ``clear``: namespaces to delete; ``commands``: <rosparam> commands to run before the
+    parameters are set; ``files``: all files read, without duplicates; ``includes``: (file, included file); ``args``:
+    declarations of the first file; ``machines``: by name; ``warnings``: content that was ignored.
     """
 
     nodes: list[NodeSpec] = field(default_factory=list)
@@ -143,7 +143,7 @@ class LaunchSpec:
     # --- adding: the loader calls these methods in the order of the tags
 
     def add_file(self, path: str, name: str) -> None:
-        """Add a file that is read now; ``name`` is its path as written."""
+        """Record that a file is being read; ``name`` is its path as written."""
         if path not in self.files:
             self.files.append(path)
 
@@ -202,7 +202,7 @@ class LaunchSpec:
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine on which a node runs, or None for this machine. Raise LaunchError if the machine is unknown."""
+        """Return the machine that runs a node, or None for this machine. Raise LaunchError if the machine is unknown."""
         name = node.machine
         if name in ("", "localhost"):
             return None

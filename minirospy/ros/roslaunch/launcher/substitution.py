@@ -26,7 +26,7 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-# maximum number of characters produced per load, because an arg that repeats another arg doubles the size
+# maximum number of characters produced per load; args that repeat other args can double the size again and again
 _MAX_SUBSTITUTED = 64 * 1024 * 1024
 _MAX_SHOWN = 200  # maximum length of a string quoted in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
@@ -40,8 +40,8 @@ class SubstitutionError(ValueError):
 class Substitution:
     """The values for one file's substitutions.
 
-    ``used`` contains every arg that was used, in any file. ``unset`` contains the args declared without a value, each with the
-    error message for its use.
+    ``used`` contains every arg that was used, in any file. ``unset`` maps each arg declared without a value to the error
+    message for using it.
     """
 
     packages: Packages
@@ -119,7 +119,7 @@ class Substitution:
         return self.environ.get(name, " ".join(default))
 
     def _optenv_value(self, name: str, default: object = "") -> object:
-        """Return the value of ``optenv()`` in an expression: the variable's value, else the default, which may be a number."""
+        """Evaluate ``optenv()`` in an expression: return the variable's value, else the default, which may be a number."""
         return self.environ.get(name, default)
 
     def _anon(self, name: str) -> str:
@@ -129,7 +129,7 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """Return a Python expression's value as a string. Raise SubstitutionError if the expression is invalid.
+        """Evaluate a Python expression; return the value as a string. Raise SubstitutionError if the expression is invalid.
 
         The expression can run any Python code, as ``<param command=...>`` can run any program.
         """
@@ -188,7 +188,7 @@ def convert(text: str, type_: str) -> object:
         return text
     if kind == "int":
         return int(text)
-    if kind == "double":  # ROS refuses "float"
+    if kind == "double":  # ROS rejects "float"
         return float(text)
     if kind in ("bool", "boolean"):
         if text.strip().lower() not in ("true", "1", "false", "0"):

@@ -17,7 +17,10 @@ def summary(
     clear: Iterable[str],
     machines: Iterable[str] | None = None,
 ) -> str:
-    """Return the summary that precedes the first process. ``machines`` are the names to list; None omits the section MACHINES."""
+    """Return the summary to print before starting nodes.
+
+    ``machines`` are the names to list; None omits the section MACHINES.
+    """
     lines = ["", "SUMMARY", "========", ""]
     cleared = sorted({f" * {name.rstrip('/')}/" for name in clear})
     if cleared:

@@ -1,4 +1,4 @@
-"""Watches a launch's processes, and restarts those with respawn, until the run is over."""
+"""Watches a launch's processes until the run is over. Restarts those with respawn."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from minirospy.ros.roslaunch.launcher.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_RESPAWN_SECONDS = 0.1  # minimum interval between two starts of a node that exits immediately
+_RESPAWN_SECONDS = 0.1  # minimum seconds between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds per slice in which the main thread, which receives signals, waits.
+"""Seconds per wait of the main thread, which receives signals.
 
-A signal that arrives just before a wait, and on Windows any signal, takes effect only after the slice. Changed files and
-remote processes are checked between slices.
+A signal just before a wait (on Windows, any signal) is handled only after that wait. Changed files and remote processes
+are checked between waits.
 """
 
 _BAR = "=" * 80
@@ -91,9 +91,9 @@ class Supervisor:
         self._restarts: list[tuple[float, Process]] = []
 
         self.on_change: Callable[[], object] = lambda: None
-        """Called, in any thread, after a process has started or exited, or its exit has been requested."""
+        """Called, in any thread, after a process has started, exited, or been told to exit."""
         self.processes: list[Process] = []
-        """The started nodes that are watched, including those that will be restarted."""
+        """The processes being watched, including those that will be restarted."""
         self.master: Process | None = None
         """The master, if this launch has started one."""
         self.stopped_by = ""
@@ -164,7 +164,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Wait. Raise KeyboardInterrupt if stop() is called in the meantime."""
+        """Sleep. Raise KeyboardInterrupt if stop() is called meanwhile."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:

@@ -20,7 +20,7 @@ class FileWatch:
         self._seen: dict[str, dict[Path, int]] = {}
 
     def add(self, node: NodeSpec) -> None:
-        """Watch a node's files from now on."""
+        """Start watching a node's files."""
         self._seen[node.name] = self._times(node)
 
     def changed(self, node: NodeSpec) -> Path | None:

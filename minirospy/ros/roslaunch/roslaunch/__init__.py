@@ -76,7 +76,7 @@ def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | N
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command ``roslaunch``; ``argv`` starts with its name. Return its exit status."""
+    """Run the command ``roslaunch``; return its exit status. ``argv`` starts with the command's name."""
     from minirospy.ros.roslaunch.commands import roslaunch
 
     return roslaunch.main(None if argv is None else argv[1:])

@@ -17,7 +17,7 @@ __all__ = [
 
 
 def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
-    """Return the args that launch files declare, as a dict from name to (doc, default)."""
+    """Return the args that launch files declare: a dict of (doc, default) keyed by name."""
     packages, found = chosen_packages(), {}
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each

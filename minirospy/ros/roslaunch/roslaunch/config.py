@@ -1,4 +1,4 @@
-"""The classes of roslaunch.core and roslaunch.config, through which programs read launch files' content from a LaunchSpec.
+"""The classes of roslaunch.core and roslaunch.config, through which programs read a LaunchSpec.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -108,7 +108,7 @@ class ROSLaunchConfig:
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
     def summary(self, local: bool = False) -> str:
-        """Return the summary that roslaunch prints before it starts any process; the summary lists machines unless ``local``."""
+        """Return the summary that roslaunch prints before it starts any process. It lists machines unless ``local``."""
         return summary(
             self.spec.nodes,
             {name: param.value for name, param in self.params.items()},
@@ -141,12 +141,12 @@ class ROSLaunchConfig:
         return False
 
     def add_config_error(self, msg: str) -> None:
-        """Add a configuration error, which is printed as a warning."""
+        """Add a configuration error, to be printed as a warning."""
         self.config_errors.append(msg)
 
     @property
     def spec(self) -> LaunchSpec:
-        """The whole configuration as a LaunchSpec, from which it is run."""
+        """Return the whole configuration as a LaunchSpec, which the launcher can run."""
         return LaunchSpec(
             nodes=[node.spec for node in self.nodes],
             params={name: _as_sent(param.value) for name, param in self.params.items()},
@@ -212,7 +212,7 @@ def _as_sent(value: object) -> object:
 
 
 def namespaces_of(name: str) -> list[str]:
-    """Return the namespaces that contain a global name, the root first."""
+    """Return the namespaces that contain a global name, starting with the root."""
     parts = name.strip("/").split("/")[:-1]
     return ["/", *("/" + "/".join(parts[: i + 1]) for i in range(len(parts)))]
 

@@ -56,7 +56,7 @@ __all__ = [
 
 PHASE_SETUP, PHASE_RUN, PHASE_TEARDOWN = "setup", "run", "teardown"
 
-TEST_TIME_LIMIT_DEFAULT = 60  # time limit in seconds for a <test> without a time limit
+TEST_TIME_LIMIT_DEFAULT = 60  # default time limit in seconds for a <test>
 
 
 class RLException(Exception):
@@ -75,7 +75,7 @@ class Master:
 
     @property
     def environment(self) -> Environment:
-        """The environment with this master's URI."""
+        """Return the environment with this master's URI."""
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
@@ -162,7 +162,7 @@ class Machine:
 
     @property
     def spec(self) -> MachineSpec:
-        """Return the machine as a MachineSpec."""
+        """Convert the machine to a MachineSpec."""
         return MachineSpec(
             self.name, self.address, self.env_loader or "", self.user or "", self.password or "", self.ssh_port,
             self.timeout,
@@ -341,7 +341,7 @@ class Node:
 
     @property
     def spec(self) -> NodeSpec:
-        """Return the node as a NodeSpec."""
+        """Convert the node to a NodeSpec."""
         return NodeSpec(
             name=f"{self.namespace}{self.name or ''}",
             package=self.package,
@@ -430,7 +430,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Receives either the error lines or all other lines."""
+    """Forwards either the error lines or all other lines to a function."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function

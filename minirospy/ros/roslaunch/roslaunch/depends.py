@@ -93,7 +93,7 @@ def parse_launch(launch_file: str, file_deps: dict[str, RoslaunchDeps], verbose:
 
 
 def rl_file_deps(file_deps: dict[str, RoslaunchDeps], launch_file: str, verbose: bool = False) -> None:
-    """Add the dependencies of a launch file, as :func:`parse_launch` does."""
+    """Add a launch file's dependencies, like :func:`parse_launch`."""
     parse_launch(launch_file, file_deps, verbose)
 
 
@@ -103,7 +103,10 @@ def fullusage() -> None:
 
 
 def print_deps(base_pkg: object, file_deps: Mapping[str, RoslaunchDeps], verbose: bool) -> None:
-    """Print the packages that launch files need, in one line; if ``verbose``, print each program and file before that line."""
+    """Print the packages that launch files need on one line.
+
+    If ``verbose``, print each program and file before that line.
+    """
     if verbose:
         for file, deps in file_deps.items():
             for package, program in deps.nodes:
@@ -123,7 +126,7 @@ def calculate_missing(
     file_deps: Mapping[str, RoslaunchDeps],
     use_test_depends: bool = False,
 ) -> dict[str, set[str]]:
-    """Add the packages that launch files need, but their package.xml does not declare, to ``missing``; return ``missing``."""
+    """Add packages that launch files need but their package.xml does not declare to ``missing``; return ``missing``."""
     for file, deps in file_deps.items():
         package = package_of(file)
         if package is None:

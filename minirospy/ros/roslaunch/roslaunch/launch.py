@@ -151,7 +151,7 @@ class ROSLaunchRunner:
         )
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Add a listener, which is notified when a process exits."""
+        """Add a listener that is notified when a process exits."""
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:
@@ -195,7 +195,7 @@ class ROSLaunchRunner:
         return self.pm
 
     def _load_parameters(self) -> None:
-        """Only set the parameters. Raise RLException if a parameter cannot be set."""
+        """Set the parameters without starting any nodes. Raise RLException if a parameter cannot be set."""
         try:
             self._launcher.set_parameters()
         except (MinirospyError, RpcError) as error:
@@ -210,7 +210,7 @@ def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str
 
 
 def replacement_of(module: str, name: str, ours: Function) -> Function:
-    """Return the function with which a program has replaced a function in roslaunch's modules, else the original.
+    """Return the function that a program has put in place of ``ours`` in one of roslaunch's modules, else ``ours``.
 
     For example, programs disable roslaunch's signal handlers with ``roslaunch.pmon._init_signal_handlers = ...``.
     """
@@ -219,7 +219,7 @@ def replacement_of(module: str, name: str, ours: Function) -> Function:
 
 
 def unify_clear_params(params: Iterable[str]) -> list[str]:
-    """Return the namespaces to delete, each with a trailing slash, omitting namespaces that are inside another one."""
+    """Return the namespaces to delete, with trailing slashes. Omit namespaces inside other ones."""
     names = [name if name.endswith("/") else f"{name}/" for name in params]
     return [
         name

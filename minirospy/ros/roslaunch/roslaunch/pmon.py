@@ -1,4 +1,4 @@
-"""Manages the processes that a program launches: the classes of roslaunch.pmon and roslaunch.nodeprocess, based on a Launcher.
+"""The classes of roslaunch.pmon and roslaunch.nodeprocess, which manage a program's processes with a Launcher.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -79,7 +79,7 @@ class ApiLauncher(Launcher):
 
     @property
     def log_folder(self) -> str:
-        """The folder for the nodes' log files."""
+        """Return the folder for the nodes' log files."""
         return str(self._master.log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
@@ -199,7 +199,7 @@ class DeadProcess(Process):
 
 
 class LaunchedProcess(Process):
-    """A node's process, which is either running, or created by create_node_process() and not started yet."""
+    """A node's process: running, or created by create_node_process() and not yet started."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         # Do not set `args`, `env`, `spawn_count` and `exit_code`: as properties, they return the process's current
@@ -226,27 +226,27 @@ class LaunchedProcess(Process):
 
     @property
     def stopped(self) -> bool:
-        """Return whether the process's termination was requested."""
+        """Return whether the process has been told to exit."""
         return self.process is not None and self.process.is_ending
 
     @property
     def popen(self) -> subprocess.Popen[bytes] | None:
-        """The process as a subprocess.Popen."""
+        """Return the process as a subprocess.Popen."""
         return self.process.popen if self.process else None
 
     @property
     def pid(self) -> int:
-        """The process id, or -1 before the process is started."""
+        """Return the process id, or -1 before the process is started."""
         return self.process.pid if self.process else -1
 
     @property
     def args(self) -> list[str]:  # type: ignore[override]
-        """The node's command."""
+        """Return the node's command."""
         return list(self.process.command if self.process else self._launcher.command(self._node))
 
     @property
     def env(self) -> dict[str, str]:  # type: ignore[override]
-        """The node's environment variables."""
+        """Return the node's environment variables."""
         return self._launcher.variables(self._node)
 
     @property
@@ -256,7 +256,7 @@ class LaunchedProcess(Process):
 
     @property
     def exit_code(self) -> int | None:  # type: ignore[override]
-        """The exit status; None while the process is running."""
+        """Return the exit status, or None while the process is running."""
         return self.process.exit_code if self.process else None
 
     def is_alive(self) -> bool:
@@ -310,7 +310,7 @@ class LaunchedProcess(Process):
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Add the process to another launcher, which watches the process once it has started."""
+        """Add the process to another launcher. That launcher watches it once it has started."""
         self._launcher = launcher
 
 
@@ -318,7 +318,7 @@ class ProcessMonitor:
     """The processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
-    """The monitors whose processes a signal or pmon_shutdown() terminates, excluding monitors that a program has created."""
+    """The monitors whose processes a signal or pmon_shutdown() terminates. Monitors created by programs are not included."""
 
     def __init__(self, name: str = "ProcessMonitor", *, launcher: ApiLauncher | None = None) -> None:
         self.name = name
@@ -331,7 +331,7 @@ class ProcessMonitor:
         if launcher is not None:
             self._living.add(self)
 
-        # These are the processes of the program's own classes; the launcher manages all others.
+        # Guards the processes of the program's own classes; the launcher manages all others.
         self.plock = threading.RLock()
         self._own: list[Process] = []
         self._own_dead: list[Process] = []
@@ -354,7 +354,7 @@ class ProcessMonitor:
 
     @property
     def listeners(self) -> list[ProcessListener]:
-        """The objects that are notified when processes exit."""
+        """Return the objects that are notified when processes exit."""
         return self._launcher.listeners
 
     @property
@@ -369,13 +369,13 @@ class ProcessMonitor:
 
     @property
     def procs(self) -> list[Process]:
-        """The watched processes."""
+        """Return the watched processes."""
         launched = [self._launcher.known[process.name] for process in tuple(self._launcher.processes)]
         return [*launched, *self._own]
 
     @property
     def dead_list(self) -> list[Process]:
-        """The exited processes."""
+        """Return the exited processes."""
         watched = self.get_active_names()
         known = tuple(self._launcher.known.values())
         launched = [each for each in known if each.started and each.name not in watched]
@@ -386,7 +386,7 @@ class ProcessMonitor:
         return [process.name for process in self.procs]
 
     def get_process_names_with_spawn_count(self) -> list[list[tuple[str, int]]]:
-        """Return the names of the watched and of the exited processes, each with the number of times that it was started."""
+        """Return (name, start count) for the watched processes, and for the exited ones."""
         return [[(each.name, each.spawn_count) for each in some] for some in (self.procs, self.dead_list)]
 
     def has_process(self, name: str) -> bool:
@@ -447,11 +447,11 @@ class ProcessMonitor:
                 self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Add a listener, which is notified when a process exits."""
+        """Add a listener that is notified when a process exits."""
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Watch the processes in a thread, which terminates them when it stops.
+        """Watch the processes in a thread. When the thread stops, it terminates them.
 
         The thread stops after shutdown(), or after registrations_complete() when all processes have exited.
         """
@@ -462,7 +462,7 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, this thread stops, too, and the guardian terminates the nodes.
+        # If the program is killed, this thread also stops, and the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
@@ -471,7 +471,7 @@ class ProcessMonitor:
                 self._watch_own()
 
     def start(self) -> None:
-        """Watch the processes, as :meth:`watch` does."""
+        """Like :meth:`watch`: watch the processes."""
         self.watch()
 
     def _watch_own(self) -> None:

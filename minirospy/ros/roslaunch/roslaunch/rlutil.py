@@ -1,4 +1,4 @@
-"""roslaunch.rlutil: checks, terminal titles and arguments of roslaunch."""
+"""roslaunch.rlutil: roslaunch's checks, terminal titles and arguments."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def update_terminal_name(ros_master_uri: str) -> None:
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
-    """Return the run id: the given one, else the master's, or a new one if no master responds."""
+    """Return the given run id, else the master's, or a new one if no master responds."""
     if options_runid:
         return options_runid
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
@@ -68,7 +68,7 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
-    """Return the paths of the launch files that a command line (package and file, or files) specifies.
+    """Return the paths of the launch files named on a command line: a package and a file, or files.
 
     Raise RLException if a file is not found.
     """

@@ -1,4 +1,4 @@
-"""roslaunch.substitution_args: resolves `$(find ...)` and the other substitution arguments, all or one by one.
+"""roslaunch.substitution_args: resolves `$(find ...)` and the other substitution arguments, together or one by one.
 
 Programs that parse launch files themselves also call the single steps, to collect a string's arguments or to resolve some
 kinds of arguments, or they set ``_rospack`` so that ``$(find ...)`` searches other folders. Source:
@@ -57,7 +57,7 @@ Context: TypeAlias = dict[str, dict[str, str]]
 """The values of args and anonymous names, under the keys ``arg`` and ``anon``; ``filename`` is the launch file."""
 
 Command: TypeAlias = Callable[[str, str, list[str], Context], str]
-"""Resolves one kind of argument. Its parameters are the text, the argument in it, the argument's words, and the context."""
+"""Resolves one kind of argument. Takes the text, the argument in it, the argument's words, and the context."""
 
 _VALID = ["find", "env", "optenv", "dirname", "anon", "arg"]
 _MODULE = "roslaunch.substitution_args"
@@ -106,7 +106,7 @@ def resolve_args(
 
 
 def chosen_packages() -> Packages:
-    """Return the packages that ``$(find ...)`` searches: those of ``_rospack`` if a program has set it, else all packages."""
+    """Return the packages that ``$(find ...)`` searches: those of ``_rospack`` if set, else all packages."""
     rospack = getattr(sys.modules.get(_MODULE), "_rospack", None)
     return Packages() if rospack is None else Packages.below(*map(Path, rospack.get_ros_paths()))
 
@@ -312,7 +312,7 @@ class _DictWrapper:
 
 
 def _eval(s: str, context: Context) -> str:
-    """Return a Python expression's value as a string.
+    """Evaluate a Python expression; return the value as a string.
 
     Raise SubstitutionException if the expression contains a double underscore, or any exception from the expression.
     """

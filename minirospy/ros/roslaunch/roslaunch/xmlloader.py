@@ -51,13 +51,13 @@ class XmlParseException(RLException):
 
 
 class Configuration(Protocol):
-    """The object into which launch files are loaded: a ROSLaunchConfig, or a program's own object with these methods.
+    """The object that launch files are loaded into: a ROSLaunchConfig, or a program's own object with these methods.
 
     The methods are called in the order of the tags.
     """
 
     def add_roslaunch_file(self, f: str) -> None:
-        """Handle the start of reading a file."""
+        """Record that a file is being read."""
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> object:
         """Add a node."""
@@ -168,7 +168,7 @@ class _Forwarded(LaunchSpec):
 
 
 def _shown(file: str) -> str:
-    """Return a file's name as ROS prints it."""
+    """Return a file's name in the form that ROS prints."""
     return "string" if file == STDIN else file
 
 

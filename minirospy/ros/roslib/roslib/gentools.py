@@ -1,4 +1,4 @@
-"""roslib.gentools: md5sums and full definitions of definition files, computed from their dependencies.
+"""roslib.gentools: computes the md5sums and full definitions of definition files from their dependencies.
 
 The functions use a dict that describes a definition's dependencies, with the keys ``package``, ``spec``, ``deps``,
 ``uniquedeps`` and ``files``.
@@ -78,12 +78,12 @@ def compute_md5(get_deps_dict: Dependencies, rospack: object = None) -> str:
 
 
 def compute_md5_text(get_deps_dict: Dependencies, spec: MsgSpec, rospack: object = None) -> str:
-    """Return the text from which a message's md5sum is computed."""
+    """Return the text whose md5sum is the message's md5sum."""
     return gentools.compute_md5_text(_context(get_deps_dict["spec"]), spec)
 
 
 def compute_full_text(get_deps_dict: Dependencies) -> str:
-    """Return a definition's text, followed by the definitions on which it depends."""
+    """Return a definition's text, followed by those of its dependencies."""
     return gentools.compute_full_text(_context(get_deps_dict["spec"]), get_deps_dict["spec"])
 
 

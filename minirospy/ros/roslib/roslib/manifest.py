@@ -67,12 +67,12 @@ class Manifest:
         self.versioncontrol: VersionControl | None = None
 
     def get_export(self, tag: str, attr: str) -> list[str | None]:
-        """Return an attribute's values in the exports with this tag."""
+        """Return the values of an attribute in all exports with this tag."""
         return [export.get(attr) for export in self.exports if export.tag == tag and attr in export.attrs]
 
 
 def folders_with(file: str, path: str) -> Iterator[str]:
-    """Yield the folders below a path that contain a manifest with this name; skip folders below a manifest."""
+    """Yield the folders below ``path`` that contain the manifest ``file``. Do not search below such folders."""
     for folder, subfolders, files in os.walk(path, followlinks=True):
         if file in files:
             yield folder

@@ -1,4 +1,4 @@
-"""roslib.message: re-exports genpy's names, which were in this module before."""
+"""roslib.message: re-exports the names that have moved to genpy."""
 
 from minirospy.ros.genpy.genpy.message import (
     DeserializationError,

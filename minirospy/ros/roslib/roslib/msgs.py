@@ -1,4 +1,4 @@
-"""roslib.msgs: types and definitions in the form used before genmsg, and a table of definitions by name."""
+"""roslib.msgs: types and definitions in their form before genmsg, and a table of definitions keyed by name."""
 
 from __future__ import annotations
 
@@ -238,7 +238,7 @@ def list_msg_types(package: str, include_depends: bool) -> list[str]:
 
 
 def msg_file(package: str, type_: str) -> str:
-    """Return the path to a message's definition file, which need not exist.
+    """Return the path to a message's definition file. The file need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """
@@ -353,7 +353,7 @@ def _convert_val(type_: str, val: str) -> object:
 
 
 def _strify_spec(spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
-    """Return a definition with the fields of the messages that it uses, which must be registered; write it to ``buff``."""
+    """Format a definition with the fields of the registered messages that it uses. Also write it to ``buff``."""
     stream = StringIO() if buff is None else buff
     for constant in spec.constants:
         stream.write(f"{indent}{constant.type} {constant.name}={constant.val_text}\n")
@@ -372,7 +372,7 @@ _initialized = [False]
 
 
 def _init() -> None:
-    """Register the types that are known to every package."""
+    """Register the types known to every package."""
     if _initialized[0]:
         return
     _initialized[0] = True
@@ -384,7 +384,7 @@ def _init() -> None:
 
 
 def reinit() -> None:
-    """Forget all registered definitions, except those that are known to every package."""
+    """Remove all registered definitions except those known to every package."""
     _initialized[0] = False
     _loaded.clear()
     REGISTERED_TYPES.clear()
@@ -410,7 +410,7 @@ def load_package(package: str) -> None:
 
 
 def load_package_dependencies(package: str, load_recursive: bool = False) -> None:
-    """Register the messages of a package's direct dependencies; if ``load_recursive``, also those of the indirect ones."""
+    """Register the messages of a package's direct dependencies, or of all dependencies if ``load_recursive``."""
     from minirospy.ros.rospkg.rospkg.rospack import RosPack
 
     _init()
@@ -431,7 +431,7 @@ def is_registered(msg_type_name: str) -> bool:
 
 
 def get_registered(msg_type_name: str, default_package: str | None = None) -> MsgSpec:
-    """Return the definition that is registered under a name, or under that name in ``default_package``.
+    """Return the definition registered under a name, or under that name in ``default_package``.
 
     Raise KeyError if no definition is registered.
     """

@@ -1,4 +1,4 @@
-"""roslib.network: re-exports rosgraph's names, which were in this module before."""
+"""roslib.network: re-exports the names that have moved to rosgraph."""
 
 from minirospy.ros.rosgraph.rosgraph.network import (
     ROS_HOSTNAME,

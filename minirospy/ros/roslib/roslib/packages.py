@@ -47,7 +47,7 @@ class InvalidROSPkgException(ROSPkgException):
 
 
 class MultipleNodesException(ROSPkgException):
-    """A package has several nodes with this name."""
+    """The package has several nodes with this name."""
 
 
 def get_pkg_dir(
@@ -166,7 +166,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
 def _get_pkg_subdir_by_dir(
     package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return a folder in a package, given the package's path; create the folder if it is missing and ``required``.
+    """Return a folder in the package at a path. If ``required``, create it if it is missing.
 
     Raise OSError if the folder cannot be created.
     """

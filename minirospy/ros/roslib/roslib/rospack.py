@@ -37,12 +37,12 @@ def rosstackexec(args: Sequence[str]) -> str:
 
 
 def rospack_depends(pkg: str) -> list[str]:
-    """Return the packages on which a package depends, directly or indirectly."""
+    """Return a package's direct and indirect dependencies."""
     return rospackexec(["depends", pkg]).split()
 
 
 def rospack_depends_1(pkg: str) -> list[str]:
-    """Return the packages on which a package depends directly."""
+    """Return a package's direct dependencies."""
     return rospackexec(["depends1", pkg]).split()
 
 
@@ -57,18 +57,18 @@ def rospack_depends_on_1(pkg: str) -> list[str]:
 
 
 def rospack_plugins(pkg: str) -> list[tuple[str, str]]:
-    """Return (package, value of the plugin's attribute) for each package that exports a plugin for a package."""
+    """Return (package, plugin attribute) for each package that exports a plugin for ``pkg``."""
     lines = rospackexec(["plugins", "--attrib=plugin", pkg]).splitlines()
     return [(name, value.strip()) for name, _, value in (line.partition(" ") for line in lines)]
 
 
 def rosstack_depends(s: str) -> list[str]:
-    """Return the stacks on which a stack depends, directly or indirectly."""
+    """Return a stack's direct and indirect dependencies."""
     return rosstackexec(["depends", s]).split()
 
 
 def rosstack_depends_1(s: str) -> list[str]:
-    """Return the stacks on which a stack depends directly."""
+    """Return a stack's direct dependencies."""
     return rosstackexec(["depends1", s]).split()
 
 

@@ -1,4 +1,4 @@
-"""roslib.rostime: re-exports genpy's names, which were in this module before."""
+"""roslib.rostime: re-exports the names that have moved to genpy."""
 
 from minirospy.base.times import Duration, Time, TVal
 

@@ -48,7 +48,7 @@ def is_verbose() -> bool:
 
 
 def set_verbose(v: bool) -> None:
-    """Store a value for :func:`is_verbose`; the value has no other effect here."""
+    """Set the value that :func:`is_verbose` returns. It has no other effect."""
     _Verbosity.is_on = bool(v)
 
 
@@ -59,7 +59,7 @@ def list_srv_types(package: str, include_depends: bool) -> list[str]:
 
 
 def srv_file(package: str, type_: str) -> str:
-    """Return the path to a service's definition file, which need not exist.
+    """Return the path to a service's definition file. The file need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """

@@ -95,7 +95,7 @@ def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
 def expand_to_packages(
     names: Sequence[str], env: Mapping[str, str] | None = None
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names), with stacks and metapackages replaced by their packages."""
+    """Replace stacks and metapackages by their packages; return (packages, unknown names)."""
     stacks, known = _stacks(env), _packages(env)
     packages: list[str] = []
     unknown = []
@@ -135,7 +135,7 @@ def _packages(env: Mapping[str, str] | None) -> dict[str, str]:
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str | None:
-    """Return the version of the stack in a folder, from its stack.xml, else from its CMakeLists.txt, else None."""
+    """Return a stack's version from its stack.xml or its CMakeLists.txt, or None if neither states it."""
     from minirospy.ros.rospkg.rospkg.manifest import parse_manifest_file
 
     if os.path.isfile(os.path.join(stack_dir, STACK_FILE)):

@@ -75,7 +75,7 @@ class _MasterParser(Parser):
     """Ignores the remapping arguments that a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError if the arguments are invalid."""
+        """Parse the arguments to a dict keyed by name. Raise CommandLineError if the arguments are invalid."""
         return super().parse(split_assignments(words)[0])
 
 
@@ -92,7 +92,7 @@ def _parser(name: str) -> Parser:
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")
     add("-v", dest="verbose", action="store_true", help="verbose printing")
 
-    # Accepted without effect, because one loop in one process serves every client.
+    # Accept these options without effect: one loop in one process serves all clients.
     parser.accept(
         "-w",
         "--numworkers",
@@ -189,8 +189,8 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Reject an empty value, which may come from an unset variable: it must not give every address access to the
-        # master.
+        # Reject an empty value, which may come from an unset variable, because it would give every address access to
+        # the master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -215,7 +215,7 @@ def _environment(*, local: bool) -> Environment:
 
 
 def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
-    """Warn, in one line, about options and variables for other machines, which have no effect on a local master."""
+    """Warn, in one line, about options and variables that only matter for other machines, if the master is local."""
     asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
@@ -276,7 +276,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # Remove the file while this master still owns the port; later, the file may belong to the next master.
+        # Remove the file while this master still owns the port. After that, it may belong to the next master.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -302,7 +302,7 @@ def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, qu
 
 
 def _write_pid(path: Path) -> None:
-    """Write the process id to a file that scripts read, as ROS does."""
+    """As in ROS, write the process id to a file for scripts to read."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with private_files.open_text(path, "w") as file:
@@ -328,7 +328,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master. For ROS's rosmaster, the information is obtained by calling its API."""
+    """Print one line about the running master. If it is ROS's rosmaster, get the data from its API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -381,7 +381,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _most_clients() -> int:
-    """Raise the open-file limit; return the number of clients that it allows, reserving some files for other uses."""
+    """Raise the open-file limit. Return the number of clients that it allows, with some files reserved for other uses."""
     if sys.platform == "win32":
         return 400
     import resource
@@ -396,7 +396,7 @@ def _most_clients() -> int:
 
 
 def _stop_event() -> asyncio.Event:
-    """Return an event that is set by Ctrl-C, SIGTERM or a closed terminal (SIGHUP, except under nohup)."""
+    """Return an event that Ctrl-C, SIGTERM or a closed terminal (SIGHUP, except under nohup) sets."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     numbers = [*interrupt_signals(), signal.SIGTERM]
@@ -452,7 +452,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
 
 
 def _holder(path: Path) -> int | None:
-    """Return the pid of the master that has locked a journal: 0 if the pid is unknown, None if the journal is not locked."""
+    """Return the pid of the master that holds a journal's lock (0: unknown pid), or None if the journal is not locked."""
     from minirospy.runtime.master.journal import Journal, JournalBusyError
 
     if not path.with_name(path.name + ".lock").exists():
@@ -469,14 +469,14 @@ def _holder(path: Path) -> int | None:
 
 
 def _quiet(line: str) -> None:
-    """Discard a log line about a registration."""
+    """Discard a log line."""
 
 
 class _Shown(logging.Handler):
-    """Prints log records."""
+    """Prints log records to stdout."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a record."""
+        """Print a log record."""
         _show(self.format(record))
 
 

@@ -1,4 +1,4 @@
-"""rosmaster.master_api: the Master API as an object with one method per call, for programs to serve or call.
+"""rosmaster.master_api: the Master API as an object with one method per call, for programs that serve or call it.
 
 The responses are those of ``core/graph/master_api.py``. A thread of this object notifies nodes.
 Source: http://wiki.ros.org/ROS/Master_API.
@@ -105,7 +105,7 @@ class _Api(MasterApi):
         self.notices.put(None)
 
     def get_status(self, caller_id: str) -> Answer:
-        """Refuse the call, which only minirospy's own master supports."""
+        """Reject the call, because only minirospy's own master supports it."""
         return [ERROR, "not a call of the Master API", 0]
 
 
@@ -174,5 +174,5 @@ for _name in _Api().dispatcher.methods:
 
 
 def _value(tree: ParameterTree, key: str) -> object:
-    """Return the value for a node's notification, which is {} if the parameter is not set."""
+    """Return the parameter's value to send in a notification: {} if it is not set."""
     return tree.get(key) if tree.has(key) else {}

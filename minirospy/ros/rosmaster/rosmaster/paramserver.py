@@ -1,6 +1,6 @@
 """rosmaster.paramserver: the parameter tree.
 
-Keys are global names. A notify task is called with a list that has an entry ([(node, API)], key, value) for each change.
+Keys are global names. A notify task is called with a list of changes, each ([(node, API)], key, value).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ParamDictionary:
         return self._tree.names()
 
     def search_param(self, ns: str, key: str) -> str | None:
-        """Return the closest parameter, searched from a namespace upwards.
+        """Search for a parameter from a namespace upwards; return the closest match.
 
         Raise ValueError if the key is empty or private, or the namespace is not global.
         """
@@ -128,7 +128,7 @@ def compute_param_updates(
 def _compute_all_keys(
     param_key: str, param_value: dict[str, Any], all_keys: list[str] | None = None
 ) -> list[str]:
-    """Return the keys of all values and namespaces in a dictionary set at ``param_key``, each with a trailing slash."""
+    """Return the keys, with trailing slashes, of all values and namespaces in a dictionary set at ``param_key``."""
     found = [] if all_keys is None else all_keys
     for name, value in param_value.items():
         key = f"{param_key.rstrip(SEP)}{SEP}{name}{SEP}"

@@ -20,10 +20,10 @@ Answer = tuple[int, str, int]
 
 
 class Pool(Protocol):
-    """The part of a MarkedThreadPool that a manager uses."""
+    """The method of MarkedThreadPool that a RegistrationManager uses."""
 
     def queue_task(self, marker: object, task: Callable[..., object], args: tuple[object, ...]) -> object:
-        """Call ``task(*args)`` in a thread; tasks with the same marker run one after another."""
+        """Call ``task(*args)`` in a thread; at most one task per marker runs at a time."""
 
 
 class Registrations:
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Request that a node shut down. Ignore a node that does not respond, because it has probably exited already."""
+    """Ask a node to shut down. Ignore a node that does not respond, because it has probably exited already."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")

@@ -1,4 +1,4 @@
-"""rosmaster.threadpool: threads for calls to nodes. No two tasks with the same marker run at the same time."""
+"""rosmaster.threadpool: threads for calls to nodes. At most one task per marker runs at a time."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class MarkedThreadPool:
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:
-        """Return the first task whose marker is not in use, or None if this thread has to exit."""
+        """Return the first task whose marker is not in use, or None if this thread must exit."""
         with self._changed:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:

@@ -41,7 +41,7 @@ def remove_server_proxy(uri: str) -> None:
 
 
 def close_half_closed_sockets() -> None:
-    """Close the connections of this thread's proxies whose servers have closed them."""
+    """Close this thread's proxy connections that the server has already closed."""
     if not hasattr(socket, "TCP_INFO"):
         return
     for proxy in _PROXIES.by_uri.values():

@@ -1,4 +1,4 @@
-"""rosmaster.validators: checks for the arguments of master calls.
+"""rosmaster.validators: validates the arguments of calls to the master.
 
 Each function returns a check, which is called with (value, caller_id). The check returns the value, or raises
 ParameterInvalid with rosmaster's message.

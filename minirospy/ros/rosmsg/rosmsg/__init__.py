@@ -130,14 +130,14 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_debug(rospack: object, mode: str, type_: str, raw: bool = False) -> None:
-    """Print a type's text, as `rosmsg show` does. Raise ROSMsgException if the type or the mode is unknown."""
+    """Print a type's definition, like `rosmsg show`. Raise ROSMsgException if the type or the mode is unknown."""
     if mode not in _KINDS:
         raise ROSMsgException(f"Invalid mode for debug: {mode}")
     print(_text(type_, raw, _KINDS[mode]))
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the full name of each type whose name without the package is ``base_type``."""
+    """Yield the full names of types called ``base_type`` in any package."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 
@@ -150,9 +150,9 @@ def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
 
 
 def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
-    """Return a genmsg spec as `rosmsg show` prints it, indented by ``indent``; also write it to the stream ``buff``.
+    """Format a genmsg spec like `rosmsg show`, indented by ``indent``. Also write it to the stream ``buff``.
 
-    Raise KeyError if a message on which it depends is not in the context.
+    Raise KeyError if one of its dependencies is not in the context.
     """
     from minirospy.ros.genmsg.genmsg.msg_loader import lookup_in, parsed_message
 
@@ -172,11 +172,11 @@ def get_yaml_for_msg(
     flow_style_: bool | None = None,
     fill_arrays_: bool = False,
 ) -> str:
-    """Return a message as YAML with sorted fields, and ``prefix`` before each line.
+    """Format a message as YAML with sorted fields. Prepend ``prefix`` to each line.
 
     ``time_offset`` is subtracted from times. ``field_filter`` returns the names of a message's fields to print.
-    ``flow_style_``: put everything in braces. By default, flat values are in braces after the first message or array with
-    more than four entries, to save lines. ``fill_arrays_``: put one element into each empty array.
+    ``flow_style_``: write everything in braces. By default, flat values are in braces after the first message or array
+    with more than four entries, to save lines. ``fill_arrays_``: put one element into each empty array.
     """
     return dump(msg, prefix, time_offset, field_filter, flow_style_, fill_arrays_)
 
@@ -320,7 +320,7 @@ def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names in a folder whose paths ``rfilter`` accepts, or [] if the folder does not exist."""
+    """Return the names of a folder's entries whose paths ``rfilter`` accepts, or [] if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
@@ -332,7 +332,7 @@ def _msg_filter(ext: str) -> Callable[[str], bool]:
 
 
 def _list_types(path: str, subdir: str, ext: str) -> list[str]:
-    """Return the sorted names of the types that a folder's files define; ``subdir`` has no effect, as in ROS."""
+    """Return the sorted names of the types defined by a folder's files. As in ROS, ``subdir`` has no effect."""
     return sorted(name[: -len(ext)] for name in _list_resources(path, _msg_filter(ext)))
 
 

@@ -86,7 +86,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
-    """Return `NODE (URI)` for the node with this URI that uses a topic in the master's ``system_state``, else the URI."""
+    """Return `NODE (URI)` if a node that uses ``topic`` in ``system_state`` has this URI, else the URI."""
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
@@ -98,7 +98,7 @@ def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str
 
 
 def get_node_info_description(node_name: str) -> str:
-    """Return the master's information about a node, as `rosnode info` prints it.
+    """Return the master's information about a node in the format of `rosnode info`.
 
     Raise ROSNodeIOException if the master does not respond.
     """
@@ -111,7 +111,7 @@ def get_node_info_description(node_name: str) -> str:
 
 
 def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
-    """Return the process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
+    """Return the process id and connections of the node at ``node_api``, in the format of `rosnode info`.
 
     Raise ROSNodeIOException if the node does not respond.
     """
@@ -168,7 +168,7 @@ def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[l
 
 
 def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
-    """Request that nodes shut down; return (notified nodes, unknown or unreachable nodes).
+    """Ask nodes to shut down; return (notified nodes, unknown or unreachable nodes).
 
     Without a master, all nodes are unknown.
     """
@@ -193,7 +193,7 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
     """Unregister the nodes in ``blacklist`` from the master and print their names.
 
-    Raise ConnectionRefusedError, as ROS does, if no master responds.
+    As in ROS, raise ConnectionRefusedError if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         # Query the master even if the list is empty, because an unreachable master is an error.
@@ -206,7 +206,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
     """Unregister all nodes except those in ``whitelist`` from the master.
 
-    Raise ConnectionRefusedError, as ROS does, if no master responds.
+    As in ROS, raise ConnectionRefusedError if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
@@ -214,7 +214,7 @@ def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str])
 
 
 def get_machines_by_nodes() -> list[str]:
-    """Return the machines on which nodes run."""
+    """Return the machines that nodes run on."""
     with _graph() as graph:
         hosts = (node_host(node.uri) for node in graph.addresses(nodes.list_nodes(graph)))
         return sorted({host for host in hosts if host})
@@ -270,7 +270,7 @@ def rosnode_cleanup() -> None:
 
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
-    """Run the command, and exit with its status, as ROS does. ``argv`` starts with the command's name."""
+    """As in ROS, run the command and exit with its status. ``argv`` starts with the command's name."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
@@ -287,7 +287,7 @@ def _run_verb(name: str, argv: Sequence[str]) -> int | None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return the function for a command line whose first words are the command's name and the verb."""
+    """Return a verb's function. Its argument is a command line that starts with the command's name and the verb."""
 
     def call(argv: Sequence[str]) -> None:
         _run_verb(name, argv)
@@ -336,7 +336,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value in a response (code, status message, value). Raise ROSNodeException if the response is an error."""
+    """Return the value from a response (code, status message, value). Raise ROSNodeException if the response is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")
@@ -348,7 +348,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """Ping a node; return the duration in seconds. If the node does not respond, print an error and return None."""
+    """Ping a node; return the round-trip time in seconds. If the node does not respond, print an error and return None."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:

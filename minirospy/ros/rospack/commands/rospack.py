@@ -67,12 +67,12 @@ class _Tool(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 1 in the cases in which ROS's rospack does."""
+    """Run the command; return 1 in the same cases as ROS's rospack."""
     return _run(_Tool("rospack", "package", _VERBS), argv)
 
 
 def rosstack(argv: Sequence[str] | None = None) -> int:
-    """Run the command rosstack; return 1 in the cases in which ROS's rosstack does."""
+    """Run the command rosstack; return 1 in the same cases as ROS's rosstack."""
     return _run(_Tool("rosstack", "stack", _STACK_VERBS), argv)
 
 
@@ -282,7 +282,7 @@ def _export(line: _Line, tree: Dependencies) -> None:
 
 
 def _exported(line: _Line, tree: Dependencies, package: str, tag: str, attribute: str) -> list[str]:
-    """Return an attribute's distinct values in the exports of a package and of all its dependencies."""
+    """Return the distinct values of an attribute in the exports of a package and all its dependencies."""
     own = [] if "deps-only" in line.options else [package]
     found: dict[str, None] = {}
     for name in [*own, *reversed(tree.all(package))]:
@@ -314,7 +314,7 @@ def _contains(line: _Line, tree: Dependencies) -> None:
 
 
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
-    """Return a verb that prints those compiler or linker flags in <cpp> exports that ``keep`` accepts, without ``prefix``."""
+    """Return a verb that prints the flags in <cpp> exports that ``keep`` accepts, without ``prefix``."""
 
     def body(line: _Line, tree: Dependencies) -> None:
         words = " ".join(_exported(line, tree, _package(line), "cpp", attribute)).split()

@@ -272,7 +272,7 @@ FAMILY = Family(
         ),
         Verb("list", "list parameter names", _list_parser, _list),
     ),
-    # Exit with 0 for an unknown verb, as ROS does; scripts therefore do not notice the error.
+    # As in ROS, exit with 0 for an unknown verb; scripts therefore do not notice the error.
     help_status=HelpStatus(none=0, short=0, long=0, unknown=64),
     shows_help_on_error=True,
 )

@@ -88,11 +88,11 @@ class RosParamIOException(RosParamException):
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
-    """Invalid YAML; programs catch either of the two base classes."""
+    """The YAML is invalid. Programs catch either of the two base classes."""
 
 
 def get_param(param: str) -> Any:
-    """Return a parameter's value, with bytes and dates in xmlrpc.client's wrappers, as in ROS.
+    """Return a parameter's value. As in ROS, bytes and dates are in xmlrpc.client's wrappers.
 
     Raise rosgraph.MasterError if the parameter is not set, or if the name is empty.
     """
@@ -123,7 +123,7 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """Return a value with each Binary replaced by bytes, and numpy numbers and arrays replaced by Python numbers and lists."""
+    """Replace Binary by bytes, and numpy numbers and arrays by Python numbers and lists, in a value."""
     if is_numpy(value):
         return _with_bytes(value.tolist())  # type: ignore[attr-defined]
     if isinstance(value, Binary):
@@ -232,7 +232,7 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
+    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
@@ -279,7 +279,7 @@ def _rosparam_cmd_set_load(cmd: str, argv: Sequence[str]) -> None:
 
 
 def _rosparam_cmd_get_param(param: str, pretty: bool = False, verbose: bool = False) -> None:
-    """Print a parameter as `rosparam get` does. Raise RosParamException if the parameter is not set."""
+    """Print a parameter, like `rosparam get`. Raise RosParamException if the parameter is not set."""
     if verbose:
         print(f"getting parameter [{param}]")
     try:
@@ -290,13 +290,13 @@ def _rosparam_cmd_get_param(param: str, pretty: bool = False, verbose: bool = Fa
 
 
 def _pretty_print(value: dict[str, object], indent: str = "") -> None:
-    """Print a dictionary as `rosparam get -p` does; strings with several lines are printed unchanged."""
+    """Print a dictionary, like `rosparam get -p`. Print multi-line strings unchanged."""
     if value:
         print(format_pretty(_with_bytes(value), indent))
 
 
 def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[Values, list[str]]:
-    """Return the options and values on a command line of `rosparam set`, whose values may be negative numbers."""
+    """Parse a command line of `rosparam set`, where values may be negative numbers; return the options and values."""
     values: list[str] = []
     options: list[str] = []
     takes_value = False
@@ -317,11 +317,11 @@ def _get_caller_id() -> str:
 
 
 pattern = re.compile(r"^rad\([^\)]*\)$")
-"""The last of the two patterns by which ROS recognizes angles; programs use this name."""
+"""The second of ROS's two patterns for angles. Programs use this name."""
 
 
 def construct_angle_degrees(loader: Any, node: Any) -> float:
-    """Return the value of `deg(90)`, or of a number, in a YAML node in radians. Raise RosParamException if it is not a number."""
+    """Convert a YAML node such as `deg(90)` or `90` to radians. Raise RosParamException if it is not a number."""
     value = loader.construct_scalar(node)
     try:
         return math.radians(arithmetic(value.strip()[4:-1] if value.startswith("deg(") else value))
@@ -330,7 +330,7 @@ def construct_angle_degrees(loader: Any, node: Any) -> float:
 
 
 def construct_angle_radians(loader: Any, node: Any) -> float:
-    """Return the value of an expression such as `rad(pi/2)` in a YAML node.
+    """Evaluate a YAML node such as `rad(pi/2)`.
 
     Raise RosParamException if the expression is invalid. Only arithmetic with `pi` is evaluated, whereas ROS runs the
     expression as Python code.
@@ -358,8 +358,7 @@ def represent_foo(loader: Any, data: str) -> Any:
     return loader.represent_scalar("#", data)
 
 
-# As in ROS, programs that import rosparam can read deg(90) and rad(pi/2), and get bytes as Binary, with PyYAML's own
-# loaders.
+# As in ROS, importing rosparam lets PyYAML's own loaders read deg(90) and rad(pi/2), and return bytes as Binary.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
     _loader.add_constructor("!degrees", construct_angle_degrees)
@@ -369,7 +368,7 @@ yaml.add_representer(Binary, represent_xml_binary)
 
 
 def _fullusage() -> NoReturn:
-    """Print the list of commands, and exit as `rosparam` without arguments does."""
+    """Print the list of commands and exit, like `rosparam` without arguments."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     sys.exit(main([]))

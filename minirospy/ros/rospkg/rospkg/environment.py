@@ -41,18 +41,18 @@ ROS_TEST_RESULTS_DIR = "ROS_TEST_RESULTS_DIR"
 
 
 def _compute_package_paths(ros_root: str | None, ros_package_path: str | None) -> list[str]:
-    """Return the folders in the values of ROS_ROOT and ROS_PACKAGE_PATH."""
+    """Return the folders listed in ROS_ROOT and ROS_PACKAGE_PATH."""
     named = (ros_package_path or "").split(os.pathsep)
     return [path for path in (ros_root or "", *named) if path.strip()]
 
 
 def _resolve_path(p: str) -> str:
-    """Return a path from an environment variable, with ``~`` at its start expanded."""
+    """Expand ``~`` at the start of a path from an environment variable."""
     return os.path.expanduser(p) if p and p[0] == "~" else p
 
 
 def _resolve_paths(paths: str) -> str:
-    """Return the paths from an environment variable, with ``~`` at the start of each path expanded."""
+    """Expand ``~`` at the start of each path from an environment variable."""
     return os.pathsep.join(_resolve_path(path) for path in paths.split(os.pathsep) if path)
 
 

@@ -93,7 +93,7 @@ _OF_FDO = {
 
 
 class OsNotDetected(Exception):
-    """The running operating system is not the one that the detector supports, or no detector supports it."""
+    """The detector does not support the running operating system, or no detector does."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
@@ -130,11 +130,11 @@ class OsDetector:
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected if this is not the OS that is running."""
+        """Return the system's version. Raise OsNotDetected if another OS is running."""
         raise NotImplementedError("get_version unimplemented")
 
     def get_codename(self) -> str:
-        """Return the system's codename. Raise OsNotDetected if this is not the OS that is running."""
+        """Return the system's codename. Raise OsNotDetected if another OS is running."""
         raise NotImplementedError("get_codename unimplemented")
 
 
@@ -150,11 +150,11 @@ class FdoDetect(OsDetector):
         return self.release_info is not None
 
     def get_version(self) -> str:
-        """Return VERSION_ID. Raise OsNotDetected if this is not the OS that is running."""
+        """Return VERSION_ID. Raise OsNotDetected if another OS is running."""
         return self._info().get("VERSION_ID", "")
 
     def get_codename(self) -> str:
-        """Return VERSION_CODENAME. Raise OsNotDetected if this is not the OS that is running."""
+        """Return VERSION_CODENAME. Raise OsNotDetected if another OS is running."""
         release = self._info()
         codename = release.get("VERSION_CODENAME", "")
         if not codename and "(" in (version := release.get("VERSION", "")):
@@ -192,13 +192,13 @@ class _Platform(OsDetector):
         return platform.system() == self.system
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected if this is not the system that is running."""
+        """Return the system's version. Raise OsNotDetected if another system is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return self._version()
 
     def get_codename(self) -> str:
-        """Return an empty codename. Raise OsNotDetected if this is not the system that is running."""
+        """Return an empty codename. Raise OsNotDetected if another system is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return ""
@@ -238,7 +238,7 @@ class FreeBSD(_Platform):
 
 
 class OsDetect:
-    """Detects the operating system with a list of detectors; the first one that matches is used."""
+    """Detects the operating system. The first detector that matches is used."""
 
     default_os_list: list[tuple[str, OsDetector]] = []
 

@@ -1,7 +1,7 @@
 """rospkg's classes and functions, implemented with Packages and Dependencies; `import rospkg` re-exports them.
 
-Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. To distinguish packages from rosdep keys, rospkg reads
-rosdep's database; this module treats names of packages that it finds as packages, and all other names as rosdep keys.
+Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. rospkg reads rosdep's database to distinguish
+packages from rosdep keys. This module instead treats any name that is not a known package as a rosdep key.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class ManifestManager:
 
     @property
     def ros_paths(self) -> Names:
-        """The searched folders."""
+        """Return the searched folders."""
         return list(self._ros_paths)
 
     def get_ros_paths(self) -> Names:
@@ -81,7 +81,7 @@ class ManifestManager:
         return Manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
-        """Return a package's direct dependencies; if ``implicit``, also the indirect ones.
+        """Return a package's direct dependencies or, if ``implicit``, all of them.
 
         Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
@@ -93,7 +93,7 @@ class ManifestManager:
         return list(found)
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Names:
-        """Return the packages that depend on this one directly; if ``implicit``, also those that depend on it indirectly."""
+        """Return the packages that depend on this one directly or, if ``implicit``, directly or indirectly."""
         found = []
         for other in self._folders():
             try:
@@ -127,7 +127,7 @@ class ManifestManager:
             raise InvalidManifest(str(error)) from error
 
     def _split(self, name: str) -> tuple[Names, Names]:
-        """Return a manifest's dependencies: those that are packages, and those that are not."""
+        """Return a manifest's dependencies as (packages, others)."""
         from minirospy.workspace.manifest import Kind
 
         left_out = {Kind.DOC, Kind.BUILDTOOL_EXPORT}
@@ -207,7 +207,7 @@ def get_package_name(path: str) -> str | None:
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names) for the given names, with metapackages replaced by their packages."""
+    """Replace metapackages by their packages; return (packages, unknown names)."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():

@@ -1,4 +1,4 @@
-"""The names of rospy.client."""
+"""Provides the names in ROS's module rospy.client."""
 
 from roscpp.msg import Logger
 from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse

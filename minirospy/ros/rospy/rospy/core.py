@@ -131,7 +131,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log with the source position of the caller's caller. rospy's log functions wrap this function, and programs may do so, too.
+    """Log with the source position of the caller's caller. rospy's log functions wrap this function; programs may do the same.
 
     ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """
@@ -176,12 +176,12 @@ def add_shutdown_hook(h: Callable[[object], object]) -> None:
 
 
 def add_client_shutdown_hook(h: Callable[[], object]) -> None:
-    """Call ``h()`` at shutdown, as rospy.on_shutdown does."""
+    """Call ``h()`` at shutdown, like rospy.on_shutdown."""
     current_session().lifecycle.add_hook(h)
 
 
 def register_signals() -> None:
-    """Make SIGINT and SIGTERM shut the node down, as init_node does; works only in the main thread."""
+    """Make SIGINT and SIGTERM shut the node down, like init_node. Works only in the main thread."""
     current_session().signals.install()
 
 
@@ -205,7 +205,7 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid for other values."""
+    """Return a validator for topic names. It raises ParameterInvalid, naming ``param_name``, for other values."""
     resolved = valid_name(param_name)
 
     def check(param_value: object, caller_id: str) -> str:

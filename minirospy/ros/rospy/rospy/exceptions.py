@@ -1,4 +1,4 @@
-"""The names of rospy.exceptions."""
+"""Provides the names in ROS's module rospy.exceptions."""
 
 from minirospy.base.errors import (
     ROSException,

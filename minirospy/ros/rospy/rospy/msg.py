@@ -1,4 +1,4 @@
-"""Writes and reads messages with a length prefix, as rospy.msg does. Source: http://wiki.ros.org/ROS/TCPROS."""
+"""Reads and writes messages with a length prefix, like rospy.msg. Source: http://wiki.ros.org/ROS/TCPROS."""
 
 from minirospy.client.length_prefix import deserialize_messages, serialize_message
 from minirospy.client.topics import AnyMsg

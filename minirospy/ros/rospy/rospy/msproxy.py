@@ -38,7 +38,7 @@ _master_arg_remap = {
         "unsubscribeParam",
     )
 }
-"""Maps each method to the positions of its arguments that are graph resource names, not counting the caller's name."""
+"""Maps each method to the positions of arguments that are graph resource names. The caller's name is not counted."""
 
 
 class ServerProxy:
@@ -74,7 +74,7 @@ class ServerProxy:
 
 
 class MasterProxy:
-    """A proxy for the master at ``uri``, which passes this node's name as the first argument, and resolves names.
+    """A proxy for the master at ``uri``. Passes this node's name as the first argument, and resolves names.
 
     Results are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
@@ -125,7 +125,7 @@ class MasterProxy:
         return iter(value)
 
     def search_param(self, key: str) -> str | None:
-        """Return the name of the closest parameter, searched upwards from this node's namespace, or None if none is found."""
+        """Search for a parameter upwards from this node's namespace. Return the closest match's name, or None."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None

@@ -1,4 +1,4 @@
-"""rospy.names: remappings, and checks for the arguments of calls.
+"""rospy.names: remappings, and validators for the arguments of calls.
 
 Source: http://wiki.ros.org/Names and the behaviour of rospy.names.
 """
@@ -128,7 +128,7 @@ def scoped_name(caller_id: str, name: str) -> str:
 
 
 def global_name(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid for other values."""
+    """Return a validator for global names. It raises ParameterInvalid, naming ``param_name``, for other values."""
 
     def validator(param_value: object, caller_id: str) -> str:
         text = _text(param_name, param_value)
@@ -140,7 +140,7 @@ def global_name(param_name: str) -> Validator:
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Validator:
-    """Return a check that the argument ``param_name`` is a valid name; the check also resolves the name.
+    """Return a validator for names that also resolves them.
 
     The check raises ParameterInvalid if the name is invalid.
     """

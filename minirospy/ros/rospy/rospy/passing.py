@@ -1,4 +1,4 @@
-"""Names that rospy's modules re-export by accident, because ROS's modules import each other with a star.
+"""Names that rospy's modules re-export by accident, because ROS's modules star-import each other.
 
 Programs can therefore use `rospy.core.resolve_name`, although editors list only the names that the module defines.
 """
@@ -13,7 +13,7 @@ __all__ = ["core_dir", "core_getattr", "service_dir", "service_getattr", "topics
 
 
 def _passing_on(name: str, *sources: str) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also exports the public names of ``sources``."""
+    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, so that it also exports the public names of ``sources``."""
 
     def get(attribute: str) -> object:
         for source in () if attribute.startswith("_") else sources:

@@ -49,7 +49,7 @@ def set_rostime_initialized(val: bool) -> None:
 
 
 def set_rostime(t: object) -> None:
-    """Set the node's time, which is simulated from now on. Raise ValueError if ``t`` is not a Time."""
+    """Switch the node to simulated time and set the time. Raise ValueError if ``t`` is not a Time."""
     if not isinstance(t, times.Time):
         raise ValueError(f"must be Time instance: {t.__class__}")
     session = current_session()
@@ -63,7 +63,7 @@ _set_rostime = set_rostime
 
 
 def switch_to_wallclock() -> None:
-    """Use the machine's clock from now on."""
+    """Switch the node to the machine's clock."""
     session = current_session()
     before, session.clock = session.clock, WallClock()
     if isinstance(before, SimulatedClock):

@@ -1,4 +1,4 @@
-"""The names of rospy.service."""
+"""Provides the names in ROS's module rospy.service."""
 
 from minirospy.base.errors import ServiceException
 from minirospy.client.services import Service, ServiceProxy

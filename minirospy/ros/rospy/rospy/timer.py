@@ -1,4 +1,4 @@
-"""The names of rospy.timer."""
+"""Provides the names in ROS's module rospy.timer."""
 
 from minirospy.client.time import Rate, Timer, TimerEvent, sleep
 

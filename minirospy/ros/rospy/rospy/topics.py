@@ -1,4 +1,4 @@
-"""The names of rospy.topics."""
+"""Provides the names in ROS's module rospy.topics."""
 
 from minirospy.base.errors import ROSSerializationException, TransportTerminated
 from minirospy.client.publisher import PublishedTopic as _PublisherImpl

@@ -1,4 +1,4 @@
-"""SerialClient: represents a device on a serial port or TCP connection as part of this node.
+"""SerialClient: makes a device on a serial port or TCP connection part of this node.
 
 The device describes its topics and services; afterwards messages pass in both directions. The device can request the time
 and parameters, and its log messages appear as the node's log messages. Source:
@@ -185,7 +185,7 @@ class SerialClient:
         self._to_write.put(encode(TopicInfo.ID_PUBLISHER, b""))
 
     def txStopRequest(self) -> None:
-        """Request that the device stop sending."""
+        """Ask the device to stop sending."""
         self._to_write.put(encode(TopicInfo.ID_TX_STOP, b""))
         rospy.loginfo("Sending tx stop request")
 
@@ -413,7 +413,7 @@ def _info(data: bytes) -> TopicInfo:
 
 
 class _Creation:
-    """A context manager that logs the reason why a topic or service cannot be created, and suppresses the error."""
+    """A context manager that logs and suppresses errors in creating a topic or service."""
 
     def __init__(self, what: str) -> None:
         self._what = what

@@ -27,7 +27,7 @@ class EndpointError(MinirospyError):
 
 
 def to_bytes(message: Message) -> bytes:
-    """Return a message as bytes for the device."""
+    """Serialize a message for the device."""
     buffer = BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
@@ -95,7 +95,7 @@ class Subscriber:
 
 
 class _Service:
-    """The base class of services: the message classes, and the id of the topic on which the device receives its part of a call.
+    """The base class of services. Holds the message classes, and the id of the topic for the device's part of a call.
 
     Raise EndpointError if the service type is not installed.
     """
@@ -161,7 +161,7 @@ class ServiceServer(_Service):
 
 
 class ServiceClient(_Service):
-    """Calls a service for the device, in a thread, so that the device's other topics are not blocked."""
+    """Calls a service for the device. Uses a thread, so that the device's other topics are not blocked."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)

@@ -1,4 +1,4 @@
-"""rosserial_python's own classes for a device's topics and services, for programs that read a device's bytes themselves.
+"""rosserial_python's classes for a device's topics and services, for programs that read its bytes themselves.
 
 The classes have the constructors and methods of ROS's classes: ``parent`` is an object with ``send(topic_id, data)``, such as
 a SerialClient. A SerialClient itself uses the classes in minirospy.ros.rosserial_python.devices.endpoints. Source:

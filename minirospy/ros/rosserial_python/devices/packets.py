@@ -41,7 +41,7 @@ def _checksum(data: bytes) -> int:
 
 
 def encode(topic_id: int, data: bytes) -> bytes:
-    """Return a packet. Raise ValueError if the data is too long."""
+    """Encode a packet. Raise ValueError if the data is too long."""
     if len(data) > MAX_MESSAGE_LENGTH:
         raise ValueError(f"{len(data)} bytes: a packet holds {MAX_MESSAGE_LENGTH}")
     length, topic = struct.pack("<H", len(data)), struct.pack("<H", topic_id)
@@ -65,17 +65,17 @@ class Decoder:
 
     @property
     def missing(self) -> int:
-        """The number of bytes still missing from the current packet, or 0 between packets."""
+        """Return the number of bytes missing from the current packet, or 0 between packets."""
         return self._needed() - len(self._bytes) if self._bytes else 0
 
     @property
     def received(self) -> int:
-        """The number of bytes received so far for the current packet."""
+        """Return the number of bytes of the current packet received so far."""
         return len(self._bytes)
 
     @property
     def step(self) -> str:
-        """The part of a packet that is read next, with the name that the real rosserial_python uses."""
+        """Return the part of a packet to read next, as named by the real rosserial_python."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:
@@ -101,7 +101,7 @@ class Decoder:
                 yield found
 
     def _needed(self) -> int:
-        """Return the number of bytes that the decoder needs for its next step."""
+        """Return the number of bytes needed for the next step."""
         if len(self._bytes) < 2 or self._bytes[1] != _VERSION:
             return 2
         if len(self._bytes) < 5 or not self._has_right_length():

@@ -131,7 +131,7 @@ class SocketPort:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Do nothing, because a new TCP connection has no stray bytes from earlier."""
+        """Do nothing: a new TCP connection has no stray bytes."""
 
     def close(self) -> None:
         """Close the connection."""

@@ -139,7 +139,7 @@ def rosservice_find(service_type: str) -> list[str]:
     with _graph() as graph:
         if service_type:
             return services.find_services_of_type(graph, service_type)
-        # Query the master although no service can match, because as in ROS, an unreachable master is an error.
+        # Query the master even though no service can match: as in ROS, an unreachable master is an error.
         services.list_services(graph)
         return []
 
@@ -174,7 +174,7 @@ def has_service_args(service_name: str, service_class: ServiceClass | None = Non
 
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
+    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     from minirospy.ros.rosservice.commands.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
@@ -185,7 +185,7 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return the function for a command line whose first words are the command's name and the verb."""
+    """Return a verb's function. Its argument is a command line that starts with the command's name and the verb."""
 
     def call(argv: Sequence[str] = sys.argv) -> None:
         from minirospy.command.called import Raised, call_verb
@@ -323,7 +323,7 @@ def _stdin_yaml_arg() -> Iterator[Any]:
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value in a response (code, status message, value). Raise ROSServiceException if the response is an error."""
+    """Return the value from a response (code, status message, value). Raise ROSServiceException if the response is an error."""
     code, text, value = args
     if code != 1:
         raise ROSServiceException(f"remote call failed: {text}")
@@ -336,7 +336,7 @@ def _fullusage() -> None:
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Return the global name for a name. A value of another type is converted to a name that matches no service, as in ROS."""
+    """Resolve a name to a global name. As in ROS, a value of another type becomes a name that matches no service."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 

@@ -42,14 +42,14 @@ _logger = logging.getLogger("rostest")
 
 
 def printlog(msg: str, *args: object) -> None:
-    """Print a line with its ``%s`` replaced by ``args`` and log the line."""
+    """Print and log a line, with its ``%s`` replaced by ``args``."""
     text = msg % args if args else msg
     _logger.info("%s", text)
     print("[ROSTEST]" + text)
 
 
 def printlogerr(msg: str, *args: object) -> None:
-    """Print a line to stderr with its ``%s`` replaced by ``args`` and log the line as an error."""
+    """Print a line to stderr and log it as an error, with its ``%s`` replaced by ``args``."""
     text = msg % args if args else msg
     _logger.error("%s", text)
     print("[ROSTEST]" + text, file=sys.stderr)
@@ -61,4 +61,4 @@ def printRostestSummary(result: unittest.TestResult, rostest_results: Result) ->
 
 
 def getErrors() -> None:
-    """Return None: the errors can be queried with `rostest.runner.getResults()`."""
+    """Return None; use `rostest.runner.getResults()` to get the errors."""

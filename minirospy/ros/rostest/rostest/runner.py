@@ -78,7 +78,7 @@ def getConfig() -> ROSLaunchConfig | None:
 
 
 def getRostestParents() -> list[ROSTestLaunchParent]:
-    """Return the launches of all tests, so that each can be torn down at the end."""
+    """Return all tests' launches, so that each can be torn down at the end."""
     return _run.parents
 
 
@@ -119,9 +119,9 @@ def failDuplicateRunner(testName: str) -> TestMethod:
 
 
 def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None) -> TestMethod:
-    """Return a test method that launches the nodes and runs a ``<test>``, with as many retries as its tag allows.
+    """Return a test method that launches the nodes and runs a ``<test>``. It retries as often as the tag allows.
 
-    The test method reads the results from the test's XML file, in the package's folder in ``results_base_dir``.
+    The method reads the results from the test's XML file, in the package's folder below ``results_base_dir``.
     """
 
     def fn(self: RosTestCase) -> None:
@@ -197,7 +197,7 @@ def createUnitTest(
     clear: bool = False,
     results_base_dir: str | None = None,
 ) -> type[unittest.TestCase]:
-    """Return the TestCase class for a launch file's tests. Raise RLException if the file cannot be read."""
+    """Return a TestCase class with a launch file's tests. Raise RLException if the file cannot be read."""
     config = load_config_default([test_file], None)
     methods: dict[str, TestMethod] = {}
     for test in config.tests:

@@ -1,4 +1,4 @@
-"""Functions with which a test queries the graph and runs itself; ``import rostest`` re-exports them.
+"""Functions for tests to query the graph and to run themselves. ``import rostest`` re-exports them.
 
 Source: http://wiki.ros.org/rostest/Writing, http://wiki.ros.org/rospy/Overview.
 """

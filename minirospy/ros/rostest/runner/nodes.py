@@ -75,7 +75,7 @@ class _NodeTest(unittest.TestCase):
         return [{**each, "name": rospy.resolve_name(str(each["name"]))} for each in value]
 
     def limits(self, name: str) -> list[tuple[str, float, bool, _Item]]:
-        """Return (name, timeout, negative, item) for each item in a list parameter, the shortest timeout first."""
+        """Return (name, timeout, negative, item) for each item in a list parameter, shortest timeout first."""
         found = [
             (each["name"], float(each.get("timeout", _WAIT_SECONDS)), bool(each.get("negative")), each)
             for each in self.listed(name)
@@ -159,7 +159,7 @@ class _GraphTest(_NodeTest):
         self.addCleanup(self.master.close)
 
     def check(self, parameter: str, known: Callable[[SystemState], Container[str]], text: str) -> list[_Item]:
-        """Wait for each name in a list parameter, the shortest timeout first; return the items that were found."""
+        """Wait for each name in a list parameter, shortest timeout first; return the items found."""
         started = time.monotonic()
         came = []
         for name, timeout, negative, each in self.limits(parameter):

@@ -55,7 +55,7 @@ class RosTest:
     is_interrupted: bool = False
 
     def run(self) -> None:
-        """Run all tests, one after the other, sorted by name; a signal stops the run."""
+        """Run all tests in sequence, sorted by name. A signal stops the run."""
         nodes = {node.name for node in self.spec.nodes}
         by_name: dict[str, list[TestSpec]] = {}
         for test in self.spec.tests:
@@ -180,7 +180,7 @@ class RosTest:
 
     @property
     def run_id(self) -> str:
-        """The name of the folder for the nodes' log files."""
+        """Return the name of the folder for the nodes' log files."""
         return f"rostest-{os.getpid()}"
 
     def _results_file(self, test: TestSpec) -> Path:
@@ -207,7 +207,7 @@ class RosTest:
 def master_of_tests(
     environment: Environment, run_id: str, *, reuse: bool = False, clear: bool = False
 ) -> Iterator[Environment]:
-    """Yield an environment with a new master on a free port, which has this run_id and is stopped after the block.
+    """Start a master with this run_id on a free port; yield its environment. Stop the master after the block.
 
     ``reuse``: use the master that the environment specifies; ``clear`` deletes its parameters first.
     Raise MasterUnreachableError if that master does not respond.

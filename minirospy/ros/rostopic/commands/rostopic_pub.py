@@ -43,10 +43,10 @@ _CLOCK_SECONDS = 5.0
 
 
 class _PubParser(Parser):
-    """Accepts negative numbers as values, even though there is an option `-1`."""
+    """Accepts negative numbers as values, despite the option `-1`."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, with negative numbers among the values."""
+        """Parse the arguments to a dict keyed by name. Accept negative numbers as values."""
         options = super().parse(
             [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
         )
@@ -232,7 +232,7 @@ def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> l
 
 
 def _ros_argument_error(text: str) -> str:
-    """Return ROS's error message for an argument that is not valid YAML, including the error of PyYAML's own parser."""
+    """Return ROS's error message for an argument that is not valid YAML. It includes PyYAML's own error."""
     import yaml
 
     try:

@@ -155,7 +155,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return the same as get_topic_type(), but with the message class as type.
+    """Like get_topic_type(), but return the message class instead of the type name.
 
     Raise ROSTopicException if the class is not installed.
     """
@@ -214,7 +214,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
 
 
 def _slice_fault(field: str) -> str:
-    """Return the error in a field's brackets, worded as in ROS, or an empty string if there is no error."""
+    """Return ROS's error message for invalid brackets in a field, or "" if they are valid."""
     name, bracket, rest = field.partition("[")
     if not bracket:
         return ""
@@ -234,7 +234,7 @@ def _slice_fault(field: str) -> str:
 
 
 def get_info_text(topic: str) -> str:
-    """Return a topic's type, publishers and subscribers, as `rostopic info` prints them.
+    """Return a topic's type, publishers and subscribers in the format of `rostopic info`.
 
     Raise ROSTopicException if the topic does not exist.
     """
@@ -287,7 +287,7 @@ def create_publisher(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
+    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
@@ -295,7 +295,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return the function for a command line whose first words are the command's name and the verb."""
+    """Return a verb's function. Its argument is a command line that starts with the command's name and the verb."""
 
     def call(argv: Sequence[str] = sys.argv) -> None:
         from minirospy.command.called import Raised, call_verb
@@ -326,7 +326,7 @@ def _fullusage() -> NoReturn:
 def _rostopic_list_group_by_host(
     master: masterapi.Master, pubs: Sequence[_Topic], subs: Sequence[_Topic]
 ) -> tuple[dict[str, list[_Topic]], dict[str, list[_Topic]]]:
-    """Return the publishers by host, and the subscribers by host; each is a dict of rows (topic, type, nodes)."""
+    """Return two dicts keyed by host, of publishers and of subscribers, with rows (topic, type, nodes)."""
     hosts: dict[str, str] = {}
 
     def grouped(rows: Sequence[_Topic]) -> dict[str, list[_Topic]]:
@@ -532,7 +532,7 @@ def _sub_rostopic_list(
     verbose: bool,
     indent: str = "",
 ) -> None:
-    """Print rows of (topic, type, nodes) as `rostopic list` does; each line starts with ``indent``."""
+    """Print rows of (topic, type, nodes) like `rostopic list`, indented by ``indent``."""
     if not verbose:
         chosen = [
             *([] if subscribers_only and not publishers_only else pubs),

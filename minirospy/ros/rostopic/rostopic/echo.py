@@ -1,4 +1,4 @@
-"""Prints messages in user code, with a class that is used as a subscriber's callback or as a base class."""
+"""A class that prints messages in user code, as a subscriber's callback or as a base class."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ValueTransform = Callable[[object, object], object]
 
 
 class CallbackEcho:
-    """Prints messages as `rostopic echo` does: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
+    """Prints messages like `rostopic echo`: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
 
     ``msg_eval`` extracts the field to print; messages for which ``filter_fn`` returns a falsy value are not printed.
     ``done`` becomes True after ``count`` messages.

@@ -1,4 +1,4 @@
-"""Measures rates, bandwidths and delays in user code, with classes that are used as a subscriber's callback."""
+"""Classes that measure rates, bandwidths and delays in user code, as subscribers' callbacks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The names of rosunit.baretest."""
+"""Provides the names in ROS's module rosunit.baretest."""
 
 from minirospy.ros.rosunit.runner.unit import print_runner_summary, print_unittest_summary
 

@@ -1,4 +1,4 @@
-"""The names of rosunit.core."""
+"""Provides the names in ROS's module rosunit.core."""
 
 from __future__ import annotations
 

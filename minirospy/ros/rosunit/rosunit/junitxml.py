@@ -46,5 +46,5 @@ def invalid_char_replacer(m: re.Match[str]) -> str:
 
 
 def cdata(cdata_text: str) -> str:
-    """Return a string as a CDATA section."""
+    """Wrap a string in a CDATA section."""
     return f"<![CDATA[\n{cdata_text}\n]]>"

@@ -1,4 +1,4 @@
-"""The names of rosunit.pyunit."""
+"""Provides the names in ROS's module rosunit.pyunit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _running: list[Any] = []
 
 
 def start_coverage(packages: Sequence[str]) -> None:
-    """Start to measure test coverage, adding to earlier results. If the package coverage is not installed, print a warning."""
+    """Start measuring test coverage, adding to earlier results. If the package coverage is not installed, print a warning."""
     try:
         import coverage  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
@@ -42,7 +42,7 @@ def start_coverage(packages: Sequence[str]) -> None:
 
 
 def stop_coverage(packages: Sequence[str], html: str | None = None) -> None:
-    """Stop measuring the coverage and print the coverage of ``packages``; also write a report into the folder ``html``."""
+    """Stop measuring coverage and print that of ``packages``. Also write a report into the folder ``html``."""
     if not _running:
         return
     measured = _running.pop()

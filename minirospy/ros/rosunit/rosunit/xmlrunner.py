@@ -1,4 +1,4 @@
-"""The names of rosunit.xmlrunner."""
+"""Provides the names in ROS's module rosunit.xmlrunner."""
 
 from minirospy.ros.rosunit.rosunit.junitxml import cdata, python2
 from minirospy.ros.rosunit.runner.unit import XMLTestRunner

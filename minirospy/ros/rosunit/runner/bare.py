@@ -29,7 +29,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Make Ctrl-C set the event, because an exception could leave a newly started process running."""
+    """Make Ctrl-C set the event instead of raising an exception, which could leave a new process running."""
     noted = SignalSafeEvent()
     before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:

@@ -56,7 +56,7 @@ class TestInfo:
         return element
 
     def xml(self) -> bytes:
-        """Return the element as bytes."""
+        """Return the XML element as bytes."""
         return ElementTree.tostring(self.xml_element())
 
 
@@ -95,7 +95,7 @@ class TestCaseResult:
 
     @property
     def description(self) -> str:
-        """The lines about this case in the printed summary."""
+        """Return the lines about this case in the printed summary."""
         if self.passed:
             return f"[{self.name}][passed]\n"
         return "".join(
@@ -105,7 +105,7 @@ class TestCaseResult:
 
     @property
     def line(self) -> str:
-        """The text to print after the case has run."""
+        """Return the text to print after the case has run."""
         lines = [f"[Testcase: {self.name}] ... ok"]
         for info in (*self.failures, *self.errors):
             lines[0] = f"[Testcase: {self.name}] ... {info.word}!"
@@ -130,7 +130,7 @@ class TestCaseResult:
         return element
 
     def xml(self) -> bytes:
-        """Return the element as bytes."""
+        """Return the XML element as bytes."""
         return ElementTree.tostring(self.xml_element())
 
 
@@ -313,7 +313,7 @@ def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
 
 
 def filter_nonprintable_text(text: str) -> str:
-    """Return a string in which characters that XML does not allow are written as ``&#x001B;``."""
+    """Escape the characters that XML does not allow, as in ``&#x001B;``."""
     return NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
 
 

@@ -59,7 +59,7 @@ def unitrun(
 ) -> None:
     """Run a TestCase, given as a class or a name. A test file calls this as its main function.
 
-    With ``--text`` in ``sysargs`` (default: ``sys.argv``), print as unittest does; else write the results to
+    With ``--text`` in ``sysargs`` (default: ``sys.argv``), print like unittest; else write the results to
     ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or to the file given by ``--gtest_output=xml:FILE``. Raise
     SystemExit(1) if a test fails. ``coverage_packages`` has no effect: run the file under coverage.py instead.
     """
@@ -92,7 +92,7 @@ def create_xml_runner(
 
 
 def begin_results(file: Path) -> None:
-    """Create the results file's folder, delete the file from an earlier run, and print the file's path."""
+    """Create the results file's folder, delete an earlier run's file, and print the file's path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)
     print(f"[ROSUNIT] Outputting test results to {file.absolute()}", flush=True)
@@ -128,7 +128,7 @@ def print_unittest_summary(result: unittest.TestResult) -> None:
 def print_runner_summary(
     runner_results: unittest.TestResult, junit_results: Result, runner_name: str = "ROSUNIT"
 ) -> None:
-    """Print each case in the results that tests have written, then the counts, which include the runner's own errors."""
+    """Print each case in the tests' results, then the counts, including the runner's own errors."""
     print(report(junit_results, runner_name, len(runner_results.errors), names_of(runner_results.failures)))
 
 
@@ -205,7 +205,7 @@ class _Recorder(unittest.TestResult):
         self._note(test, (TestFailure if is_failure else TestError)(kind, text))
 
     def addUnexpectedSuccess(self, test: unittest.TestCase) -> None:
-        # Count the unexpected success as a failure, as wasSuccessful() does.
+        # Like wasSuccessful(), count the unexpected success as a failure.
         super().addUnexpectedSuccess(test)
         text = "the test was expected to fail, and did not"
         self.failures.append((test, text))

@@ -24,7 +24,7 @@ def roswtf_main() -> None:
 
 
 def yaml_results(ctx: WtfContext) -> None:
-    """Print the warnings of a context as YAML."""
+    """Print a context's warnings as YAML."""
     import yaml
 
     names = ctx.as_dictionary()
@@ -33,7 +33,7 @@ def yaml_results(ctx: WtfContext) -> None:
 
 
 def print_results(ctx: WtfContext) -> None:
-    """Print the warnings and errors of a context."""
+    """Print a context's warnings and errors."""
     if not ctx.warnings and not ctx.errors:
         print("No errors or warnings")
     if ctx.warnings:

@@ -49,7 +49,7 @@ class WtfContext:
             setattr(self, name, [] if name in _LISTS else {} if name in ("env", "uri_node_map") else None)
 
     def as_dictionary(self) -> dict[str, Any]:
-        """Return the attributes by name, for a rule's message."""
+        """Return a dict of the attributes, for a rule's message."""
         return {name: getattr(self, name) for name in self.__slots__}
 
     @staticmethod

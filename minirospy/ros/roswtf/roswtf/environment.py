@@ -59,7 +59,7 @@ def invalid_url(url: str | None) -> str | None:
 
 
 def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
-    """Return the error in ROS_ROOT, or None if there is no error."""
+    """Return the error in ROS_ROOT, or None."""
     path = ctx.ros_root if ros_root is None else ros_root
     if os.path.basename(os.path.normpath(path)) in ("ros", "rosbuild"):
         return None
@@ -67,7 +67,7 @@ def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
 
 
 def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
-    """Return the error in a folder to which ROS writes, or None if there is no error."""
+    """Return the error in a folder that ROS writes to, or None."""
     if path is None:
         return None
     if os.path.isfile(path):
@@ -76,17 +76,17 @@ def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
 
 
 def ros_home_check(ctx: Any) -> str | None:
-    """Return the error in ROS_HOME, or None if there is no error."""
+    """Return the error in ROS_HOME, or None."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_HOME"), "ROS_HOME")
 
 
 def ros_log_dir_check(ctx: Any) -> str | None:
-    """Return the error in ROS_LOG_DIR, or None if there is no error."""
+    """Return the error in ROS_LOG_DIR, or None."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_LOG_DIR"), "ROS_LOG_DIR")
 
 
 def ros_test_results_dir_check(ctx: Any) -> str | None:
-    """Return the error in ROS_TEST_RESULTS_DIR, or None if there is no error."""
+    """Return the error in ROS_TEST_RESULTS_DIR, or None."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_TEST_RESULTS_DIR"), "ROS_TEST_RESULTS_DIR")
 
 

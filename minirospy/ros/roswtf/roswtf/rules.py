@@ -1,6 +1,7 @@
 """roswtf.rules: converts the checks' return values to errors and warnings in a context.
 
-A rule is a pair (check, message). A check returns the problem, or a falsy value; a returned list is shown item by item.
+A rule is a pair (check, message). A check returns the problem, or a falsy value. If it returns a list, each item is shown
+separately.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""sensor_msgs: the package's Python modules, in addition to its messages."""
+"""sensor_msgs: the package's Python modules, besides its messages."""

@@ -48,7 +48,7 @@ _DATATYPES: dict[int, tuple[str, int]] = {
     PointField.FLOAT32: ("f", 4),
     PointField.FLOAT64: ("d", 8),
 }
-"""The format character and size in bytes for each datatype of a field."""
+"""The format character and size in bytes, keyed by field datatype."""
 
 _BLOCK = 4_096  # number of points read at a time, so that they fit into the processor's cache
 
@@ -85,8 +85,8 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # Creating the tuples takes most of the time. zip is the fastest way, because it reuses a tuple that the
-        # caller has dropped.
+        # Most of the time goes into creating the tuples. zip is the fastest way: it reuses tuples that the caller has
+        # dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
 
@@ -197,7 +197,7 @@ def _get_struct_fmt(
 
 
 def _columns(fields: Iterable[PointField], field_names: Collection[str] | None) -> list[Column]:
-    """Return the columns for the fields with these names, read one after another as in ROS, even if they overlap."""
+    """Return the columns of the named fields. As in ROS, read them in sequence, even if they overlap."""
     columns, end = [], 0
     for field in sorted(fields, key=lambda each: each.offset):
         if field_names is not None and field.name not in field_names:
@@ -250,7 +250,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
 def _values(
     cloud: PointCloud2, columns: Iterable[Column], offset: int, shape: tuple[int, int], *, skip_nans: bool
 ) -> list[memoryview]:
-    """Return the values in a block of a cloud, as one sequence for each value of a point."""
+    """Return the values in a block of a cloud, with one sequence per value of a point."""
     import numpy as np
 
     order = ">" if cloud.is_bigendian else "<"
@@ -273,7 +273,7 @@ def _values(
 
 
 def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
-    """Return the cloud as an array of shape (height, width, values)."""
+    """Convert the cloud to an array of shape (height, width, values)."""
     import numpy as np
 
     shape = cloud.height, cloud.width
@@ -310,7 +310,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the packed data if all points and fields are floats, or None if ``struct`` has to pack them."""
+    """Return the packed data if all points and fields are floats, or None if ``struct`` must pack them."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

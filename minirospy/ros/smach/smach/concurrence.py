@@ -23,10 +23,10 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 
 
 class Concurrence(Container):
-    """Executes all of its states in parallel, and finishes when all of them have finished.
+    """Executes its states in parallel, and finishes when all of them have finished.
 
-    The container's outcome is the return value of ``outcome_cb``, else the outcome in ``outcome_map`` that most states match,
-    else ``default_outcome``. The outcome is "preempted" if the states finished because the container was preempted.
+    The outcome is the return value of ``outcome_cb``, else the best match in ``outcome_map``, else ``default_outcome``.
+    The outcome is "preempted" if the states finished because the container was preempted.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below, and is notified when the states that are still executing have to finish.
+        # Guards the attributes below. Notified when the states that are still executing must finish.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -129,7 +129,7 @@ class Concurrence(Container):
         return outcome
 
     def _run_states(self) -> None:
-        """Start a thread for each state, wait until the states have to finish, and join the threads."""
+        """Start a thread for each state, wait until the states must finish, and join the threads."""
         self._is_ending = self._user_code_exception = False
         self._child_outcomes = dict.fromkeys(self._states)
         self._threads = {
@@ -187,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the container can finish, after one of its states has finished."""
+        """Return whether the container can finish now that one of its states has finished."""
         others_end = False
         if self._child_termination_cb:
             try:
@@ -256,7 +256,7 @@ class Concurrence(Container):
     # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
-        """Return the states by label."""
+        """Return a dict of the states, keyed by label."""
         return self._states
 
     def __getitem__(self, key: str) -> State:

@@ -1,4 +1,4 @@
-"""The base class of all containers: construction in a ``with`` block, copying of userdata in and out, and callbacks."""
+"""The base class of all containers: construction in a ``with`` block, copying userdata in and out, and callbacks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Container(State):
         raise NotImplementedError
 
     def get_children(self) -> Mapping[str, State]:
-        """Return the states by label."""
+        """Return a dict of the states, keyed by label."""
         raise NotImplementedError
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
@@ -70,7 +70,7 @@ class Container(State):
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions: (outcome, the state's label, the label or container outcome to which the outcome leads)."""
+        """Return the transitions as (outcome, label of the state, target label or container outcome)."""
         raise NotImplementedError
 
     def check_consistency(self) -> None:
@@ -102,15 +102,15 @@ class Container(State):
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
-        """Call the functions that ``register_start_cb`` has registered; log their exceptions."""
+        """Call the functions registered with ``register_start_cb``; log their exceptions."""
         self._call("start", self._start_cbs, lambda: (self.get_initial_states(),))
 
     def call_transition_cbs(self) -> None:
-        """Call the functions that ``register_transition_cb`` has registered; log their exceptions."""
+        """Call the functions registered with ``register_transition_cb``; log their exceptions."""
         self._call("transition", self._transition_cbs, lambda: (self.get_active_states(),))
 
     def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str | None) -> None:
-        """Call the functions that ``register_termination_cb`` has registered; log their exceptions."""
+        """Call the functions registered with ``register_termination_cb``; log their exceptions."""
         self._call("termination", self._termination_cbs, lambda: (terminal_states, outcome))
 
     def _call(
@@ -155,7 +155,7 @@ class Container(State):
             self.close()
 
     def open(self) -> None:
-        """Open the container: until ``close``, ``add`` adds states to it."""
+        """Open the container. Until ``close``, ``add`` adds states to it."""
         Container._construction_lock.acquire()
         Container._construction_stack.append(self)
 

@@ -1,4 +1,4 @@
-"""smach's log functions, which print to stdout until ``set_loggers`` replaces them."""
+"""smach's log functions. They print to stdout until ``set_loggers`` replaces them."""
 
 from __future__ import annotations
 

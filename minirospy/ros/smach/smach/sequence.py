@@ -1,4 +1,4 @@
-"""A state machine whose states run in the order in which they are added."""
+"""A state machine whose states run in the order they were added."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Sequence"]
 
 
 class Sequence(StateMachine):
-    """Executes its states in order while they return the connector outcome."""
+    """Executes its states in order, as long as they return the connector outcome."""
 
     def __init__(
         self,

@@ -102,7 +102,7 @@ class CBState(State):
 
 
 def adopt_interface(state: State, cb: object) -> None:
-    """Add to a state the keys and outcomes that the state's callback declares with ``cb_interface``."""
+    """Add the keys and outcomes that a callback declares with ``cb_interface`` to a state."""
     if has_smach_interface(cb):
         state.register_input_keys(cb.get_registered_input_keys())
         state.register_output_keys(cb.get_registered_output_keys())

@@ -87,7 +87,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state whose ``connector_outcomes`` lead to the next added state; apart from that, work as ``add`` does."""
+        """Like ``add``, but let the state's ``connector_outcomes`` lead to the next added state."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
@@ -231,7 +231,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """Preempt a state before it executes if the machine is preempted and the previous state has not handled that."""
+        """Preempt a state before it executes, if the machine is preempted and the previous state has not handled it."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")
@@ -314,7 +314,7 @@ class StateMachine(Container):
     # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
-        """Return the states by label."""
+        """Return a dict of the states, keyed by label."""
         return self._states
 
     def __getitem__(self, key: str) -> State:
@@ -328,7 +328,7 @@ class StateMachine(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Set the state in which the next execution starts, and add ``userdata`` to the machine's userdata."""
+        """Set the initial state for the next execution, and add ``userdata`` to the machine's userdata."""
         logdebug(f"Setting initial states to {initial_states}")
         if len(initial_states) > 1:
             logwarn(

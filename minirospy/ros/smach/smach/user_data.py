@@ -13,7 +13,7 @@ __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
 
 class UserData:
-    """Values by key, as attributes or items. Accessing a missing key logs an error and raises KeyError."""
+    """Key-value pairs, accessed as attributes or items. Accessing a missing key logs an error and raises KeyError."""
 
     def __init__(self) -> None:
         self._data: dict[str, object] = {}
@@ -33,7 +33,7 @@ class UserData:
         return extracted
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Copy some values from another UserData. ``remapping`` maps keys in that object to keys in this object."""
+        """Copy some values from another UserData. ``remapping`` maps its keys to this object's keys."""
         for key in keys:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 

@@ -1,4 +1,4 @@
-"""The interface that a state's callbacks may declare, and the check for a shutdown."""
+"""The interface that state callbacks may declare, and the shutdown check."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _checks: dict[str, Callable[[], bool]] = {"shutdown": lambda: False}
 
 
 def is_shutdown() -> bool:
-    """Return whether containers have to stop after the current state."""
+    """Return whether containers must stop after the current state."""
     return _checks["shutdown"]()
 
 
 def set_shutdown_check(cb: Callable[[], bool]) -> None:
-    """Set the function that decides whether containers have to stop."""
+    """Set the function that decides whether containers must stop."""
     _checks["shutdown"] = cb
 
 
@@ -26,7 +26,7 @@ def has_smach_interface(obj: object) -> TypeGuard[CBInterface]:
 
 
 class CBInterface:
-    """A callback with outcomes and userdata keys, which are added to the state that uses the callback."""
+    """A callback that declares outcomes and userdata keys. They are added to the state that uses the callback."""
 
     def __init__(
         self,

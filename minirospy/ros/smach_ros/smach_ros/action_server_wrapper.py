@@ -1,4 +1,4 @@
-"""An action server that executes a container for each goal."""
+"""Provides an action server that executes a container for each goal."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ActionServerWrapper:
         expand_goal_slots: bool = False,
         pack_result_slots: bool = False,
     ) -> None:
-        """Set the userdata keys for the goal, which the container reads, and for feedback and result, which the container writes.
+        """Set the userdata keys: the container reads the goal, and writes feedback and result.
 
         ``goal_slots_map`` and ``result_slots_map`` map fields of the goal and of the result to keys. If
         ``expand_goal_slots`` and ``pack_result_slots``, every field is used under its own name.

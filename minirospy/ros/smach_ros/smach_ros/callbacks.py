@@ -1,4 +1,4 @@
-"""The callbacks of service and action states: the userdata keys that they may use, and their return values."""
+"""Wraps the callbacks of service and action states: checks the userdata keys they may use, and their results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Publishes the structure and status of containers, and receives the states in which their next execution starts.
+"""Publishes containers' structure and status, and receives the initial states for their next execution.
 
 Topics: NAME/smach/container_structure, NAME/smach/container_status, NAME/smach/container_init.
 Source: http://wiki.ros.org/smach/Tutorials/Smach%20Viewer.
@@ -34,7 +34,7 @@ STRUCTURE_TOPIC = "/smach/container_structure"
 
 _QUEUE_SIZE = 20
 _CONNECT_SECONDS = 2.0
-"""Seconds for which a command waits for the connection to the server."""
+"""Seconds that a command waits for the connection to the server."""
 _RESEND_SECONDS = 0.3
 
 
@@ -212,7 +212,7 @@ class ContainerProxy:
 
 
 class IntrospectionServer:
-    """Publishes the state of a container and of all containers in it."""
+    """Publishes the state of a container and of all nested containers."""
 
     def __init__(self, server_name: str, state: Container, path: str) -> None:
         """Create the server; ``path`` is the container's name, for example "/SM_ROOT"."""
@@ -231,7 +231,7 @@ class IntrospectionServer:
             proxy.stop()
 
     def construct(self, server_name: str, state: Container, path: str) -> None:
-        """Create the proxies for a container and for the containers in it."""
+        """Create the proxies for a container and all nested containers."""
         proxy = ContainerProxy(server_name, state, path)
         prefix = "" if path == "/" else path
         for label, child in state.get_children().items():

@@ -1,4 +1,4 @@
-"""A state that monitors a topic until a message does not meet a condition."""
+"""A state that monitors a topic until a message fails a condition."""
 
 from __future__ import annotations
 
@@ -79,6 +79,6 @@ class MonitorState(State):
             self._trigger_event.set()
 
     def request_preempt(self) -> None:
-        """Preempt the state, which then finishes without waiting for another message."""
+        """Preempt the state, so that it finishes without waiting for another message."""
         super().request_preempt()
         self._trigger_event.set()

@@ -28,7 +28,7 @@ _SIMPLE = "biufc" + _TEXTS  # numpy dtype kinds for numbers and strings; other k
 
 
 def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
-    """Return the values as a string, and the keys of values that cannot be pickled, which are omitted."""
+    """Pickle the values to a string; return it, and the keys of omitted values, which cannot be pickled."""
     try:
         return _encoded(dict(data)), []
     except Exception:  # noqa: BLE001 - values of the user's: pickle raises what their classes raise
@@ -63,7 +63,7 @@ _set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
 
 
 class _Unpickler(pickle._Unpickler):
-    """The unpickler that is written in Python, instead of C, so that its operations can be checked before they run."""
+    """pickle's Python unpickler, used instead of the one in C so that operations can be checked before they run."""
 
     stack: list[Any]
     read: Callable[[int], bytes]
@@ -123,7 +123,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Wrap a constructor so that it accepts only these argument types, and not, for example, a number, which would be a size."""
+    """Wrap a constructor so that it accepts only these argument types; a number, for example, would be a size."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):
@@ -172,7 +172,7 @@ def _scalar(dtype: Any, data: Any) -> object:
 def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    # Refuse another array, because a state set afterwards could free its memory.
+    # Reject another array, because a state set afterwards could free its memory.
     if type(data) not in (bytes, bytearray):
         raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
     return np.frombuffer(data, dtype, count)

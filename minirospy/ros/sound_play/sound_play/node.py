@@ -1,4 +1,4 @@
-"""soundplay_node.py: plays sounds for requests on the topic robotsound and the action sound_play, with a program on this machine.
+"""soundplay_node.py: plays the sounds requested through the topic robotsound or the action sound_play.
 
 Parameters: ~default_voice, ~loop_rate (100 Hz, for the action's feedback). Source: http://wiki.ros.org/sound_play.
 """
@@ -46,7 +46,7 @@ class SoundError(Exception):
 
 
 class PlayingSound:
-    """A program that plays a sound, once or repeatedly, controlled by a separate thread."""
+    """A program that plays a sound, once or repeatedly. A separate thread controls it."""
 
     def __init__(self, command: Command, repeats: bool) -> None:
         self._command = command
@@ -99,7 +99,7 @@ class PlayingSound:
 
 
 class SoundNode:
-    """The node, with the sounds that are playing, by request."""
+    """The node, and the sounds that are playing, keyed by request."""
 
     def __init__(self, folder: Path) -> None:
         """Create the node. ``folder`` is the folder for the package's sound files."""

@@ -1,4 +1,4 @@
-"""Selects a program on this machine that plays a file or speaks text, and the program's arguments. Pure."""
+"""Selects a program on this machine to play a file or speak text, and its arguments. Pure."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
         f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
     ),
 }
-"""Functions from a file and a volume (0 to 1) to a player's arguments; the keys are the players, in order of preference."""
+"""Functions that take a file and a volume (0 to 1) and return the player's arguments, keyed by player, preferred ones first."""
 
 SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
     "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
@@ -53,7 +53,7 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Functions that return the command that speaks a text; the keys are the programs, in order of preference."""
+"""Functions that return the command to speak a text, keyed by program, preferred ones first."""
 
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 

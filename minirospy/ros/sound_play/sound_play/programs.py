@@ -1,4 +1,4 @@
-"""The programs say.py, play.py and others, each of which sends a request to soundplay_node.
+"""The programs say.py, play.py and others. Each sends a request to soundplay_node.
 
 Source: http://wiki.ros.org/sound_play.
 """
@@ -102,7 +102,7 @@ def shutup() -> int:
 
 
 def is_speaking() -> int:
-    """Publish on ~output/is_speaking whether the action named by ~robotsound is active; return the exit status."""
+    """Publish whether the action named by ~robotsound is active on ~output/is_speaking; return the exit status."""
     rospy.init_node("is_speaking")
     active = {GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
     state = {"is_speaking": False}

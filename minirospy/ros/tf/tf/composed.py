@@ -124,7 +124,7 @@ def compose_matrix(
     translate: ArrayLike | None = None,
     perspective: ArrayLike | None = None,
 ) -> Floats:
-    """Return the matrix composed from the values that :func:`decompose_matrix` returns."""
+    """Compose a matrix from the values that :func:`decompose_matrix` returns."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -203,7 +203,7 @@ def superimposition_matrix(
 
 
 def _horn(first: Floats, second: Floats) -> Floats:
-    """Return the quaternion of the best rotation: the eigenvector for the largest eigenvalue of Horn's matrix."""
+    """Return the best rotation's quaternion: the eigenvector of Horn's matrix with the largest eigenvalue."""
     import numpy
 
     s = numpy.dot(first, second.T)
@@ -256,7 +256,7 @@ class Arcball:
         self._center = numpy.asarray(center, dtype=numpy.float64)[:2]
 
     def setaxes(self, *axes: ArrayLike) -> None:
-        """Set the axes to which rotations can be constrained; without arguments, remove the constraint."""
+        """Set the axes that rotations can be constrained to. Without arguments, remove the constraint."""
         self._axes = [unit_vector(axis) for axis in axes] if axes else None
 
     def setconstrain(self, constrain: bool) -> None:
@@ -305,7 +305,7 @@ class Arcball:
 
 
 def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) -> Floats:
-    """Return the point on the unit sphere under a point in the window; outside the ball, return the closest point on its rim."""
+    """Map a point in the window to the unit sphere. Outside the ball, return the closest point on its rim."""
     import numpy
 
     at, centre = numpy.asarray(point), numpy.asarray(center)

@@ -1,4 +1,4 @@
-"""tf.Transformer, TransformerROS and TransformListener: transforms returned as tuples, and transformed messages.
+"""tf.Transformer, TransformerROS and TransformListener: return transforms as tuples, and transform messages.
 
 Methods that need matrices import numpy on first use. Source: http://wiki.ros.org/tf.
 """
@@ -50,7 +50,7 @@ def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
 
 
 def strip_leading_slash(s: str) -> str:
-    """Return a frame name without a leading slash, because tf2 rejects names with a leading slash."""
+    """Remove a leading slash from a frame name, because tf2 rejects names with one."""
     return s[1:] if s.startswith("/") else s
 
 
@@ -118,7 +118,7 @@ class Transformer:
         timeout: Moment,
         polling_sleep_duration: Moment | None = None,
     ) -> None:
-        """Wait for a transform between two times, as :meth:`waitForTransform` does."""
+        """Like :meth:`waitForTransform`, for a transform between two times."""
         self._check_thread()
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         self._raise_unless(
@@ -130,7 +130,7 @@ class Transformer:
     def chain(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> list[str]:
-        """Return the frames on the path from the source to the fixed frame, and from the fixed frame to the target."""
+        """Return the frames on the path from the source to the target by way of the fixed frame."""
         return self._buffer._chain(target_frame, target_time, source_frame, source_time, fixed_frame)
 
     def clear(self) -> None:
@@ -148,7 +148,7 @@ class Transformer:
         return list(yaml.safe_load(self._buffer.all_frames_as_yaml()) or {})
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> rospy.Time:
-        """Return the newest time at which a lookup succeeds. Raise tf.Exception if there is no such time."""
+        """Return the latest time for which a lookup succeeds. Raise tf.Exception if there is no such time."""
         return self._buffer.get_latest_common_time(
             strip_leading_slash(source_frame), strip_leading_slash(dest_frame)
         )
@@ -165,7 +165,7 @@ class Transformer:
     def lookupTransformFull(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> Tuples:
-        """Return the pose of a frame at one time relative to a frame at another time, as :meth:`lookupTransform` does."""
+        """Like :meth:`lookupTransform`, with a separate time for each frame."""
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         return _tuples(self._buffer.lookup_transform_full(target, target_time, source, source_time, fixed))
 
@@ -236,7 +236,7 @@ class Transformer:
         return tuple(linear.tolist()), tuple(angular.tolist())
 
     def setUsingDedicatedThread(self, value: bool) -> None:
-        """Set whether another thread inserts transforms; only then can a lookup wait for one."""
+        """Set whether another thread inserts transforms. Only then can a lookup wait for one."""
         self._using_dedicated_thread = value
 
     def getTFPrefix(self) -> str:
@@ -260,7 +260,7 @@ class TransformerROS(Transformer):
     def asMatrix(self, target_frame: str, hdr: Header) -> NDArray[numpy.float64]:
         """Return the 4x4 matrix from a header's frame, at its stamp, to ``target_frame``.
 
-        Raise exceptions as lookupTransform does.
+        Raise the same exceptions as lookupTransform.
         """
         return self.fromTranslationRotation(*self.lookupTransform(target_frame, hdr.frame_id, hdr.stamp))
 
@@ -321,7 +321,7 @@ class TransformerROS(Transformer):
     ) -> sensor_msgs.msg.PointCloud:
         """Return a PointCloud (not PointCloud2) transformed into another frame."""
         matrix = self.asMatrix(target_frame, point_cloud.header)
-        # Use 64-bit Points, as real ROS does; they have the same fields as Point32.
+        # Like real ROS, use 64-bit Points, which have the same fields as Point32.
         points: list[Any] = [geometry_msgs.msg.Point(*_moved(matrix, point)) for point in point_cloud.points]
         return sensor_msgs.msg.PointCloud(
             _header(target_frame, point_cloud.header), points, point_cloud.channels

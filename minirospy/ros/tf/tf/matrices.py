@@ -1,4 +1,4 @@
-"""Homogeneous 4x4 matrices for single transformations, and the reverse: a matrix's parameters.
+"""Builds homogeneous 4x4 matrices for single transformations, and recovers the parameters from a matrix.
 
 A plane is given by a point and a normal. Each function imports numpy when it is called.
 """

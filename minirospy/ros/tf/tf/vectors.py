@@ -160,7 +160,7 @@ def quaternion_inverse(quaternion: ArrayLike) -> NDArray[numpy.float64]:
 def quaternion_slerp(
     quat0: ArrayLike, quat1: ArrayLike, fraction: float, spin: float = 0, shortestpath: bool = True
 ) -> NDArray[numpy.float64]:
-    """Return the interpolated rotation at ``fraction`` between ``quat0`` and ``quat1``, with ``spin`` additional half turns."""
+    """Interpolate between ``quat0`` and ``quat1`` at ``fraction``, with ``spin`` additional half turns."""
     import numpy
 
     q0: NDArray[numpy.float64] = unit_vector(numpy.asarray(quat0)[:4])

@@ -48,12 +48,12 @@ def do_transform_frame(frame: PyKDL.Frame, transform: TransformStamped) -> PyKDL
 
 
 def do_transform_twist(twist: PyKDL.Twist, transform: TransformStamped) -> PyKDL.Twist:
-    """Return a twist in the transform's target frame, with the transform's header."""
+    """Return the twist in the transform's target frame, with the transform's header."""
     return _moved(twist, transform)
 
 
 def do_transform_wrench(wrench: PyKDL.Wrench, transform: TransformStamped) -> PyKDL.Wrench:
-    """Return a wrench in the transform's target frame, with the transform's header."""
+    """Return the wrench in the transform's target frame, with the transform's header."""
     return _moved(wrench, transform)
 
 

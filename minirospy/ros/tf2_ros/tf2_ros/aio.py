@@ -109,7 +109,7 @@ class Buffer:
     ) -> TransformStamped:
         """Return the pose of ``source`` at ``source_time``, relative to ``target`` at ``target_time``.
 
-        The frame ``fixed`` is assumed not to move between the two times. Wait and raise exceptions as :meth:`lookup` does.
+        The frame ``fixed`` is assumed not to move between the two times. Wait and raise exceptions like :meth:`lookup`.
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         found = await self._wait_for(

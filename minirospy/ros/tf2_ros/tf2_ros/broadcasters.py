@@ -39,14 +39,14 @@ class StaticTransformBroadcaster:
 
     _lock = threading.Lock()
     _sent: WeakKeyDictionary[object, dict[str, TransformStamped]] = WeakKeyDictionary()
-    """The transforms by child frame, per topic handle; all broadcasters of a node share them."""
+    """The transforms keyed by child frame, per topic handle. A node's broadcasters share them."""
 
     def __init__(self) -> None:
         self.pub_tf = rospy.Publisher("/tf_static", TFMessage, queue_size=100, latch=True)
 
     @property
     def net_message(self) -> TFMessage:
-        """A message that contains all transforms sent so far."""
+        """Return a message that contains all transforms sent so far."""
         return TFMessage(list(self._sent.get(self.pub_tf.impl, {}).values()))
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:

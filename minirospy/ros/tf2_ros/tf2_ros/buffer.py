@@ -64,8 +64,7 @@ class Buffer(BufferCore, BufferInterface):
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` is assumed not to move between the two times. Wait and raise exceptions as
-        :meth:`lookup_transform` does.
+        ``fixed_frame`` is assumed not to move between the two times. Wait and raise exceptions like :meth:`lookup_transform`.
         """
         if nanoseconds(timeout) > 0:
             self.can_transform_full(
@@ -87,7 +86,7 @@ class Buffer(BufferCore, BufferInterface):
 
         If ``return_debug_tuple``, return a tuple of this result and the reason.
 
-        Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
+        Raise ROSInterruptException and ROSTimeMovedBackwardsException like :meth:`lookup_transform`.
         """
 
         def possible() -> tuple[int, str]:

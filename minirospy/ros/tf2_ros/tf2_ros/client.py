@@ -54,7 +54,7 @@ class BufferClient(BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``, waiting up to ``timeout`` for the transform.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``. Wait up to ``timeout`` for the transform.
 
         Raise the exception that the server reports, such as LookupException, or TimeoutException if the server does not
         respond.
@@ -78,7 +78,7 @@ class BufferClient(BufferInterface):
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        Raise exceptions as :meth:`lookup_transform` does.
+        Raise the same exceptions as :meth:`lookup_transform`.
         """
         goal = LookupTransformGoal(
             target_frame=target_frame,

@@ -1,4 +1,4 @@
-"""tf2_py: the thread-safe buffer, which reads and returns messages. Source: http://wiki.ros.org/tf2_py."""
+"""tf2_py: the thread-safe buffer. It reads and returns messages. Source: http://wiki.ros.org/tf2_py."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class BufferCore:
     # --- inserting transforms
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
-        """Insert a transform that was received from the node ``authority``."""
+        """Insert a transform from the node ``authority``."""
         self._insert(transform, authority, False)
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
@@ -88,7 +88,8 @@ class BufferCore:
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` is assumed not to move between the two times. Raise exceptions as :meth:`lookup_transform_core` does.
+        ``fixed_frame`` is assumed not to move between the two times. Raise the same exceptions as
+        :meth:`lookup_transform_core`.
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         _check_names(target_frame, source_frame, fixed_frame)
@@ -115,7 +116,7 @@ class BufferCore:
         )
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
-        """Return the newest time at which a lookup succeeds; zero if all transforms between the frames are static.
+        """Return the latest time for which a lookup succeeds; zero if all transforms between the frames are static.
 
         Raise LookupException if a frame is unknown, InvalidArgumentException if a frame name is invalid, TransformException if
         the frames are not connected.
@@ -137,7 +138,7 @@ class BufferCore:
             return self._tree.frames_as_string()
 
     def _allFramesAsDot(self, time: Moment = _NO_TIME) -> str:
-        """Return the tree of frames as a graphviz graph, with the age of each frame if a time is given."""
+        """Return the tree of frames as a graphviz graph, with each frame's age if a time is given."""
         stamp = nanoseconds(time)
         with self._lock:
             return frames_as_dot(self._tree, stamp)

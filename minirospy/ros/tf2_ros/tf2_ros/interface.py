@@ -1,4 +1,4 @@
-"""The base class of the buffer and the buffer client, which transforms whole messages, and converts between types.
+"""The base class of the buffer and the buffer client. Transforms whole messages, and converts between types.
 
 Source: http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2/Tutorials/Transforming%20your%20own%20datatypes.
 """
@@ -50,7 +50,7 @@ class NotImplementedException(Exception):
 
 
 class _Registry:
-    """A process-wide table of functions by type, or by pairs of types."""
+    """A process-wide table of functions, keyed by type or by a pair of types."""
 
     def __init__(self) -> None:
         self.functions: dict[object, _Function] = {}
@@ -113,7 +113,7 @@ class ConvertRegistration:
 
 
 def convert(a: object, b_type: type[_T]) -> _T:
-    """Return ``a`` as an object of the type: converted directly, copied, or through a message.
+    """Convert ``a`` to a type: directly, by copying it, or through a message.
 
     Raise TypeException if no conversion is registered.
     """
@@ -135,7 +135,7 @@ def Stamped(obj: _T, stamp: times.Time, frame_id: str) -> _T:
 
 
 class BufferInterface:
-    """The lookup methods, which subclasses implement, and the methods that use them."""
+    """Declares the lookup methods, for subclasses to implement, and implements the methods that use them."""
 
     def __init__(self) -> None:
         self.registration = TransformRegistration()
@@ -159,7 +159,7 @@ class BufferInterface:
         timeout: Moment = NO_WAIT,
         new_type: type | None = None,
     ) -> object:
-        """Return a stamped object in ``target_frame``, at its own stamp, converted to ``new_type`` if given.
+        """Transform a stamped object to ``target_frame``, at its own stamp. Convert it to ``new_type`` if given.
 
         Raise TypeException if a type is not registered, and the exceptions that :meth:`lookup_transform` raises.
         """
@@ -178,9 +178,9 @@ class BufferInterface:
         timeout: Moment = NO_WAIT,
         new_type: type | None = None,
     ) -> Any:
-        """Return a stamped object in ``target_frame`` at ``target_time``.
+        """Transform a stamped object to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` is assumed not to move between the two times. Raise exceptions as :meth:`transform` does.
+        ``fixed_frame`` is assumed not to move between the two times. Raise the same exceptions as :meth:`transform`.
         """
         do_transform = self.registration.get(type(object_stamped))
         header = object_stamped.header
@@ -193,7 +193,7 @@ class BufferInterface:
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return a transform; subclasses implement this method."""
+        """Look up a transform; subclasses implement this method."""
         raise NotImplementedException
 
     def lookup_transform_full(
@@ -205,13 +205,13 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> TransformStamped:
-        """Return a transform between two times; subclasses implement this method."""
+        """Look up a transform between two times; subclasses implement this method."""
         raise NotImplementedException
 
     def can_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> object:
-        """Return whether there is a transform; subclasses implement this method."""
+        """Return whether a transform is available; subclasses implement this method."""
         raise NotImplementedException
 
     def can_transform_full(
@@ -223,5 +223,5 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> object:
-        """Return whether there is a transform between two times; subclasses implement this method."""
+        """Return whether a transform between two times is available; subclasses implement this method."""
         raise NotImplementedException

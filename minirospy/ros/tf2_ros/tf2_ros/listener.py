@@ -66,8 +66,7 @@ class TransformListener:
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time while holding the lock; otherwise, a thread that is overtaken by another thread would report a
-        # jump.
+        # Read the time while holding the lock; otherwise, a thread overtaken by another would report a jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now
@@ -77,7 +76,7 @@ class TransformListener:
 
     @property
     def last_update(self) -> rospy.Time:
-        """The time of the last message."""
+        """Return the time of the last message."""
         return rospy.Time.from_sec(self._last)
 
     def callback(self, data: LazyTFMessage) -> None:
@@ -108,7 +107,7 @@ class TransformListener:
 
 
 def _takes_bytes(buffer: TransformSink) -> bool:
-    """Return whether a buffer accepts undecoded messages. It does if it is a BufferCore and does not override set_transform."""
+    """Return whether a buffer accepts undecoded messages: it is a BufferCore that does not override set_transform."""
     kind = type(buffer)
     return (
         issubclass(kind, BufferCore)

@@ -1,4 +1,4 @@
-"""Converts between messages and the buffer's numbers: TransformStamped, times, and /tf messages that stay undecoded."""
+"""Converts TransformStamped messages, times and undecoded /tf messages to and from the buffer's numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Moment(Protocol):
 def nanoseconds(time: Moment) -> int:
     """Return a time in nanoseconds. The result is exact if the time has ``secs`` and ``nsecs``.
 
-    Raise TypeError if the argument is not a time, as tf2_py does.
+    Like tf2_py, raise TypeError if the argument is not a time.
     """
     try:
         return time.secs * _BILLION + time.nsecs  # type: ignore[attr-defined, no-any-return]
@@ -40,7 +40,7 @@ def nanoseconds(time: Moment) -> int:
 
 
 def transform_stamped(target: str, source: str, found: StampedTransform) -> TransformStamped:
-    """Return a lookup's result as a message."""
+    """Convert a lookup's result to a message."""
     # Create the message without constructors, which would take longer than the lookup.
     message: TransformStamped = _new(TransformStamped)
     message.header = header = _new(Header)
@@ -58,7 +58,7 @@ def transform_stamped(target: str, source: str, found: StampedTransform) -> Tran
 
 
 class LazyTFMessage(TFMessage):
-    """A TFMessage that stores its bytes (``raw``) for the buffer, and is decoded only when ``transforms`` is read."""
+    """A TFMessage that stores its bytes (``raw``) for the buffer. Decoded only when ``transforms`` is read."""
 
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types

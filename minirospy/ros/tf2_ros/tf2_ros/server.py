@@ -35,7 +35,7 @@ _CODES: list[tuple[type[TransformException], int]] = [
 
 
 class BufferServer:
-    """Performs lookups in ``buffer`` for goals of the action ``ns`` (tf2_msgs/LookupTransform), each as soon as it is possible.
+    """Serves the action ``ns`` (tf2_msgs/LookupTransform): looks up each goal in ``buffer`` as soon as possible.
 
     A goal stays pending until an insertion makes its lookup possible, or its timeout expires and the result contains the
     error. ``check_period`` (a Duration) is the interval at which simulated time is checked. Real ROS has this class only

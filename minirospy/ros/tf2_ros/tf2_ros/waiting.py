@@ -1,4 +1,4 @@
-"""Waits for a transform, until an insertion provides it, a shutdown, the timeout, or a time jump."""
+"""Waits until an insertion provides a transform, or until a shutdown, the timeout, or a time jump."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)  # maximum time by which the wall clock may be set back without aborting a wait
-# interval in seconds between checks in simulated time, because a change of that time does not wake a blocked thread
+_JUMP = times.Duration(3)  # how far the wall clock may be set back without aborting a wait
+# seconds between checks in simulated time; a change of that time does not wake a blocked thread
 _SIMULATED_SLICE = 0.01
 
 
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
-    """Wait until ``is_possible()``, called after each insertion, returns a truthy value, or until ``timeout`` in ROS time.
+    """Wait until ``is_possible()`` is truthy, or for ``timeout`` in ROS time. Check after each insertion.
 
     ``step`` is the fraction of the timeout that the real implementation sleeps between two checks. Raise
     ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep, ROSInterruptException

@@ -137,7 +137,7 @@ def _repeat(rate: float, echo: Callable[[], bool]) -> None:
 
 
 def _pose(found: TransformStamped, precision: int, angles: Callable[[Quaternion], Vector]) -> str:
-    """Return the lines that describe a pose, as a string without a trailing line break."""
+    """Format a pose as lines, without a trailing line break."""
     place, turn = found.transform.translation, found.transform.rotation
     rpy = angles((turn.x, turn.y, turn.z, turn.w))
     rows = (

@@ -1,6 +1,6 @@
 """tf_monitor: measures the delay of each frame's transforms, and the rate at which each node sends them.
 
-Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by name, as the real program did before tf2.
+Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by name, as in the real program before tf2.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000  # number of delays over which to average, and of messages from which to compute a rate
+_KEPT = 1000  # number of delays to average, and of messages to compute a rate from
 _STEP = 0.01
-_STEPS = 20  # number of times per report that the delay between two frames is measured
+_STEPS = 20  # number of measurements per report of the delay between two frames
 _SMOOTHING = 0.01
 _MIN_PERIOD = 1e-8
 
@@ -46,7 +46,7 @@ class Delays:
         self._node_times: dict[str, deque[float]] = {}
 
     def add(self, sender: str, frames: Sequence[tuple[str, float]], now: float, *, is_static: bool) -> None:
-        """Record a message, given as its child frames with their stamps. Static transforms count as having no delay."""
+        """Record a message: its child frames with their stamps. Static transforms count as having no delay."""
         sender = sender + "(static)" * is_static
         late = [(child, 0.0 if is_static else now - stamp) for child, stamp in frames]
         for child, delay in late:

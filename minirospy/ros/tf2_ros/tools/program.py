@@ -1,4 +1,4 @@
-"""The code that the programs share: arguments, errors, and a buffer with a listener."""
+"""Code shared by the programs: arguments, errors, and a buffer with a listener."""
 
 from __future__ import annotations
 

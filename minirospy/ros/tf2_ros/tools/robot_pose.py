@@ -1,4 +1,4 @@
-"""robot_pose_publisher: publish the robot's pose on the map, as computed from /tf, on the topic robot_pose.
+"""robot_pose_publisher: publish the robot's pose on the map, computed from /tf, on the topic robot_pose.
 
 Parameters: ~map_frame (/map), ~base_frame (/base_link), ~publish_frequency (10 Hz), ~is_stamped (false: Pose, true:
 PoseStamped). Source: http://wiki.ros.org/robot_pose_publisher.

@@ -47,7 +47,7 @@ class FrameRecord(NamedTuple):
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf's view_frames, for the received transforms or, with --node, for a node's buffer; return the exit status."""
+    """Run tf's view_frames, for the received transforms or (--node) a node's buffer; return the exit status."""
     return run_program(_run_tf, words)
 
 
@@ -120,7 +120,7 @@ def _listen() -> None:
 
 
 def _graph_of_node(name: str) -> str:
-    """Return the graph that a tf or tf2 node provides through a service, after waiting for it.
+    """Wait for the service of a tf or tf2 node; return the graph that it provides.
 
     Raise ToolError if the call fails.
     """
@@ -158,7 +158,7 @@ def read_records(listing: str) -> list[FrameRecord]:
 
 
 def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
-    """Return the frames as a graphviz graph, in the format of tf2_tools' view_frames.py."""
+    """Format the frames as a graphviz graph, like tf2_tools' view_frames.py."""
     if not records:
         return 'digraph G { "No tf data received" }'
 

@@ -21,7 +21,7 @@ class _Verb(NamedTuple):
     service: type
     takes_topic: bool
     text: Callable[[str, str, str], str]
-    """Returns the line to print before the call, given the program (mux or demux), the node's name and the topic."""
+    """Takes the program (mux or demux), the node's name and the topic; returns the line to print before the call."""
 
 
 _VERBS = {
@@ -30,7 +30,7 @@ _VERBS = {
     "delete": _Verb(MuxDelete, True, lambda kind, name, topic: f'Deleting "{topic}" from {kind} "{name}"'),
     "list": _Verb(MuxList, False, lambda kind, name, topic: f'Listing topics from {kind} "{name}"'),
 }
-"""The services by verb. demux's services have the same fields as mux's, and therefore the same md5sums."""
+"""The services, keyed by verb. demux's services have the same fields, and therefore the same md5sums, as mux's."""
 
 
 def main(program: str) -> int:

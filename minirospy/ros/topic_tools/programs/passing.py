@@ -1,4 +1,4 @@
-"""The code that the programs share. Messages of any type are received and sent as bytes."""
+"""Code shared by the programs. Receives and sends messages of any type as bytes."""
 
 from __future__ import annotations
 
@@ -156,8 +156,8 @@ def run_node(
 ) -> int:
     """Run a program until its node shuts down; return its exit status.
 
-    ``name`` and ``prepare`` are called with the command-line arguments; if either raises ValueError, the error is printed with
-    the usage. ``prepare`` checks the arguments, which needs no master, and returns the function that is called once the node
+    ``name`` and ``prepare`` are called with the command-line arguments; if either raises ValueError, the error is printed
+    with the usage. ``prepare`` checks the arguments without a master, and returns the function to call once the node
     runs. ``counts``: the allowed numbers of arguments.
     """
     words = rospy.myargv()[1:]

@@ -46,8 +46,7 @@ class Relay:
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
-        # The lock covers a subscriber that arrives while the input is being closed, so that the input is reopened for
-        # it.
+        # Locks opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
         self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)

@@ -41,9 +41,7 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""A function that receives the time in seconds and a message's size in bytes, and returns whether to forward the message. If
-so, it counts the message.
-"""
+"""Takes the time in seconds and a message's size in bytes. Returns whether to forward the message and, if so, counts it."""
 
 
 def main() -> int:
@@ -150,7 +148,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Forwards the messages that a function selects, unchanged."""
+    """Forwards the messages that a function selects, without changing them."""
 
     def __init__(
         self,
@@ -165,8 +163,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # The lock covers a subscriber that arrives while the input is being closed, so that the input is reopened for
-        # it.
+        # Locks opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
         self._lock = threading.Lock()
 
         self._output = Output(

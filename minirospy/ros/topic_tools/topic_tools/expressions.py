@@ -77,7 +77,7 @@ def _run(
     parser: argparse.ArgumentParser,
     prepare: Callable[[argparse.Namespace], _Start],
 ) -> int:
-    """Check the arguments, which needs no master; then run the node until it shuts down. Return the exit status."""
+    """Check the arguments without a master, then run the node until it shuts down. Return the exit status."""
     try:
         start = prepare(parser.parse_args(rospy.myargv()[1:]))
         rospy.init_node(name, anonymous=True)
@@ -167,7 +167,7 @@ def _compiled(expression: str) -> CodeType:
 
 
 def _evaluated(template: dict[str, object], value: object) -> dict[str, object]:
-    """Return the fields with their strings evaluated; leave a string that is not a valid expression unchanged."""
+    """Evaluate the strings in a template's fields. Leave a string that is not a valid expression unchanged."""
     found: dict[str, object] = {}
     for name, each in template.items():
         if isinstance(each, dict):

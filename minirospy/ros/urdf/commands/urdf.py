@@ -1,4 +1,4 @@
-"""`check_urdf`, and `urdf_to_graphviz` with its old name `urdf_to_graphiz`: print or draw a robot description's tree.
+"""`check_urdf` and `urdf_to_graphviz` (old name: `urdf_to_graphiz`): print or draw a robot description's tree.
 
 The output is the same as that of liburdfdom-tools, except that line numbers refer to the description instead of the tools'
 source code. The exit status is 255 if the description cannot be read, as in liburdfdom-tools. Source:
@@ -45,7 +45,7 @@ def urdf_to_graphviz(argv: Sequence[str] | None = None) -> int:
 
 
 def urdf_to_graphiz(argv: Sequence[str] | None = None) -> int:
-    """Run urdf_to_graphiz, which prints a warning about its old name."""
+    """Run urdf_to_graphviz under its old name, with a warning."""
     return GRAPHIZ.main(argv)
 
 
@@ -89,7 +89,7 @@ def _graph(file: str | None, output: str | None) -> None:
         print(_NO_OUTPUT + _USAGE, file=sys.stderr)
     robot = _read(file)
     name = robot.name if output is None else output
-    # The file may be from an untrusted source, so the robot's name must not determine where files are written.
+    # The file may be untrusted, so the robot's name must not determine where files are written.
     if output is None and (not name or name != Path(name).name or name.startswith(".") or "\\" in name):
         raise UsageError(f"the robot's name [{name}] is not a file's name: name the OUTPUT")
 

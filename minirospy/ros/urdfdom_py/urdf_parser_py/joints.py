@@ -39,7 +39,7 @@ class JointDynamics(Object):
 
 
 class JointCalibration(Object):
-    """The positions at which a joint's reference sensor changes its signal."""
+    """The positions where a joint's reference sensor changes its signal."""
 
     TAG = "calibration"
     FIELDS = (Attribute("rising", _NUMBER, False, 0), Attribute("falling", _NUMBER, False, 0))
@@ -116,7 +116,7 @@ class SafetyController(Object):
 
 
 class Joint(Object):
-    """A joint between two links, which are given by name."""
+    """A joint between two links, given by name."""
 
     TYPES = ["unknown", "revolute", "continuous", "prismatic", "floating", "planar", "fixed"]
     TAG = "joint"
@@ -168,7 +168,7 @@ class Joint(Object):
 
     @property
     def joint_type(self) -> str | None:
-        """The former name of ``type``."""
+        """Return ``type``; this is its former name."""
         return self.type
 
     @joint_type.setter

@@ -48,7 +48,7 @@ class Pose(Object):
 
     @property
     def rotation(self) -> Sequence[float] | None:
-        """The former name of ``rpy``."""
+        """Return ``rpy``; this is its former name."""
         return self.rpy
 
     @rotation.setter
@@ -57,7 +57,7 @@ class Pose(Object):
 
     @property
     def position(self) -> Sequence[float] | None:
-        """The former name of ``xyz``."""
+        """Return ``xyz``; this is its former name."""
         return self.xyz
 
     @position.setter
@@ -297,7 +297,7 @@ class Link(Object):
 
     @property
     def visual(self) -> Visual | None:
-        """The first visible shape."""
+        """Return the first visible shape."""
         return self.visuals[0] if self.visuals else None
 
     @visual.setter
@@ -309,7 +309,7 @@ class Link(Object):
 
     @property
     def collision(self) -> Collision | None:
-        """The first shape for collision checking."""
+        """Return the first shape for collision checking."""
         return self.collisions[0] if self.collisions else None
 
     @collision.setter

@@ -80,7 +80,7 @@ class _Transmissions(Codec[Object]):
 
 
 class Robot(Object):
-    """A robot with its parts as lists, and by name in ``joint_map`` and ``link_map``.
+    """A robot. Its parts are in lists, and keyed by name in ``joint_map`` and ``link_map``.
 
     ``parent_map`` maps a link to (joint, parent link), ``child_map`` a link to [(joint, child link), ...].
     """

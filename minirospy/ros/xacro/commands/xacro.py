@@ -1,8 +1,8 @@
 """`xacro`: expands the macros in robot descriptions with the Python package xacro.
 
-`$(find PACKAGE)` finds minirospy's packages. The options, messages and exit statuses (2 if a file cannot be processed) are
-those of the Python package. Options that enabled now-standard behaviour in earlier releases are accepted without effect.
-Source: http://wiki.ros.org/xacro.
+`$(find PACKAGE)` finds minirospy's packages. The options, messages and exit statuses (2 if a file cannot be processed)
+are those of the Python package. Options for behaviour that is now standard are accepted without effect. Source:
+http://wiki.ros.org/xacro.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from minirospy.command.command import run
 __all__ = ["main"]
 
 _ALWAYS = {"--xacro-ns", "--check-order"}
-"""Options that select behaviour that is always enabled since ROS Melodic."""
+"""Options for behaviour that has always been enabled since ROS Melodic."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -48,7 +48,7 @@ def _xacro(words: Sequence[str]) -> int:
     evaluate = xacro.eval_extension
 
     def eval_extension(text: str) -> object:
-        """Evaluate `$(...)`. If a package is not found, shorten the error, which xacro would print twice, with a class name."""
+        """Evaluate `$(...)`. Shorten the error for a missing package, which xacro would print twice, with a class name."""
         try:
             return evaluate(text)
         except xacro.XacroException as error:

@@ -17,12 +17,12 @@ _CALLER_ID = "/rosgraph"
 
 
 def topic_node(topic: str) -> str:
-    """Return the name of a topic's node in the graph, which is a space followed by the topic."""
+    """Return the name of a topic's node in the graph: a space followed by the topic."""
     return " " + topic
 
 
 def node_topic(node: str) -> str:
-    """Return the topic from a name that :func:`topic_node` returned."""
+    """Return the topic for a name from :func:`topic_node`."""
     return node[1:]
 
 

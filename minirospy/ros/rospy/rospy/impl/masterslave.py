@@ -97,7 +97,7 @@ class ROSHandler(XmlRpcHandler):
         self.done = True
 
     def _call(self, method: str, args: tuple[object, ...], **known: object) -> Answer:
-        """Return the response from the node's own API; ``value``, if given, replaces the response's value."""
+        """Return the response of the node's own API. ``value``, if given, replaces the value in the response."""
         session = current_session()
         if session.node is None:
             return -1, "the node has not been initialized", known.get("value", 0)

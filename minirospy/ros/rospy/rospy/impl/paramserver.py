@@ -1,4 +1,4 @@
-"""The names of rospy.impl.paramserver."""
+"""Provides the names in ROS's module rospy.impl.paramserver."""
 
 from minirospy.client.params import KeptParameters as ParamServerCache
 from minirospy.client.params import get_param_server_cache

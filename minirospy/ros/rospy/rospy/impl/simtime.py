@@ -7,7 +7,7 @@ __all__ = ["init_simtime"]
 
 
 def init_simtime() -> bool:
-    """Use the time on /clock if the parameter /use_sim_time is true, as init_node does; return whether the master responded."""
+    """Use the time on /clock if /use_sim_time is true, like init_node. Return whether the master responded."""
     try:
         start_clock()
     except ROSInitException:

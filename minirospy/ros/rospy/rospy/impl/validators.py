@@ -1,4 +1,4 @@
-"""The names of rospy.impl.validators."""
+"""Provides the names in ROS's module rospy.impl.validators."""
 
 from minirospy.ros.rospy.rospy.names import ParameterInvalid
 

@@ -1,4 +1,4 @@
-"""Objects that are converted to and from XML, as described by tables of their attributes, elements, and lists of elements.
+"""Objects that are converted to and from XML, according to tables of their attributes and child elements.
 
 Error messages and their paths (``/robot[@name='r']/link[1]``) are those of urdf_parser_py.
 """
@@ -150,7 +150,7 @@ class Raw(Codec[ET.Element]):
 
 
 class ObjectOf(Codec["Object"]):
-    """A codec for an element that is represented by an object of a given class."""
+    """A codec for an element represented by an object of a given class."""
 
     def __init__(self, kind: type[Object]) -> None:
         self.kind = kind
@@ -228,7 +228,7 @@ class Object:
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML string into this object and return the object. Raise exceptions as from_xml_string does."""
+        """Read an XML string into this object and return the object. Raise the same exceptions as from_xml_string."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
@@ -305,13 +305,13 @@ class Object:
     # --- writing XML
 
     def to_xml(self) -> ET.Element:
-        """Return the object as an element."""
+        """Convert the object to an element."""
         node = ET.Element(self.TAG)
         self.write_xml(node)
         return node
 
     def to_xml_string(self, addHeader: bool = True) -> str:
-        """Return the object as an indented XML string."""
+        """Convert the object to an indented XML string."""
         return xml_string(self.to_xml(), addHeader)
 
     def write_xml(self, node: ET.Element) -> None:
@@ -375,7 +375,7 @@ class Object:
     # --- human-readable output
 
     def to_yaml(self) -> object:
-        """Return the object as data that YAML can represent."""
+        """Convert the object to YAML-compatible data."""
         names = [f"{each.name}s" if isinstance(each, Many) else each.name for each in self.FIELDS]
         return to_yaml({name: getattr(self, name) for name in names})
 
@@ -386,7 +386,7 @@ class Object:
 
 
 def to_yaml(obj: object) -> object:
-    """Return a value as data that YAML can represent."""
+    """Convert a value to YAML-compatible data."""
     if isinstance(obj, bool | int | float):
         return obj
     if isinstance(obj, Object):
