@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 import pytest
 import roslaunch
 import roslaunch.pmon
 
+from minirospy.base.environment import Environment
+from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
+from minirospy.ros.roslaunch.roslaunch.pmon import ApiLauncher
 from tests.waiting import wait_until
 
 
@@ -158,31 +162,39 @@ def test_a_listener_may_wait_for_the_shutdown() -> None:
     assert (monitor.done, other.alive) == (True, False)
 
 
-def test_the_shutdown_ends_although_terminating_the_nodes_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> None:
-        raise OSError("a fault")
+class NodeLauncher(ApiLauncher):
+    """A launcher without nodes; ``fault`` is raised by close()."""
 
-    monitor = roslaunch.pmon.ProcessMonitor()
-    monkeypatch.setattr(monitor._launcher, "close", fail)
+    def __init__(self, fault: Exception | None = None) -> None:
+        super().__init__(LaunchSpec(), Environment.read())
+        self.fault = fault
+        self.is_closed = False
+
+    def close(self) -> None:
+        super().close()
+        self.is_closed = True
+        if self.fault:
+            raise self.fault
+
+
+def test_the_shutdown_ends_although_terminating_the_nodes_fails() -> None:
+    monitor = roslaunch.pmon.ProcessMonitor(launcher=NodeLauncher(OSError("a fault")))
     with pytest.raises(OSError, match="a fault"):
         monitor.close()
     assert monitor.done
 
 
-def test_the_nodes_are_terminated_although_terminating_an_own_process_fails(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_nodes_are_terminated_although_terminating_an_own_process_fails() -> None:
     class Exiting(Own):
         def stop(self, errors: list[str] | None = None) -> None:
             raise SystemExit(3)
 
-    closed: list[bool] = []
-    monitor = roslaunch.pmon.ProcessMonitor()
-    monkeypatch.setattr(monitor._launcher, "close", lambda: closed.append(True))
+    launcher = NodeLauncher()
+    monitor = roslaunch.pmon.ProcessMonitor(launcher=launcher)
     monitor.register(Exiting("a"))
     with pytest.raises(SystemExit):
         monitor.close()
-    assert (closed, monitor.done) == ([True], True)
+    assert (launcher.is_closed, monitor.done) == (True, True)
 
 
 def test_the_exited_processes_can_be_listed_while_another_node_is_started() -> None:
@@ -193,9 +205,12 @@ def test_the_exited_processes_can_be_listed_while_another_node_is_started() -> N
 
         @property
         def started(self) -> bool:
-            monitor._launcher.known["b"] = Launched()
+            known["b"] = Launched()
             return True
 
-    monitor = roslaunch.pmon.ProcessMonitor()
-    monitor._launcher.known["a"] = Launched()
+    launcher = NodeLauncher()
+    known: dict[str, Any] = launcher.known  # type: ignore[assignment]
+    known["a"] = Launched()
+    monitor = roslaunch.pmon.ProcessMonitor(launcher=launcher)
     assert [each.name for each in monitor.dead_list] == ["a"]
+    monitor.close()
