@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """A ROS 1 type cannot be converted to a ROS 2 type, for the reason in the message."""
+    """Raised if a ROS 1 type cannot be converted to a ROS 2 type. The message states the reason."""
 
 
 _WIDTHS = {

@@ -34,7 +34,7 @@ _BRIDGE = CvBridge()
 
 
 class CodecError(ValueError):
-    """The transport does not support the image, or the bytes are not an image."""
+    """Raised if the transport does not support the image, or the bytes are not an image."""
 
 
 @dataclass(frozen=True)

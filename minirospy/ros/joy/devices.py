@@ -41,7 +41,7 @@ _POLL_SECONDS = 0.002
 
 
 class DeviceError(MinirospyError):
-    """The joystick cannot be opened, or was disconnected; the message is one line with the reason."""
+    """Raised if the joystick cannot be opened, or was disconnected. The message is one line with the reason."""
 
 
 class Device(Protocol):

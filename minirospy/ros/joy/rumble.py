@@ -31,7 +31,7 @@ _INPUT = Path("/sys/class/input")
 
 
 class RumbleError(MinirospyError):
-    """The joystick's motors cannot be used; the message is one line with the reason."""
+    """Raised if the joystick's motors cannot be used. The message is one line with the reason."""
 
 
 def event_device(joystick: str, folder: Path = _INPUT) -> str:

@@ -40,7 +40,7 @@ FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205  # gray levels in map_saver
 
 
 class MapError(MinirospyError):
-    """A map's YAML file or a grid is invalid; the message is one line with the reason."""
+    """Raised if a map's YAML file or a grid is invalid. The message is one line with the reason."""
 
 
 class Mode(Enum):

@@ -31,7 +31,7 @@ _REVERSED_FORMATS = ("BMP", "TGA")
 
 
 class ImageError(MinirospyError):
-    """The image cannot be read; the message is one line with the reason."""
+    """Raised if the image cannot be read. The message is one line with the reason."""
 
 
 class Pixels(NamedTuple):

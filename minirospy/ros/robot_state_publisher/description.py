@@ -13,7 +13,7 @@ NAME = "robot_description"
 
 
 class DescriptionError(MinirospyError):
-    """The parameter contains no valid robot; ``lines`` are the messages that ROS's parser prints."""
+    """Raised if the parameter contains no valid robot. ``lines`` are the messages that ROS's parser prints."""
 
     def __init__(self, *lines: str) -> None:
         super().__init__(*lines)

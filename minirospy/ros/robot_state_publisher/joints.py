@@ -28,7 +28,7 @@ _SETTLED = ("fixed", "floating", "planar")
 
 
 class JointError(MinirospyError):
-    """The joints cannot be determined. The message is one line that names the joint and the reason."""
+    """Raised if the joints cannot be determined. The message is one line that names the joint and the reason."""
 
 
 @dataclass

@@ -6,8 +6,8 @@ __all__ = ["ROSTopicException", "ROSTopicIOException"]
 
 
 class ROSTopicException(Exception):
-    """A request about a topic failed."""
+    """Raised if a request about a topic failed."""
 
 
 class ROSTopicIOException(ROSTopicException):
-    """The master does not respond."""
+    """Raised if the master does not respond."""

@@ -35,7 +35,7 @@ SIZE = _float32((PIXELS - 1) / _PIXELS_PER_METRE)
 
 
 class WorldError(MinirospyError):
-    """The world rejects a request."""
+    """Raised if the world rejects a request."""
 
 
 class Velocity(NamedTuple):

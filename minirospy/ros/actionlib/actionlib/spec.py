@@ -33,7 +33,7 @@ SERVER_SECONDS = 5.0
 
 
 class ActionException(MinirospyError):
-    """The class is not an action class."""
+    """Raised if the class is not an action class."""
 
 
 class ActionTypes(NamedTuple):

@@ -17,7 +17,7 @@ __all__ = [
 
 
 class PackageNotFoundError(KeyError):
-    """The package is neither in ROS_PACKAGE_PATH nor part of minirospy."""
+    """Raised if the package is neither in ROS_PACKAGE_PATH nor part of minirospy."""
 
     def __str__(self) -> str:
         return str(self.args[0])

@@ -30,7 +30,7 @@ _PLAIN = re.compile(r"[\w/][\w./-]*\Z", re.ASCII)
 
 
 class CalibrationError(ValueError):
-    """The text is not a calibration, or the format does not support the calibration."""
+    """Raised if the text is not a calibration, or the format does not support the calibration."""
 
 
 def parse_yaml(text: str) -> tuple[str, CameraInfo]:

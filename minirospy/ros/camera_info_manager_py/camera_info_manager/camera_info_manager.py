@@ -56,7 +56,7 @@ class CameraInfoError(Exception):
 
 
 class CameraInfoMissingError(CameraInfoError):
-    """The calibration has not been loaded yet."""
+    """Raised if the calibration has not been loaded yet."""
 
 
 class CameraInfoManager:

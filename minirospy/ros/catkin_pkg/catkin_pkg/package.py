@@ -84,7 +84,7 @@ _VERSION = re.compile(r"[0-9]+\.[0-9]+\.[0-9]+")
 
 
 class InvalidPackage(Exception):
-    """The package.xml is invalid."""
+    """Raised if the package.xml is invalid."""
 
     def __init__(self, msg: str, package_path: str | None = None) -> None:
         super().__init__(msg)

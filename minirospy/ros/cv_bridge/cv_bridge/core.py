@@ -22,7 +22,7 @@ __all__ = ["CvBridge", "CvBridgeError"]
 
 
 class CvBridgeError(TypeError):
-    """The image cannot be converted."""
+    """Raised if the image cannot be converted."""
 
 
 class CvBridge:

@@ -49,11 +49,11 @@ class DynamicReconfigureException(Exception):
 
 
 class DynamicReconfigureParameterException(DynamicReconfigureException):
-    """The server does not have the parameter, or the value is invalid."""
+    """Raised if the server does not have the parameter, or the value is invalid."""
 
 
 class DynamicReconfigureCallbackException(DynamicReconfigureException):
-    """The server's callback failed, or returned no configuration."""
+    """Raised if the server's callback failed, or returned no configuration."""
 
 
 class ConfigType(Protocol):

@@ -28,8 +28,8 @@ IODELIM = "---"
 
 
 class InvalidMsgSpec(Exception):
-    """The definition cannot be parsed."""
+    """Raised if the definition cannot be parsed."""
 
 
 class MsgGenerationException(MessageException):
-    """No class can be generated from the definition."""
+    """Raised if no class can be generated from the definition."""

@@ -73,7 +73,7 @@ SearchPath = Mapping[str, Sequence[str]]  # maps a package to the folders that c
 
 
 class MsgNotFound(Exception):
-    """The file that contains a definition was not found."""
+    """Raised if the file that contains a definition was not found."""
 
     def __init__(
         self,

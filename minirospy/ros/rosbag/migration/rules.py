@@ -40,7 +40,7 @@ Key = tuple[str, str]
 
 
 class BagMigrationException(Exception):
-    """The migration is not possible, or a rule is used incorrectly."""
+    """Raised if the migration is not possible, or a rule is used incorrectly."""
 
 
 class _Step(Protocol):

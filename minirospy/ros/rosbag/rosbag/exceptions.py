@@ -31,28 +31,28 @@ class ROSBagException(Exception):
 
 
 class ROSBagFormatException(ROSBagException):
-    """The bag's bytes violate the format."""
+    """Raised if the bag's bytes violate the format."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
 
 
 class ROSBagUnindexedException(ROSBagException):
-    """The bag was not closed, or its index is damaged."""
+    """Raised if the bag was not closed, or its index is damaged."""
 
     def __init__(self, *args: object) -> None:
         super().__init__("Unindexed bag")
 
 
 class ROSBagEncryptNotSupportedException(ROSBagException):
-    """The bag is encrypted, or encryption was requested; neither is supported."""
+    """Raised if the bag is encrypted or encryption was requested. Neither is supported."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
 
 
 class ROSBagEncryptException(ROSBagException):
-    """Encryption failed."""
+    """Raised if encryption failed."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)

@@ -12,7 +12,7 @@ __all__ = ["CleanupException", "get_disk_usage", "get_human_readable_disk_usage"
 
 
 class CleanupException(Exception):
-    """The size of a folder cannot be determined."""
+    """Raised if the size of a folder cannot be determined."""
 
 
 def get_disk_usage(d: str) -> int:

@@ -31,18 +31,18 @@ __all__ = [
 
 
 class MasterException(Exception):
-    """The master is unreachable or returned an error."""
+    """Raised if the master is unreachable or returned an error."""
 
 
 ROSMasterException = MasterException  # an older name for MasterException
 
 
 class MasterFailure(MasterException):
-    """The call failed on the master."""
+    """Raised if the call failed on the master."""
 
 
 class MasterError(MasterException):
-    """The master rejected the call, because of an unknown name or a bad argument."""
+    """Raised if the master rejected the call, because of an unknown name or a bad argument."""
 
 
 Error, Failure = MasterError, MasterFailure

@@ -43,7 +43,7 @@ __all__ = [
 
 
 class ROSHandshakeException(Exception):
-    """The connection header is incomplete or cannot be parsed."""
+    """Raised if the connection header is incomplete or cannot be parsed."""
 
 
 def get_address_override() -> str | None:

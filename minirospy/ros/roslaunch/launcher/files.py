@@ -23,7 +23,10 @@ _MAX_LAUNCH_FILE = 16 * 1024 * 1024
 
 
 class LaunchFileNotFoundError(MinirospyError):
-    """A launch file named on the command line does not exist; ``ros_text`` is ROS's message, ``hint`` a suggestion."""
+    """Raised if a launch file named on the command line does not exist.
+
+    ``ros_text`` is ROS's message, ``hint`` a suggestion.
+    """
 
     def __init__(self, ros_text: str, hint: str) -> None:
         super().__init__(ros_text, hint)

@@ -47,7 +47,7 @@ Problems = list[LaunchError]
 
 
 class _TooManyIncludesError(LaunchError):
-    """A launch includes more files than allowed."""
+    """Raised if a launch includes more files than allowed."""
 
 
 class LaunchSource(NamedTuple):

@@ -33,7 +33,7 @@ _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
 class SubstitutionError(ValueError):
-    """A substitution cannot be resolved; the message states the reason."""
+    """Raised if a substitution cannot be resolved. The message states the reason."""
 
 
 @dataclass

@@ -46,7 +46,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 class RLTestTimeoutException(RLException):
-    """A test has exceeded its time limit."""
+    """Raised if a test has exceeded its time limit."""
 
 
 class ROSLaunchRunner:

@@ -77,4 +77,4 @@ def _find(name: str, files: Sequence[LaunchFile]) -> Node:
 
 
 class NodeParamsException(Exception):
-    """A node's command cannot be built."""
+    """Raised if a node's command cannot be built."""

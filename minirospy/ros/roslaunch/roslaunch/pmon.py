@@ -100,7 +100,7 @@ class ApiLauncher(Launcher):
 
 
 class FatalProcessLaunch(RLException):
-    """A process failed to start, and the launch cannot continue."""
+    """Raised if a process failed to start, and the launch cannot continue."""
 
 
 class Process:

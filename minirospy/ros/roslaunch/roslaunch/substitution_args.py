@@ -67,11 +67,11 @@ _rospack: RosPack | None = None
 
 
 class SubstitutionException(Exception):
-    """A substitution argument cannot be resolved."""
+    """Raised if a substitution argument cannot be resolved."""
 
 
 class ArgException(SubstitutionException):
-    """An arg is not set."""
+    """Raised if an arg is not set."""
 
 
 def resolve_args(

@@ -47,7 +47,7 @@ __all__ = [
 
 
 class XmlParseException(RLException):
-    """A launch file cannot be loaded."""
+    """Raised if a launch file cannot be loaded."""
 
 
 class Configuration(Protocol):

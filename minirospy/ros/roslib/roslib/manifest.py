@@ -36,7 +36,7 @@ __all__ = [
 
 
 class ManifestException(ROSLibException):
-    """A manifest.xml is invalid."""
+    """Raised if a manifest.xml is invalid."""
 
 
 class Depend(NamedTuple):

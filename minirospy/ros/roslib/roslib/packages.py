@@ -39,15 +39,15 @@ ROS_PACKAGE_PATH = "ROS_PACKAGE_PATH"
 
 
 class ROSPkgException(Exception):
-    """A package cannot be used."""
+    """Raised if a package cannot be used."""
 
 
 class InvalidROSPkgException(ROSPkgException):
-    """There is no package with this name."""
+    """Raised if there is no package with this name."""
 
 
 class MultipleNodesException(ROSPkgException):
-    """The package has several nodes with this name."""
+    """Raised if the package has several nodes with this name."""
 
 
 def get_pkg_dir(

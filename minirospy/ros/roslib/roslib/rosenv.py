@@ -36,7 +36,7 @@ ROS_LOG_DIR = "ROS_LOG_DIR"
 
 
 class ROSEnvException(ROSLibException):
-    """A required environment variable is not set."""
+    """Raised if a required environment variable is not set."""
 
 
 def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:

@@ -35,7 +35,7 @@ VERBOSE = False
 
 
 class SrvSpecException(MsgSpecException):
-    """A definition cannot be read."""
+    """Raised if a definition cannot be read."""
 
 
 class _Verbosity:

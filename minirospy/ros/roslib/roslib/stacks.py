@@ -35,11 +35,11 @@ ROS_STACK = "ros"
 
 
 class ROSStackException(Exception):
-    """A stack cannot be used."""
+    """Raised if a stack cannot be used."""
 
 
 class InvalidROSStackException(ROSStackException):
-    """There is no stack with this name."""
+    """Raised if there is no stack with this name."""
 
 
 def list_stacks_by_path(

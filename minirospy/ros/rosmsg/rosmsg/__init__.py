@@ -77,7 +77,7 @@ _KINDS = {MODE_MSG: Kind.MESSAGE, MODE_SRV: Kind.SERVICE}
 
 
 class ROSMsgException(Exception):
-    """A type does not exist, or its definition is invalid."""
+    """Raised if a type does not exist, or its definition is invalid."""
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:

@@ -63,11 +63,11 @@ _PING_SECONDS = 3.0
 
 
 class ROSNodeException(Exception):
-    """A request about a node failed."""
+    """Raised if a request about a node failed."""
 
 
 class ROSNodeIOException(ROSNodeException):
-    """The master or the node does not respond."""
+    """Raised if the master or the node does not respond."""
 
 
 def get_node_names(namespace: str | None = None) -> list[str]:

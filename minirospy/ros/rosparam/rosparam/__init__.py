@@ -80,15 +80,15 @@ NS = "_ns"
 
 
 class RosParamException(Exception):
-    """A request about a parameter or file failed."""
+    """Raised if a request about a parameter or file failed."""
 
 
 class RosParamIOException(RosParamException):
-    """The master does not respond."""
+    """Raised if the master does not respond."""
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
-    """The YAML is invalid. Programs catch either of the two base classes."""
+    """Raised if the YAML is invalid. Programs catch either of the two base classes."""
 
 
 def get_param(param: str) -> Any:

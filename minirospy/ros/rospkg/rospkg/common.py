@@ -13,7 +13,7 @@ ROS_STACK = "ros"
 
 
 class ResourceNotFound(Exception):
-    """No package or stack has this name; ``ros_paths`` are the searched folders."""
+    """Raised if no package or stack has this name. ``ros_paths`` are the searched folders."""
 
     def __init__(self, msg: str, ros_paths: Sequence[str] | None = None, nearest: Sequence[str] = ()) -> None:
         super().__init__(msg)

@@ -17,7 +17,7 @@ __all__ = ["Depend", "Export", "InvalidManifest", "Manifest", "RosDep", "parse_m
 
 
 class InvalidManifest(Exception):
-    """A package.xml is invalid."""
+    """Raised if a package.xml is invalid."""
 
 
 class Depend(NamedTuple):

@@ -93,7 +93,7 @@ _OF_FDO = {
 
 
 class OsNotDetected(Exception):
-    """The detector does not support the running operating system, or no detector does."""
+    """Raised if the detector does not support the running operating system, or no detector does."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:

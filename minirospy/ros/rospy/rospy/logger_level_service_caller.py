@@ -15,7 +15,7 @@ _GET, _SET = "/get_loggers", "/set_logger_level"
 
 
 class ROSConsoleException(Exception):
-    """A node does not list its loggers."""
+    """Raised if a node does not list its loggers."""
 
 
 class LoggerLevelServiceCaller:

@@ -78,7 +78,7 @@ Validator = Callable[[object, str], str]
 
 
 class ParameterInvalid(Exception):
-    """An argument of a call is invalid."""
+    """Raised if an argument of a call is invalid."""
 
     def __init__(self, message: str) -> None:
         super().__init__(message)

@@ -23,7 +23,7 @@ _LOOK_SECONDS = 0.2
 
 
 class EndpointError(MinirospyError):
-    """A topic or service cannot be created as the device describes it."""
+    """Raised if a topic or service cannot be created as the device describes it."""
 
 
 def to_bytes(message: Message) -> bytes:

@@ -18,7 +18,7 @@ _CHUNK = 4096
 
 
 class PortError(MinirospyError):
-    """A connection cannot be opened, or was lost; the message is one line with the reason."""
+    """Raised if a connection cannot be opened, or was lost. The message is one line with the reason."""
 
 
 class Port(Protocol):

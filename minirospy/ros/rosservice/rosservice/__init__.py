@@ -68,11 +68,11 @@ NAME = "rosservice"
 
 
 class ROSServiceException(Exception):
-    """A request about a service failed."""
+    """Raised if a request about a service failed."""
 
 
 class ROSServiceIOException(ROSServiceException):
-    """The master or the service does not respond."""
+    """Raised if the master or the service does not respond."""
 
 
 def get_service_list(

@@ -22,16 +22,16 @@ class SmachError(Exception):
 
 
 class InvalidTransitionError(SmachError):
-    """A state does not have this outcome, or the transition's target does not exist."""
+    """Raised if a state does not have this outcome, or the transition's target does not exist."""
 
 
 class InvalidStateError(SmachError):
-    """A state cannot be added, or a container was not constructed correctly."""
+    """Raised if a state cannot be added, or a container was not constructed correctly."""
 
 
 class InvalidUserCodeError(SmachError):
-    """A state or callback raised an exception."""
+    """Raised if a state or callback raised an exception."""
 
 
 class InvalidConstructionError(SmachError):
-    """A container was used before it was opened."""
+    """Raised if a container was used before it was opened."""

@@ -42,7 +42,7 @@ Key = tuple[int, str, str]
 
 
 class SoundError(Exception):
-    """A sound cannot be played; the message states the reason and a remedy."""
+    """Raised if a sound cannot be played. The message states the reason and a remedy."""
 
 
 class PlayingSound:

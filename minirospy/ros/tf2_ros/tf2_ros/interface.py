@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """No conversion is registered for the type. The program must import the package that registers it."""
+    """Raised if no conversion is registered for the type. The program must import the package that registers it."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)
@@ -42,7 +42,7 @@ class TypeException(Exception):
 
 
 class NotImplementedException(Exception):
-    """A subclass of BufferInterface does not implement this method."""
+    """Raised if a subclass of BufferInterface does not implement this method."""
 
     def __init__(self) -> None:
         super().__init__()

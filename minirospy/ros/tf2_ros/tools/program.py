@@ -17,7 +17,9 @@ USAGE_STATUS = 255
 
 
 class ToolError(MinirospyError):
-    """A program cannot continue. It prints ``text`` to stdout and ``str()`` to stderr, and exits with the status.
+    """Raised if a program cannot continue.
+
+    It prints ``text`` to stdout and ``str()`` to stderr, and exits with the status.
 
     ``level`` is the line's log level; if it is empty, the line is printed without a level.
     """

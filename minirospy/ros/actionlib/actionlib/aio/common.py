@@ -51,7 +51,9 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 
 
 class GoalError(MinirospyError):
-    """The goal was not reached. ``text`` and ``result`` (if any) come from the server; ``state`` is the final state.
+    """Raised if the goal was not reached.
+
+    ``text`` and ``result`` (if any) come from the server; ``state`` is the final state.
 
     A server's ``execute`` raises this error to abort the goal with a status text and a result. ``result`` may have any
     type that ``execute`` may return.

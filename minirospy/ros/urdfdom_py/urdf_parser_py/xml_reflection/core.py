@@ -51,7 +51,7 @@ class Path:
 
 
 class ParseError(Exception):
-    """A description cannot be read; ``e`` is the error, ``path`` the element's path."""
+    """Raised if a description cannot be read. ``e`` is the error, ``path`` the element's path."""
 
     def __init__(self, e: Exception, path: Path) -> None:
         self.e = e
