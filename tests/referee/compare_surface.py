@@ -25,6 +25,7 @@ import re
 import subprocess
 import sys
 import textwrap
+import warnings
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -161,6 +162,11 @@ LEFT_OUT = [
     ("roslib", "manifestlib stack_manifest Manifest.xml", "of rosbuild: use rospkg"),
     ("rosmaster.master_api", "apivalidate ROSMasterHandler.param_update_task", "the inside of rosmaster"),
     ("rosmaster.threadpool", "*", "the inside of the pool of threads"),
+    (
+        "catkin_pkg.package",
+        "parse_package_for_distutils",
+        "deprecated: use catkin_pkg.python_setup.generate_distutils_setup",
+    ),
     ("catkin_pkg", "terminal_color", "for the scripts of catkin_pkg"),
     (
         "catkin_pkg.condition",
@@ -690,6 +696,7 @@ def described_by(python: str, option: str = "--describe") -> dict[str, Any]:
 
 
 def main() -> int:
+    warnings.filterwarnings("ignore", "roslib.rospack is deprecated")
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

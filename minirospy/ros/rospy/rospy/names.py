@@ -107,9 +107,13 @@ def reload_mappings(argv: Sequence[str]) -> None:
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, with the node name ``node_name``. Raise ValueError if ``node_name`` is None."""
-    namespace(node_name)
+    """Resolve the remappings again, with the node name ``node_name``.
+
+    Raise ValueError if there are any names to resolve and ``node_name`` is not a name.
+    """
     identity = current_session().identity
+    if any(not name.startswith("__") for name in identity.mappings):
+        namespace(node_name)
     identity.remappings = identity.resolved_mappings(node_name)
 
 
