@@ -98,22 +98,22 @@ def get_global_python_destination() -> str:
 
 def get_package_bin_destination(pkgname: str) -> str:
     """Return the folder for a package's programs, relative to the install prefix."""
-    return f"lib/{pkgname}"
+    return "lib/" + pkgname
 
 
 def get_package_etc_destination(pkgname: str) -> str:
     """Return the folder for a package's configuration files, relative to the install prefix."""
-    return f"etc/{pkgname}"
+    return "etc/" + pkgname
 
 
 def get_package_include_destination(pkgname: str) -> str:
     """Return the folder for a package's header files, relative to the install prefix."""
-    return f"include/{pkgname}"
+    return "include/" + pkgname
 
 
 def get_package_share_destination(pkgname: str) -> str:
     """Return the folder for a package's data files, relative to the install prefix."""
-    return f"share/{pkgname}"
+    return "share/" + pkgname
 
 
 def get_package_lib_destination(_pkgname: str) -> str:
@@ -123,4 +123,4 @@ def get_package_lib_destination(_pkgname: str) -> str:
 
 def get_package_python_destination(pkgname: str) -> str:
     """Return the folder for a package's Python modules, relative to the install prefix."""
-    return f"{get_global_python_destination()}/{pkgname}"
+    return get_global_python_destination() + "/" + pkgname
