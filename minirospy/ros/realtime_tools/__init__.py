@@ -1,0 +1,1 @@
+"""Publishers for loops that must not wait."""
