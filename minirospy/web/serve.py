@@ -33,7 +33,9 @@ __all__ = [
 
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Minimum size in bytes of freed blocks returned to the system. It exceeds camera images, because mapping memory takes time."""
+"""Minimum size, in bytes, of freed blocks that are returned to the system. It exceeds the size of camera images, because
+mapping memory for each image is slow.
+"""
 
 
 class Part(Protocol):
@@ -46,7 +48,7 @@ class Part(Protocol):
 
 _P = TypeVar("_P", bound=Part)
 
-# GIL switch interval in seconds; with Python's default of 5 ms, the loop waits that long after each call
+# GIL switch interval in seconds; with Python's default of 5 ms, the loop could wait that long after each call
 _SWITCH_SECONDS = 0.0005
 
 
@@ -149,7 +151,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # If there is no master yet, cancel the wait for the master; otherwise, shut down the node.
+        # If there is no master yet, cancel the wait for it; otherwise, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:

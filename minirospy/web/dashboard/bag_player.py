@@ -34,7 +34,7 @@ _MAX_WAITING = 200
 
 
 class GraphOutput:
-    """Publishes a player's messages on the loop's graph: the messages on enabled topics, and the clock."""
+    """Publishes a player's messages to the loop's graph: the messages on enabled topics, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
         """Create the output for ``graph``. Must be called on the loop."""
@@ -199,7 +199,7 @@ class OpenBag:
         return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
 
     def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
-        """For each latched topic among these, return its last message up to ``time``, for late subscribers."""
+        """Return the last message up to ``time`` of each latched topic in ``topics``, for late subscribers."""
         return [
             (topic, message.body)
             for topic in topics

@@ -152,7 +152,7 @@ class LaunchRun:
         return self._state in ("stopping", "ended")
 
     def has_exited(self, node: str) -> bool:
-        """Return whether a node was started and is no longer running."""
+        """Return whether a node was started and has exited."""
         process = self._known.get(node)
         return process is not None and not process.is_running
 

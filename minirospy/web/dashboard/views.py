@@ -69,7 +69,7 @@ def plotted_fields(words: Iterable[str]) -> list[str]:
     """
     found: list[str] = []
     for word in (part for each in words for part in each.split(",") if part):
-        # A colon in brackets belongs to a slice.
+        # A colon in brackets is part of a slice.
         head, *others = _split_colons(word)
         base = head.rpartition("/")[0]
         if not base and not head.startswith("/"):

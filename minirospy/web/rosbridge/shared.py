@@ -23,9 +23,9 @@ __all__ = ["RosbridgeOptions", "RosbridgeShared"]
 
 _LOG_LINES = 20
 
-# maximum bytes of a message that is encoded immediately; 8,000 numbers take 8 ms
+# maximum bytes of a message to encode on the loop; 8,000 numbers take 8 ms
 _MAX_QUICK_BODY = 64 * 1024
-# maximum bytes of an image that is encoded immediately; encoding it in base64 takes 3 ms
+# maximum bytes of an image to encode on the loop; base64-encoding it takes 3 ms
 _MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
@@ -49,7 +49,7 @@ class RosbridgeOptions:
 
 
 class _LargeWork:
-    """Runs work on large messages in one thread, one piece of work at a time."""
+    """Runs work on large messages in one thread, one job at a time."""
 
     def __init__(self, name: str) -> None:
         self._name = name  # name of the thread
@@ -104,7 +104,7 @@ class RosbridgeShared:
         self._encoded.clear()
 
     def release(self, publication: Publication) -> None:
-        """Release a publication after a delay, within which clients may advertise it again."""
+        """Release a publication after a delay, in which clients may advertise it again."""
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
 
     def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
@@ -151,7 +151,7 @@ class RosbridgeShared:
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Like :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
+        """Like :meth:`encoded`, but encode in a thread, so that only the clients that receive this message wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:
