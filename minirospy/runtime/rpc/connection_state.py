@@ -34,7 +34,7 @@ class State(Enum):
     REFUSED = "received bytes are ignored, until the client closes the connection or the time is over"
     ENDED = "the socket is closed"
 
-    # use object's hash, because Enum's is a Python function that takes longer than a transition
+    # use object's hash: Enum's is a Python function that takes longer than a whole transition
     __hash__ = object.__hash__
 
 

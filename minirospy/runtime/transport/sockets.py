@@ -29,15 +29,15 @@ __all__ = [
 
 FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sockets
 
-HANDSHAKE_SECONDS = 10.0  # time limit in seconds for each handshake, because a peer may never respond
+HANDSHAKE_SECONDS = 10.0  # time limit in seconds per handshake, because a peer may never respond
 
 BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process on the same host arrive
 
 KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence, seconds between probes, number of probes. On macOS the first option is called TCP_KEEPALIVE."""
 
-# Requested buffer size for a Unix socket in bytes, as much as TCP buffers; Linux limits it to net.core.wmem_max (208
-# kB by default)
+# Buffer size to request for a Unix socket, in bytes; as much as TCP buffers. Linux limits it to net.core.wmem_max
+# (208 kB by default)
 _SEND_BUFFER = 4 * 1024 * 1024
 
 _PEER = struct.Struct("iII")  # layout of the kernel's credentials for a peer, see Peer
@@ -68,7 +68,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def enlarge_send_buffer(sock: socket.socket) -> None:
-    """Let a Unix socket buffer some megabytes, as far as the kernel allows. TCP enlarges its own buffers.
+    """Let a Unix socket buffer some megabytes, or as much as the kernel allows. TCP enlarges its own buffers.
 
     Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process in between.
     """
@@ -153,7 +153,7 @@ def _busy_poll(sock: socket.socket, events: int) -> bool:
     poll = _poll(sock, events)
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
-        # Yield first, because the peer may be waiting for this processor.
+        # Yield first, because the peer may need this processor.
         os.sched_yield()
         if poll.poll(0):
             return True
