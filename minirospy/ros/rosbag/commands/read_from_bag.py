@@ -109,8 +109,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
         for message in reader.messages(paths) if options.limit != 0 else ():
             connection = message.connection
             field = paths[connection.id]
-            # Topics without a field share one Echo, so that the output of -p starts with a single line of column
-            # names.
+            # Topics without a field share one Echo, so that -p prints a single line of column names at the start.
             if field not in echoes:
                 echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
             echo = echoes[field]
