@@ -37,7 +37,7 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """Prints ROS's help before its own. Like ROS, also prints it on a usage error."""
+    """A parser that prints ROS's help before its own, also on a usage error, as ROS does."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()

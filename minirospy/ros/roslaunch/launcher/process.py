@@ -35,7 +35,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A started process. ``node`` is None for the master; ``starts`` counts how often it was started."""
+    """A started process. ``node`` is None for the master; ``starts`` counts the starts."""
 
     name: str
     command: Sequence[str]
@@ -45,9 +45,9 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # set once the process has been told to exit, so that its exit is not reported
+    is_ending: bool = False  # set once the process has been told to exit; its exit is then not reported
 
-    # set if the process will be restarted after its exit because its file has changed
+    # set if the process is to be restarted after its exit because its file has changed
     is_restarting: bool = False
 
     @property
@@ -74,7 +74,7 @@ class _Group(TypedDict, total=False):
 
 
 class Guardian:
-    """Is told of processes' starts and exits, and terminates the remaining ones if roslaunch is killed.
+    """Tracks the running processes, and terminates them if roslaunch is killed.
 
     On Windows the system terminates them (`minirospy.base.child_lifetime`). There the guardian only unregisters nodes from a
     master that this launch did not start; otherwise its process is not started.
@@ -181,8 +181,8 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # send_signal fails if the process has exited, or on Windows without a console; then there is nothing to
-            # wait for.
+            # send_signal fails if the process has exited or, on Windows, has no console. There is nothing to wait for
+            # then.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)
@@ -193,7 +193,7 @@ def end_processes(
 
     if not _WINDOWS:
         for process in processes:
-            # Also kill processes that a node left running in its group.
+            # Also kill the processes that a node has left running in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed

@@ -57,7 +57,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below. Notified when the states that are still executing must finish.
+        # Guards the attributes below. Notified when the states that are still executing have to finish.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -187,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the container can finish now that one of its states has finished."""
+        """Return whether the container can finish now that this state has finished."""
         others_end = False
         if self._child_termination_cb:
             try:

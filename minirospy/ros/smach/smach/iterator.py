@@ -85,7 +85,7 @@ class Iterator(Container):
         iterator._final_outcome_map = final_outcome_map or {}
 
     def check_consistency(self) -> None:
-        """Do nothing, as in ROS, because ``execute`` raises an error if there is no state."""
+        """Do nothing, as in ROS: ``execute`` raises an error if there is no state."""
 
     # Execution.
 

@@ -192,7 +192,7 @@ class SimpleActionState(State):
                     )
                     return False
             elif self.preempt_requested():
-                # Cancel the goal, because the preemption may have been requested just before the goal was sent.
+                # Cancel the goal here, because the preemption may have been requested just before the goal was sent.
                 self._action_client.cancel_goal()
                 cancelled = now
             elif self._exec_timeout and now - self._activate_time > self._exec_timeout:

@@ -203,7 +203,7 @@ def superimposition_matrix(
 
 
 def _horn(first: Floats, second: Floats) -> Floats:
-    """Return the best rotation's quaternion: the eigenvector of Horn's matrix with the largest eigenvalue."""
+    """Return the quaternion of the best rotation: the eigenvector of Horn's matrix with the largest eigenvalue."""
     import numpy
 
     s = numpy.dot(first, second.T)
@@ -256,7 +256,7 @@ class Arcball:
         self._center = numpy.asarray(center, dtype=numpy.float64)[:2]
 
     def setaxes(self, *axes: ArrayLike) -> None:
-        """Set the axes that rotations can be constrained to. Without arguments, remove the constraint."""
+        """Set the axes to which rotations can be constrained. Without arguments, remove the constraint."""
         self._axes = [unit_vector(axis) for axis in axes] if axes else None
 
     def setconstrain(self, constrain: bool) -> None:

@@ -166,7 +166,7 @@ def run_node(
             raise ValueError("")
         start = prepare(words)
         rospy.init_node(name(words), anonymous=True)
-        # Keep a reference, so that the subscription or the services are not deleted.
+        # Keep a reference, because otherwise the subscription or the services would be deleted.
         running = start()
         rospy.spin()
         del running
