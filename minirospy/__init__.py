@@ -38,7 +38,7 @@ _ELSEWHERE = {
     "get_ros_root": "minirospy.ros.rospy.rospy.core",
     "parse_rosrpc_uri": "minirospy.ros.rospy.rospy.core",
 }
-"""Public names that are not of `minirospy.client`."""
+"""Public names that are not in `minirospy.client`."""
 
 
 def __getattr__(name: str) -> Any:
