@@ -31,9 +31,9 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-# Limit for the process's address space: a reader that allocates more gets a MemoryError, which is a finding.
+# Limit of the process's address space; a reader that allocates more gets a MemoryError, which counts as a finding.
 MEMORY_BYTES = 3 << 30
-MAX_SECONDS = 20.0  # CPU seconds for an input of some kilobytes; if an input takes longer, it is a finding
+MAX_SECONDS = 20.0  # CPU seconds for an input of some kilobytes; taking longer counts as a finding
 MAX_INPUT = 50_000  # maximum size of an input in bytes
 
 
