@@ -1,4 +1,4 @@
-"""Many nodes shut down together: how many registrations are left at the master?
+"""Many nodes shut down together. How many registrations are left at the master?
 
     python benchmarks/shutdown.py --nodes 200 --rounds 20
     python benchmarks/shutdown.py --launch --nodes 100 --rounds 10

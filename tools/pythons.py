@@ -52,7 +52,10 @@ def main(words: Sequence[str]) -> int:
 
 
 def choose(words: Sequence[str], found: Sequence[str]) -> list[str]:
-    """Return the versions that ``words`` select from those found, which are sorted. Raise LookupError if one is not found."""
+    """Return the versions selected by ``words`` from the sorted ones that were found.
+
+    Raise LookupError if one was not found.
+    """
     with_gil = [name for name in found if not name.endswith("t")] or list(found)
     names = {{"oldest": with_gil[0], "newest": with_gil[-1]}.get(word, word) for word in words}
     if missing := names - set(found):
@@ -67,7 +70,10 @@ def _version(python: str) -> str:
 
 
 def _environment(python: str, label: str) -> Path:
-    """Return the interpreter of an environment with this checkout and its test dependencies; create it once."""
+    """Return the interpreter of an environment with this checkout and its test dependencies.
+
+    The environment is created once.
+    """
     folder = FOLDER / label
     inner = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / ".installed"

@@ -72,7 +72,7 @@ def _file_name(path: str) -> str:
 
 
 def _without_map(body: bytes) -> bytes:
-    """Remove the line that names a source map, which is not vendored, because a browser would request it."""
+    """Remove the line that names a source map: a browser would request it, and it is not vendored."""
     kept = [line for line in body.split(b"\n") if not line.startswith(b"//# sourceMappingURL=")]
     return b"\n".join(kept)
 
