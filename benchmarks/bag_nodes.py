@@ -89,8 +89,7 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
     start = time.perf_counter()
     for _ in range(count):
         publication.publish(frame)
-    # Wait until no messages are left in the sockets. There is no condition for this, because a recorder may have lost
-    # some.
+    # Wait until no messages are left in the sockets. There is no condition for this, because a recorder may have lost some.
     time.sleep(_SETTLE_SECONDS)
     process.send_signal(signal.SIGINT)
     _, status, usage = os.wait4(process.pid, 0)

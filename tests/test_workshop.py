@@ -154,8 +154,7 @@ def test_ctrl_c_ends_the_server_in_the_middle_of_a_goal(start: Start, board: Boa
     client = start(LISTINGS / "ledrun_client.py")
     assert any(edge.level for edge in edges)
     interrupt(server)
-    # The client waits for a server to return; without one, Ctrl-C stops the client. The listing then has no result to
-    # print.
+    # The client waits for a server to return; without one, Ctrl-C stops the client. The listing then has no result to print.
     wait_line(client, "Server is active.")
     client.send_signal(CTRL_C)
     output, _ = client.communicate(timeout=30)

@@ -223,8 +223,7 @@ def find_pythons() -> dict[str, str]:
             text=True,
             check=False,
         )
-        # pyenv also has commands for versions that are not selected. Debian's versions lack ensurepip without
-        # python3-venv.
+        # pyenv also has commands for versions that are not selected. Debian's versions lack ensurepip without python3-venv.
         if done.returncode == 0:
             major, minor, is_free = map(int, done.stdout.split())
             versions.setdefault((major, minor, is_free), path)

@@ -94,8 +94,7 @@ class ServiceProxy(Generic[_Response_co]):
                 keeping = isinstance(error.__cause__, CallFailed)
                 raise
             finally:
-                # Close the connection after a cancelled call: the next call would otherwise read the cancelled call's
-                # response.
+                # Close the connection after a cancelled call: the next call would otherwise read the cancelled call's response.
                 if not keeping:
                     self._disconnect()
 

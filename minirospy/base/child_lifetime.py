@@ -51,8 +51,7 @@ class ProcessJob:
         with self._lock:
             try:
                 if self._job is None:
-                    # The job's handle is never closed here. The system closes it when this process exits, whatever
-                    # the reason.
+                    # The job's handle is never closed here. The system closes it when this process exits, whatever the reason.
                     job = self._system.create()
                     self._system.set_limits(job, _BREAKAWAY_OK)
                     self._system.add_this_process(job)

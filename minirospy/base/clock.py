@@ -65,8 +65,7 @@ class SignalSafeEvent(threading.Event):
 
     def set(self) -> None:
         """Set the event, and wake the waiting threads."""
-        # Set the flag before reading the list: a waiting thread first adds itself to the list and then checks the
-        # flag.
+        # Set the flag before reading the list: a waiting thread first adds itself to the list and then checks the flag.
         self._is_set = True
         for lock in self._waiting.copy():
             # Another thread, or a signal handler in this thread, has already released the lock.

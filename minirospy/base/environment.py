@@ -175,8 +175,7 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
 
     This does not use urllib.parse, because importing it takes a twentieth of a command's run time.
     """
-    # Reject control characters and spaces: the path is sent in the first line of a request, and the URI is written to
-    # logs.
+    # Reject control characters and spaces: the path is sent in the first line of a request, and the URI is written to logs.
     if has_controls(uri) or " " in uri:
         raise ValueError(f"[{escaped(uri)}] is not of the form {scheme}://host:port")
     found, _, rest = uri.partition("://")

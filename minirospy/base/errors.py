@@ -121,7 +121,7 @@ __all__ = [
 
 
 class MinirospyError(Exception):
-    """The root of minirospy's own errors; ``str()`` is one line for the user."""
+    """The base class of minirospy's own errors; ``str()`` is one line for the user."""
 
 
 class UsageError(MinirospyError):
@@ -427,7 +427,7 @@ class ValueTextError(MinirospyError):
 
 
 class ROSException(Exception):
-    """The root of rospy's errors."""
+    """The base class of rospy's errors."""
 
 
 class ROSInitException(ROSException):
@@ -503,7 +503,7 @@ class ServiceException(Exception):
 
 
 class TransformException(Exception):
-    """The root of tf2's errors. Source: http://wiki.ros.org/tf2/Errors."""
+    """The base class of tf2's errors. Source: http://wiki.ros.org/tf2/Errors."""
 
     __module__ = "tf2"
 

@@ -84,6 +84,5 @@ class SafeTerminal(io.TextIOWrapper):
             self.detach()
 
     def __del__(self) -> None:
-        # Unlike TextIOWrapper.__del__, do not close the stream: that would close the buffer, which sys.__stdout__
-        # shares.
+        # Unlike TextIOWrapper.__del__, do not close the stream: that would close the buffer, which sys.__stdout__ shares.
         pass

@@ -69,8 +69,7 @@ class Keys:
         ready, _, _ = select.select([sys.stdin], [], [], LOOK_SECONDS)
         if not ready:
             return ""
-        # Bypass Python's buffer, which select does not see. A read that returns no bytes means that the terminal is
-        # closed.
+        # Bypass Python's buffer, which select does not see. A read that returns no bytes means that the terminal is closed.
         try:
             key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
         except OSError:

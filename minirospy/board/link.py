@@ -82,8 +82,7 @@ class Link:
     def __init__(self, directory: BoardDirectory, on_edge: Callable[[Edge], None] | None = None) -> None:
         self._directory = directory
         self._on_edge = on_edge
-        # Use a reentrant lock: a signal handler, such as a node's shutdown hook, may set pins while its thread holds
-        # the lock.
+        # Use a reentrant lock: a signal handler, such as a node's shutdown hook, may set pins while its thread holds the lock.
         self._news = threading.Condition(threading.RLock())
         self._number = 0
         self._acknowledged = 0

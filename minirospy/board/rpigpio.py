@@ -119,8 +119,7 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use
-        # it.
+        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use it.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
         # The channels that cleanup() released in a signal handler, with their BCM pins, so that the interrupted call

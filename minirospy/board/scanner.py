@@ -66,8 +66,7 @@ class Scan(NamedTuple):
         return nearest >= FIELDS[0], nearest >= FIELDS[1]
 
 
-# A room of 6 m by 4 m. There is a door to the left and a reflector on the wall ahead; the scanner is at the wall
-# behind.
+# A room of 6 m by 4 m. There is a door to the left and a reflector on the wall ahead; the scanner is at the wall behind.
 WALLS = (
     Wall(-1.0, -2.0, 5.0, -2.0),
     Wall(5.0, -2.0, 5.0, -0.3),

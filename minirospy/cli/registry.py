@@ -92,7 +92,7 @@ COMMANDS = (
     Entry("ros.roswtf.commands.doctor", "main", "DOCTOR", "", "doctor",
           "what is wrong here, in the network, in the graph (as roswtf)"),
     Entry("cli.completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),
-    # For shells, not for users.
+    # Shells call this command; users do not.
     Entry("cli.completion.complete", "main", "", "", "complete"),
     Entry("ros.rosmaster.commands.master", "roscore", "ROSCORE", "roscore"),
     Entry("ros.rosmaster.commands.master", "rosmaster", "ROSMASTER", "rosmaster"),

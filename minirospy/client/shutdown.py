@@ -24,8 +24,8 @@ class Phase(enum.IntEnum):
     """The phase that the shutdown has reached."""
 
     RUNNING = 0
-    HOOKS = 1  # is_shutdown() still returns False
-    DOWN = 2  # is_shutdown() returns True, blocking calls are interrupted
+    HOOKS = 1  # the hooks run; is_shutdown() still returns False
+    DOWN = 2  # is_shutdown() returns True, and blocking calls are interrupted
     LEAVING = 3  # the node waits for the master to unregister it
     LEFT = 4  # the master has unregistered the node
 

@@ -373,8 +373,7 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
             callback.function(message, callback.args)
     except BaseException as error:
         add_numpy_note(error)
-        # As in rospy, sys.exit() has no effect in a link's thread, but inside the Subscriber() call it exits the
-        # program.
+        # As in rospy, sys.exit() has no effect in a link's thread, but inside the Subscriber() call it exits the program.
         if is_callers_thread and not isinstance(error, Exception):
             raise
         # Ignore errors in the callback during a shutdown: a hook may have released resources that the callback uses.

@@ -90,8 +90,7 @@ class FleetContents:
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
             if gateway.claim not in (None, token):
-                # A gateway declares only one claim while it runs, so a different second claim comes from another
-                # peer.
+                # A gateway declares only one claim while it runs, so a different second claim comes from another peer.
                 return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
             changed = gateway.claim is None
             if changed:
@@ -115,8 +114,7 @@ class FleetContents:
         if gateway is None:
             return False
 
-        # If a topic's flags change, the new token arrives before the old one is removed. Remove a token only if it is
-        # equal.
+        # If a topic's flags change, the new token arrives before the old one is removed. Remove a token only if it is equal.
         if isinstance(token, Claim):
             if gateway.claim != token:
                 return False

@@ -27,8 +27,7 @@ _MOST = 5_000
 ANSWER_SECONDS = 10.0
 # maximum total number of characters of all cached definitions; those of ROS's own packages have 3 million
 MAX_CHARACTERS = 64 << 20
-# maximum number of concurrent queries, in total and per gateway; a query without a reply times out after
-# ANSWER_SECONDS
+# maximum number of concurrent queries, in total and per gateway; a query without a reply times out after ANSWER_SECONDS
 MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 

@@ -300,8 +300,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # Clear all attributes before the await: while it runs, the topic may be subscribed to again, with a new
-        # outflow.
+        # Clear all attributes before the await: while it runs, the topic may be subscribed to again, with a new outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None

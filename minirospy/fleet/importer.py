@@ -46,8 +46,7 @@ _MAX_PING = 64  # maximum size in bytes of a reply to a ping; a valid reply has 
 _CALL_SECONDS = 3600.0
 # seconds for a name's holder to reply when another gateway on the same machine claims the name
 CHALLENGE_SECONDS = 2.0
-# Return memory to the system after removing this many names (some 4 MB), and this many seconds later, because links
-# close late
+# Return memory to the system after removing this many names (some 4 MB), and this many seconds later, because links close late
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names that one robot may use, out of _MAX_IMPORTED
 # maximum number of a robot's names to close concurrently; each needs a task and a call to the master

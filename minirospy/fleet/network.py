@@ -101,8 +101,7 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # A single thread keeps the calls in order, so that peers see declarations in the order in which they were
-        # made.
+        # A single thread keeps the calls in order, so that peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(MAX_QUERIES)

@@ -184,7 +184,7 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """A receiver's flows by key. At the limit, the idle flow unused for longest is removed. Thread-safe."""
+    """A receiver's flows by key. At the limit, the least recently used idle flow is removed. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most

@@ -103,7 +103,7 @@ def node_hosts(graph: Graph) -> dict[str, str]:
 
 
 def nodes_on(graph: Graph, machine: str) -> list[str]:
-    """Return the nodes on a machine, by its name or address. Raise NotFoundError if there is none."""
+    """Return the nodes on a machine, given its name or address. Raise NotFoundError if there are none."""
     hosts = node_hosts(graph)
     found = [node for node, host in hosts.items() if _is_same_host(host, machine)]
     if not found:

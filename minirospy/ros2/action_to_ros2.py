@@ -237,7 +237,7 @@ class GoalsToRos2:
         except DeserializationError as error:
             self._misfits.error("feedback of action %s: %s", self._link.action, error)
         except ROSException:
-            return  # the action was closed meanwhile
+            return  # the action was closed in the meantime
 
     async def _publish_statuses(self) -> None:
         """Publish the statuses of all goals, after each change and at regular intervals."""

@@ -384,6 +384,6 @@ class _ToRos1(TopicPassing):
         except DeserializationError as error:
             self._report(error)
         except ROSException:
-            return  # the link was closed meanwhile
+            return  # the link was closed in the meantime
         else:
             self.passed += 1

@@ -209,8 +209,7 @@ class ZenohServer:
                 # Send an error: a response of zeros would look like a valid one.
                 self._refuse(query, reason)
                 return
-            # The response is a bool and a string, as for SetBool and Trigger: send false for success, then the
-            # reason.
+            # The response is a bool and a string, as for SetBool and Trigger: send false for success, then the reason.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

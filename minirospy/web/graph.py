@@ -75,8 +75,7 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # The last message of each publisher, keyed by the id of its connection header, which is one object per
-        # connection.
+        # The last message of each publisher, keyed by the id of its connection header, which is one object per connection.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
 

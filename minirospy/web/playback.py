@@ -32,7 +32,7 @@ class PlayerPlayback:
         self._did_seek = False
 
     def now(self) -> int:
-        """Return the bag's current time, used as messages' timestamp."""
+        """Return the bag's current time, which messages use as their timestamp."""
         return self._player.state().time
 
     def state(self) -> PlaybackState:

@@ -71,8 +71,7 @@ with open(__file__, "rb") as _source:
 """
 
 
-# Use the interpreter that has rospy, unless its path is too long or contains white space, which shebang lines do not
-# allow.
+# Use the interpreter that has rospy, unless its path is too long or contains white space, which shebang lines do not allow.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)

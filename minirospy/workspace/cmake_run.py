@@ -236,7 +236,7 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """Return the items of a loop: words, numbers in a ``RANGE``, or ``IN LISTS`` of variables and ``ITEMS``.
+        """Return the items of a loop: words, the numbers of a ``RANGE``, or ``IN LISTS`` with variables and ``ITEMS``.
 
         Raise ValueError if a ``RANGE`` has more than ``_MAX_LOOPS`` numbers.
         """
@@ -390,8 +390,7 @@ class _Run:
         found: list[Path] = []
         for pattern in words:
             path = self._folder / pattern
-            # Match below the package's folder: the folder's own path may contain characters that are special in a
-            # pattern.
+            # Match below the package's folder: the folder's own path may contain characters that are special in a pattern.
             top = self._folder if path.is_relative_to(self._folder) else Path(path.anchor)
             *folders, last = path.relative_to(top).parts or ("*",)
             if arguments[0] == "GLOB":

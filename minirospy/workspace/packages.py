@@ -287,7 +287,7 @@ def _is_program(path: Path) -> bool:
 
 
 def is_python(path: Path) -> bool:
-    """Return whether a file is a Python program, by its name or its first line."""
+    """Return whether a file is a Python program, judging by its name or its first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:

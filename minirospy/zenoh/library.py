@@ -312,14 +312,12 @@ def configured(options: NetworkOptions) -> Config:
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
-        # Keep-alive messages per lease of 10 s. One fewer than Zenoh's default is enough, because TCP retransmits
-        # lost data.
+        # Keep-alive messages per lease of 10 s. One fewer than Zenoh's default is enough, because TCP retransmits lost data.
         ("transport/link/tx/keep_alive", 3),
         # Data in the kernel's buffer is sent before any data of higher priority. With this size, it takes some 0.3 s
         # at 4 Mbit/s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
-        # Shared memory would pass large messages between local gateways through /dev/shm, which is small in
-        # containers.
+        # Shared memory would pass large messages between local gateways through /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),
     ):
         if not is_set(key):

@@ -194,14 +194,14 @@ def rosrun_words(cursor: Cursor) -> Iterable[str]:
 
 
 def rospack_words(cursor: Cursor) -> Iterable[str]:
-    """Return rospack's verbs and options, and packages."""
+    """Return rospack's verbs and options, and the names of packages."""
     from minirospy.ros.rospack.commands.rospack import _VERBS
 
     return _pack_words(cursor, _VERBS)
 
 
 def rosstack_words(cursor: Cursor) -> Iterable[str]:
-    """Return rosstack's verbs and options, and stacks."""
+    """Return rosstack's verbs and options, and the names of stacks."""
     from minirospy.ros.rospack.commands.rospack import _STACK_VERBS
 
     return _pack_words(cursor, _STACK_VERBS)

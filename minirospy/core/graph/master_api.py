@@ -275,8 +275,7 @@ class MasterApi(ABC):
         def get() -> Steps[Answer]:
             # Count the items in a separate step, because counting takes time.
             if not self.parameters.is_small_at(name):
-                # Send one value at a time: while one is being sent, every change to it by another client requires a
-                # copy.
+                # Send one value at a time: while one is being sent, every change to it by another client requires a copy.
                 yield ALONE
             return self._get(name)
 

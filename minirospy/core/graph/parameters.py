@@ -19,8 +19,7 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-# Maximum nesting of namespaces and dictionaries. With the response around them, they must fit into XML-RPC's 64
-# levels
+# Maximum nesting of namespaces and dictionaries. With the response around them, they must fit into XML-RPC's 64 levels
 _MAX_DEPTH = 56
 
 _MAX_INT = 2**31
@@ -76,8 +75,7 @@ class ParameterTree:
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that no caller has received since their creation; only these may be modified in
-        # place.
+        # The ids of the dictionaries that no caller has received since their creation; only these may be modified in place.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # The subscribed keys, sorted so that all keys below a namespace are adjacent.
@@ -305,7 +303,7 @@ class ParameterTree:
             del self._keys[bisect_left(self._keys, key)]
 
     def _updates(self, path: list[str], setter: str | None = None) -> Iterator[ParameterUpdate]:
-        """Yield the updates that a change requires one by one, because there may be many."""
+        """Yield, one by one, the updates that a change requires; there may be many."""
         changed = _with_slash(path)
         for length in range(len(path) + 1):
             # Skip the node that set the value: it already has it.

@@ -12,8 +12,7 @@ from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
-    # Use the module that hashlib uses without OpenSSL: loading OpenSSL takes 2 ms, and in FIPS mode OpenSSL refuses
-    # MD5.
+    # Use the module that hashlib uses without OpenSSL: loading OpenSSL takes 2 ms, and in FIPS mode OpenSSL refuses MD5.
     from _md5 import md5  # type: ignore[import-not-found]
 except ImportError:
     from hashlib import md5

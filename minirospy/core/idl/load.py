@@ -101,7 +101,7 @@ class Catalogue:
         return [self.message(f"{package}/{name}") for name in sorted(names)]
 
     def services(self, package: str) -> list[ServiceSpec]:
-        """Return all services in a package, by name."""
+        """Return all services in a package, as a dict keyed by name."""
         return [self.service(f"{package}/{name}") for name in self.files(package, "srv")]
 
     def service(self, full_name: str) -> ServiceSpec:
@@ -116,7 +116,7 @@ class Catalogue:
         return parse_service(read_definition(path), package, name, str(path))
 
     def actions(self, package: str) -> list[ActionSpec]:
-        """Return all actions in a package, by name."""
+        """Return all actions in a package, as a dict keyed by name."""
         return [self.action(f"{package}/{name}") for name in self.files(package, "action")]
 
     def action(self, full_name: str) -> ActionSpec:

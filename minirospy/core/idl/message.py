@@ -488,8 +488,7 @@ def _items_of_array(name: str, type_: str, value: object, checks: Mapping[str, _
     if len(shape) < 2:
         return cast("Iterable[object]", value)
     length = type_.partition("[")[2]
-    # Serializing counts the rows first; a column of the right length then fails, because each row is taken as a
-    # number.
+    # Serializing counts the rows first; a column of the right length then fails, because each row is taken as a number.
     is_refused = checks is _CHECKS and length == str(shape[0])
     if length and (is_refused or length != str(math.prod(shape))):
         hint = ": use reshape(-1)" if is_refused and length == str(math.prod(shape)) else ""

@@ -72,8 +72,7 @@ def main() -> int:
         if not str(error):
             print(_USAGE)
             return 1
-        # Print to stderr instead of logging: no node is running yet, and a master must not be needed to report this
-        # error.
+        # Print to stderr instead of logging: no node is running yet, and a master must not be needed to report this error.
         print(f"map_saver: ERROR: {error}", file=sys.stderr)
         return 1
     if options is None:

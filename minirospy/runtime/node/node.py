@@ -151,7 +151,7 @@ class Node:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
         Waits for the master (see :meth:`Registrations.close`), or until :meth:`stop_unregistering` is called. If the master
-        does not respond, the remaining registrations stay in it. With ``announces``, a line is logged if this takes long.
+        does not respond, the remaining registrations stay in it. With ``announces``, a line is logged if this is slow.
         """
         if self._closed:
             return

@@ -101,7 +101,7 @@ class Registrations:
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
-        self._answered = 0.0  # time of the master's last response, by the loop's clock
+        self._answered = 0.0  # time of the master's last response, on the loop's clock
         self._closed = False
 
     def watch(self) -> None:
@@ -112,7 +112,7 @@ class Registrations:
         """Unregister everything, and refuse further registrations. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
+        response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this is slow.
         """
         self._closed = True
         if self.watching:
@@ -312,8 +312,7 @@ class Registrations:
 
     async def _unregister_all(self, *, announces: bool) -> None:
         """Unregister everything that the node has registered with the master, in as few calls as possible."""
-        # If a call for a name is in progress, unregister the name after that call, which could otherwise register it
-        # again.
+        # If a call for a name is in progress, unregister the name after that call, which could otherwise register it again.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
         calls = [self._unregistration(key) for key in self._known if key not in under_way]
         calls += [("unsubscribeParam", (self.uri, parameter)) for parameter in self.parameters]

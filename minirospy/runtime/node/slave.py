@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SlaveApi", "connection_text"]
 
-# Matches the shutdown reason that rosmaster and minirospy's master send to a node whose name another node has taken
-# over
+# Matches the shutdown reason that rosmaster and minirospy's master send to a node whose name another node has taken over
 _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 
 

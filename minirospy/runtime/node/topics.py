@@ -52,8 +52,7 @@ _log = logging.getLogger(__name__)
 
 SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a master that has lost its state
 
-# Number of failures before a publisher that refuses connections is reported; one that is shutting down is gone by
-# then
+# Number of failures before a publisher that refuses connections is reported; one that is shutting down is gone by then
 _WARN_AFTER = 3
 
 # maximum number of log lines about publishers that send invalid responses; further ones are only counted
@@ -162,8 +161,7 @@ class Publication:
 
         for other in self.links:
             if other.peer == link.peer and other.waiting:
-                # A node has only one connection per topic, so it has lost the old link and no longer receives frames
-                # on it.
+                # A node has only one connection per topic, so it has lost the old link and no longer receives frames on it.
                 other.close()
         # A subscriber that has received the header expects all messages published from then on, so let the link
         # accept frames before the header is sent.

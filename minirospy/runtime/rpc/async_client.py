@@ -155,8 +155,7 @@ class _Connection:
         self._loop = loop
         self.sock = sock
         self.address = address
-        # Register the file descriptor instead of the socket: asyncio formats an unregistered socket as a string,
-        # which is slow.
+        # Register the file descriptor instead of the socket: asyncio formats an unregistered socket as a string, which is slow.
         self._fd = sock.fileno()
         self.call: Call | None = None
         self.reader = HttpReader(client.max_answer)

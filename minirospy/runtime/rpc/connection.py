@@ -44,8 +44,7 @@ _LINGER_SECONDS = 2.0
 
 _SHORT_BODY = 4096  # bytes; a longer body is read in steps
 
-# Bytes; requests longer than this are processed one by one, because their values may take several times as much
-# memory.
+# Bytes; requests longer than this are processed one by one, because their values may take several times as much memory.
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (

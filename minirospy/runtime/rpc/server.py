@@ -32,7 +32,7 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
-# Maximum total bytes of all clients' incomplete requests and those being read; beyond that the largest are refused
+# Maximum total bytes of all clients' requests that are incomplete or being read; above it, the largest are refused
 MAX_HELD = 72 * 1024 * 1024
 LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are never refused because of MAX_HELD
 
@@ -117,8 +117,7 @@ class RpcServer:
         self._listening: list[socket.socket] = []
         # Sockets on which accepting is briefly paused.
         self._resting: set[socket.socket] = set()
-        # Number of connections read in this loop iteration, the deadline for reading, and whether the deadline has
-        # passed.
+        # Number of connections read in this loop iteration, the deadline for reading, and whether the deadline has passed.
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
@@ -253,8 +252,7 @@ class RpcServer:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                # No file descriptors are free: close the connection that has been silent longest, and retry a moment
-                # later.
+                # No file descriptors are free: close the connection that has been silent longest, and retry a moment later.
                 self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)

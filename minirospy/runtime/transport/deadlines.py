@@ -61,8 +61,7 @@ class Deadlines(Generic[_T]):
         loop = asyncio.get_running_loop()
         now = loop.time()
 
-        # After a stall, several limits may have passed. Process them in order of the limits, not of the calls to
-        # set().
+        # After a stall, several limits may have passed. Process them in order of the limits, not of the calls to set().
         late = sorted(
             (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
         )

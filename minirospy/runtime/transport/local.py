@@ -84,8 +84,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 def parse_answer(answer: object) -> UnixAddress | None:
     """Parse the address in a publisher's response to requestTopic. Return None if it is for another protocol."""
     match answer:
-        # A peer must not be able to choose any other socket on this machine, for example a display's or a message
-        # bus's.
+        # A peer must not be able to choose any other socket on this machine, for example a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
             return UnixAddress(name, host, port)
         case _:
@@ -97,8 +96,7 @@ def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.sock
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)
-        # A leading zero byte makes the socket abstract. Always use UTF-8, because the two processes may have
-        # different locales.
+        # A leading zero byte makes the socket abstract. Always use UTF-8, because the two processes may have different locales.
         use(sock, b"\0" + name.encode(errors="surrogatepass"))
     except BaseException:
         sock.close()

@@ -36,8 +36,7 @@ __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frame
 _TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, for frames that are read in steps
 
 _DRAIN_BYTES = 64 * 1024 * 1024
-# maximum bytes to allocate per receive, so that a large length prefix alone cannot make this process allocate much
-# memory
+# maximum bytes to allocate per receive, so that a large length prefix alone cannot make this process allocate much memory
 _CLAIM = 16 * 1024 * 1024
 
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)

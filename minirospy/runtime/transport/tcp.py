@@ -31,8 +31,7 @@ __all__ = [
     "send_header",
 ]
 
-# Maximum number of handshakes in progress. One more closes the oldest, because a genuine handshake takes only
-# milliseconds
+# Maximum number of handshakes in progress. One more closes the oldest, because a genuine handshake takes only milliseconds
 MAX_HANDSHAKES = 200
 
 _AT_HAND = 8192

@@ -26,8 +26,7 @@ class Workers:
 
     def __init__(self) -> None:
         self._work: queue.SimpleQueue[tuple[Callable[..., object], tuple[object, ...]]] = queue.SimpleQueue()
-        # Use a reentrant lock: while the main thread holds it, a signal handler may run a shutdown hook, which starts
-        # a worker.
+        # Use a reentrant lock: while the main thread holds it, a signal handler may run a shutdown hook, which starts a worker.
         self._lock = threading.RLock()
         self._idle = 0
 

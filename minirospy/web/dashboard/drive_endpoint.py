@@ -280,8 +280,7 @@ class _Driven:
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # The task that waits for subscribers still has to publish the zero velocity; it closes the topic
-            # afterwards.
+            # The task that waits for subscribers still has to publish the zero velocity; it closes the topic afterwards.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()

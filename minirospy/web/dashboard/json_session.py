@@ -61,7 +61,7 @@ class JsonSession:
     pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
 
     def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
-        """Create the session. ``handlers``: the functions that execute the operations, by name."""
+        """Create the session. ``handlers``: the functions that execute the operations, keyed by operation name."""
         self.client = client
         self.is_ended = False
         self._handlers = handlers

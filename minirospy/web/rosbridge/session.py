@@ -34,8 +34,7 @@ _log = logging.getLogger(__name__)
 # ratio of the memory of a parsed operation to that of its text, for objects and lists of numbers
 _VALUE_FACTOR = 4
 
-# maximum bytes per CBOR message from a read-only client, which only sends small requests; each byte may become a
-# value
+# maximum bytes per CBOR message from a read-only client, which only sends small requests; each byte may become a value
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4

@@ -69,7 +69,7 @@ class _LargeWork:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def close(self) -> None:
-        """Stop the thread after the work in progress, and cancel work that is queued. Idempotent."""
+        """Stop the thread once the work in progress is done, and cancel queued work. Idempotent."""
         self._is_closed = True
         if self._thread:
             self._thread.shutdown(wait=False, cancel_futures=True)
@@ -95,7 +95,7 @@ class RosbridgeShared:
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
 
     def close(self) -> None:
-        """Stop the threads after the work in progress. Idempotent."""
+        """Stop the threads once the work in progress is done. Idempotent."""
         self.in_thread.close()
         self.encode.close()
 

@@ -26,8 +26,7 @@ __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 SILENT_SECONDS = 5.0
 # maximum connections per address that are younger than SILENT_SECONDS and have sent no request; a browser opens six
 MAX_SILENT = 16
-# seconds without traffic after which a client counts as idle; the dashboard's pages send or receive something more
-# often
+# seconds without traffic after which a client counts as idle; the dashboard's pages send or receive something more often
 IDLE_SECONDS = 30.0
 FEW = 8  # an address has few connections if it holds less than an eighth of all connections
 

@@ -206,8 +206,7 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
-        # The connection is part of reference cycles: release its memory now instead of when the garbage collector
-        # runs.
+        # The connection is part of reference cycles: release its memory now instead of when the garbage collector runs.
         self._jobs.clear()
         self._output.end()
         self.site.account.close(self.share)

@@ -100,8 +100,7 @@ class Republisher:
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         task.add_done_callback(self._reporter.of_task)
-        # A rosbridge client subscribes without giving a type, so the master must know the topic before the response
-        # is sent.
+        # A rosbridge client subscribes without giving a type, so the master must know the topic before the response is sent.
         await publisher
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}

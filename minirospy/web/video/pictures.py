@@ -24,8 +24,7 @@ _FASTEST_PNG = 1
 MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarged image
 _LENGTH = struct.Struct("<I")
 _STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
-# Number of leading bytes of a file in which to search for the image's size; other data, such as a preview, may
-# precede it.
+# Number of leading bytes of a file in which to search for the image's size; other data, such as a preview, may precede it.
 _HEAD_BYTES = 100_000
 # number of rows of a numeric image to scale per step; as 64-bit numbers they take eight times the memory
 _ROWS = 256

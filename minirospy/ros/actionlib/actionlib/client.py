@@ -206,7 +206,7 @@ class ActionClient:
 
 
 def _remove(functions: list[Callable[[], object]], function: Callable[[], object]) -> None:
-    """Remove ``function`` from ``functions`` if it is there; another thread may be removing it at the same time."""
+    """Remove ``function`` from ``functions``, unless another thread has already removed it."""
     with contextlib.suppress(ValueError):
         functions.remove(function)
 

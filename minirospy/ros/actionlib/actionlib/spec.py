@@ -25,8 +25,7 @@ TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 # send_goal returns.
 SEND_SECONDS = 1e-3
 
-# Seconds for which cancel requests are delayed, because the goal, which was sent earlier on another connection, is
-# delayed too.
+# Seconds for which cancel requests are delayed, because the goal, which was sent earlier on another connection, is delayed too.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
 # Seconds for a server to reconnect after its connection has ended; after that, its goals are LOST.

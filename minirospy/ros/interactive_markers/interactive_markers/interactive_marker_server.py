@@ -170,8 +170,7 @@ class InteractiveMarkerServer:
                 self._apply(name, update, message)
             self.pending_updates = {}
             self.seq_num += 1
-            # Publish with the lock held, so that no other message is sent before the one with the new sequence
-            # number.
+            # Publish with the lock held, so that no other message is sent before the one with the new sequence number.
             self.publish(message)
         self.publishInit()
 

@@ -98,7 +98,7 @@ class StampQueue(MutableMapping[Time, object]):
         return self.order[bisect_left(self.order, first) : bisect_right(self.order, last)]
 
     def by_distance(self, stamps: Sequence[int], stamp: int) -> list[int]:
-        """Sort some of the queue's stamps by distance to ``stamp``; at equal distance, by order of arrival."""
+        """Sort some of the queue's stamps by distance to ``stamp``; stamps at equal distance stay in order of arrival."""
         ranks = {each: rank for rank, each in enumerate(self._entries)}
         return sorted(stamps, key=lambda each: (abs(each - stamp), ranks[each]))
 

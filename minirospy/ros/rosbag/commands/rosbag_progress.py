@@ -49,8 +49,7 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         DownloadColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    # Write to the wrapped stream: the commands' stdout escapes control sequences, but the bar uses them to move the
-    # cursor.
+    # Write to the wrapped stream: the commands' stdout escapes control sequences, but the bar uses them to move the cursor.
     console = Console(file=own_output())
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
         task = progress.add_task(escaped(path), total=max(total, 1))

@@ -77,8 +77,7 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # Use open_file, which does not follow symbolic links: the name contains the time, which an attacker could
-        # guess.
+        # Use open_file, which does not follow symbolic links: the name contains the time, which an attacker could guess.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 

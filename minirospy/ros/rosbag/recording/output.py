@@ -156,7 +156,7 @@ class NodeOutput:
 
     @contextlib.contextmanager
     def running(self, on_key: Callable[[str], object]) -> Iterator[None]:
-        """Shorten the GIL switch interval, and read keys, while the block runs."""
+        """Read keys while the block runs, and shorten the GIL switch interval."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
         # Exclude existing objects from garbage collection: traversing all imported modules takes milliseconds.

@@ -93,8 +93,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # Complete the file in a thread, so that Ctrl-C does not interrupt it and the process does not exit before it
-        # is done.
+        # Complete the file in a thread, so that Ctrl-C does not interrupt it and the process does not exit before it is done.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False

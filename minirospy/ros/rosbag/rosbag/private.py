@@ -148,7 +148,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position in the format of index entries and raw messages."""
+        """Return the message at a position, given in the format that index entries and raw messages use."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)

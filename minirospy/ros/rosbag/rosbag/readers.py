@@ -42,7 +42,7 @@ class _BagReader:
         raw: bool,
         return_connection_header: bool = False,
     ) -> Iterator[Any]:
-        """Yield messages as Bag.read_messages does."""
+        """Yield messages, like Bag.read_messages."""
         return self.bag.read_messages(
             topics, start_time, end_time, connection_filter, raw, return_connection_header
         )

@@ -181,8 +181,7 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # send_signal fails if the process has exited or, on Windows, has no console. There is nothing to wait for
-            # then.
+            # send_signal fails if the process has exited or, on Windows, has no console. There is nothing to wait for then.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)

@@ -26,8 +26,7 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-# maximum number of characters produced per load, because each level of args that repeat other args can double the
-# size
+# maximum number of characters produced per load, because each level of args that repeat other args can double the size
 _MAX_SUBSTITUTED = 64 * 1024 * 1024
 _MAX_SHOWN = 200  # maximum length of a string quoted in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")

@@ -164,7 +164,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Sleep. Raise KeyboardInterrupt if stop() is called meanwhile."""
+        """Sleep. Raise KeyboardInterrupt if stop() is called during the sleep."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:

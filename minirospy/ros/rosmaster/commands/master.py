@@ -191,8 +191,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Reject an empty value, which may come from an unset variable: it would give every address access to the
-        # master.
+        # Reject an empty value, which may come from an unset variable: it would give every address access to the master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:

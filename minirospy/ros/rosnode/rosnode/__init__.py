@@ -276,7 +276,7 @@ def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
 
 
-# The following private functions of ROS's rosnode are called by programs.
+# Programs call the following private functions of ROS's rosnode.
 
 
 def _run_verb(name: str, argv: Sequence[str]) -> int | None:

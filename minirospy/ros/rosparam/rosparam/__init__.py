@@ -239,7 +239,7 @@ def yamlmain(argv: Sequence[str] | None = None) -> None:
         sys.exit(status)
 
 
-# The following private functions of ROS's rosparam are called by programs.
+# Programs call the following private functions of ROS's rosparam.
 
 
 def _run_verb(name: str, argv: Sequence[str]) -> None:

@@ -181,7 +181,7 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
         sys.exit(status)
 
 
-# The following private functions of ROS's rosservice are called by programs.
+# Programs call the following private functions of ROS's rosservice.
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:

@@ -291,7 +291,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
-# The following private functions of ROS's rostopic are called by programs.
+# Programs call the following private functions of ROS's rostopic.
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:

@@ -42,7 +42,7 @@ class Concurrence(Container):
         """Create the container. ``outcome_map`` maps an outcome to a dict from label to that state's outcome.
 
         ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states).
-        If it returns a truthy value, the other states are preempted.
+        If it returns a true value, the other states are preempted.
         """
         known = list(outcomes)
         super().__init__(known, input_keys, output_keys)
@@ -264,7 +264,7 @@ class Concurrence(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add ``userdata`` to the container's userdata; ``initial_states`` has no effect, because all states start."""
+        """Add ``userdata`` to the container's userdata; ``initial_states`` has no effect, because all states are started."""
         if 0 < len(initial_states) < len(self._states):
             logwarn(
                 "Attempting to set initial states in Concurrence container, but Concurrence children are always all "

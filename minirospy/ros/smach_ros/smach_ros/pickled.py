@@ -113,8 +113,7 @@ def _classes(name: str, kind: str) -> tuple[Any, ...]:
 
 def _check_dtype(target: Any, state: Any) -> None:
     """Raise UnpicklingError unless the state leaves a numpy dtype unchanged except for its byte order."""
-    # Allow only the values that numpy itself writes: it would accept any string size, even a negative one, and any
-    # flags.
+    # Allow only the values that numpy itself writes: it would accept any string size, even a negative one, and any flags.
     size, alignment = (target.itemsize, target.alignment) if target.kind in _TEXTS else (-1, -1)
     allowed = [(3, order, None, None, None, size, alignment, target.flags) for order in "<>=|"]
     if target.kind not in _SIMPLE or tuple(state) not in allowed:

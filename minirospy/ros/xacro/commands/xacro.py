@@ -42,8 +42,7 @@ def _xacro(words: Sequence[str]) -> int:
         ) from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
-        # Write UTF-8 regardless of the system's code page: a robot description is UTF-8, and roslaunch reads it as
-        # such.
+        # Write UTF-8 regardless of the system's code page: a robot description is UTF-8, and roslaunch reads it as such.
         sys.stdout.reconfigure(encoding="utf-8")
     evaluate = xacro.eval_extension
 
