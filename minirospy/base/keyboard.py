@@ -11,7 +11,7 @@ from typing import ClassVar
 
 __all__ = ["LOOK_SECONDS", "Keys"]
 
-LOOK_SECONDS = 0.05  # seconds that Keys.next waits for a key
+LOOK_SECONDS = 0.05  # seconds for which Keys.next waits for a key
 
 
 class Keys:

@@ -48,7 +48,7 @@ START_PATIENCE = 30.0
 
 ANSWER_PATIENCE = 40.0  # seconds to wait for a response; longer than it takes to replace a dead server
 
-CLOSE_PATIENCE = 0.5  # seconds that close() waits for the last outputs to arrive
+CLOSE_PATIENCE = 0.5  # seconds for which close() waits for the last outputs to arrive
 
 # maximum number of requests in progress; above it, an output waits for the server
 MAX_UNACKNOWLEDGED = 10_000

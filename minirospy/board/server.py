@@ -40,7 +40,7 @@ from minirospy.board.protocol import (
 
 __all__ = ["main"]
 
-LINGER = 1.5  # seconds that a board without clients waits for the next client
+LINGER = 1.5  # seconds for which a board without clients waits for the next one
 
 SAVE_AFTER = 0.05
 """Delay in seconds before a change is saved, so that even a fast-blinking LED causes at most 20 writes a second."""

@@ -167,7 +167,7 @@ class Ros2Side(Protocol):
         """Return the names and namespaces of all nodes except for bridges."""
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of nodes other than this bridge, and their types."""
+        """Return the services of all nodes except this bridge, with their types."""
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""

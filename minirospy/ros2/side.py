@@ -205,7 +205,7 @@ class RclpySide:
         return [(str(name), str(space)) for name, space in found if not name.startswith(BRIDGE_PREFIX)]
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of nodes other than this bridge, and their types."""
+        """Return the services of all nodes except this bridge, with their types."""
         # The list also contains services that have only clients.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):

@@ -47,7 +47,7 @@ CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
-    """An endpoint in the arguments that could never work."""
+    """Raised for an endpoint in the arguments that can never work."""
 
     def __init__(self, endpoint: str, reason: str) -> None:
         super().__init__(f"[{escaped(endpoint)}] {reason}")
@@ -214,7 +214,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the endpoints' hosts that do not resolve at present.
+    """Return the endpoints' hosts that currently do not resolve.
 
     The hosts may resolve later, for example once mDNS runs. Blocks.
     """

@@ -81,7 +81,7 @@ class _Rewriting:
         return self._written + len(self._waiting) - self._read
 
     def copy_until(self, position: int) -> None:
-        """Copy the file's bytes up to a position, and move them if necessary."""
+        """Copy the file's bytes up to a position, moving them if necessary."""
         if not self.shift and not self._waiting:
             self._read = self._written = position
         while self._read < position:

@@ -189,7 +189,7 @@ class Registry:
         return self._updates(*published)
 
     def set_type(self, topic: str, type_: str) -> None:
-        """Set the type of a topic that has no registrations at present."""
+        """Set the type of a topic that currently has no registrations."""
         self._types.keep(topic, type_)
 
     # --- queries

@@ -134,7 +134,7 @@ class _Position(NamedTuple):
         return self.after(-self.remainder % width) if width <= self.modulus else _Position(width, 0)
 
     def padding(self, width: int) -> int | None:
-        """Return the number of bytes to the next multiple of ``width``; None if it depends on the message."""
+        """Return the number of bytes to the next multiple of ``width``, or None if it depends on the message."""
         return -self.remainder % width if width <= self.modulus else None
 
     def or_(self, other: _Position) -> _Position:

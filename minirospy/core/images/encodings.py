@@ -102,7 +102,7 @@ def _kind(encoding: str) -> str:
 
 
 def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image with another encoding's channels, but the depth unchanged."""
+    """Convert an image's channels to another encoding's, without changing the depth."""
     import numpy as np
 
     if source == _YUV and wanted.startswith("mono"):

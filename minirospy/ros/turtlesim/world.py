@@ -20,7 +20,7 @@ BACKGROUND = Color(69, 86, 255)  # background if the parameters set no other col
 
 STEP_SECONDS = 0.016  # seconds between two steps
 
-_COMMAND_SECONDS = 1.0  # seconds that a velocity command stays in effect
+_COMMAND_SECONDS = 1.0  # seconds for which a velocity command stays in effect
 
 _PIXELS_PER_METRE = 45.0
 

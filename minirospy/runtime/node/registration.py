@@ -94,7 +94,7 @@ class Registrations:
         self.watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
-        """The object registered with the master, keyed by kind and name; None if the call has failed or is in progress."""
+        """The objects registered with the master, keyed by kind and name; None marks a call that failed or is in progress."""
         self.taken: set[_Key] = set()
         """Services that another node has registered since, so the master's entry is that node's."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()

@@ -127,7 +127,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Remove a connection that has closed from the idle ones."""
+        """Remove a closed connection from the idle ones."""
         connection.close()
         kept = self.idle[connection.address]
         kept.remove(connection)

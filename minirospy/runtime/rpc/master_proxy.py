@@ -18,7 +18,7 @@ __all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_
 
 
 class SystemState(NamedTuple):
-    """Publishers, subscribers and service providers: for each, a dict from topic or service name to node names."""
+    """The publishers, subscribers and service providers, each as a dict from topic or service name to node names."""
 
     publishers: dict[str, list[str]]
     subscribers: dict[str, list[str]]

@@ -14,7 +14,7 @@ from minirospy.runtime.transport.limits import naming_thread_limit
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
-CLOSE_SECONDS = 2.0  # seconds that :meth:`LoopThread.close` waits for the loop's tasks to finish
+CLOSE_SECONDS = 2.0  # seconds for which :meth:`LoopThread.close` waits for the loop's tasks to finish
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:

@@ -114,7 +114,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Query this before reading, so that the file contains everything that the node wrote before it exited.
+        # Check for the exit before reading, so that the file contains everything that the node wrote before it exited.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -163,7 +163,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches, if any of them has changed, and the log's new lines."""
-        # Query this before sending, so that a change in the meantime triggers another call.
+        # Check this before sending, so that a change in the meantime triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()

@@ -126,7 +126,7 @@ class Recording:
 
     def state(self) -> RecordingState:
         """Return the current state."""
-        # Query this first, because the size is final only after the exit.
+        # Query the exit status first, because the size is final only after the exit.
         status = self._process.exit_code
         size = 0
         for path in self._paths:

@@ -30,7 +30,7 @@ __all__ = ["FairTurns", "Share", "cpu_meter"]
 _log = logging.getLogger(__name__)
 
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
-# seconds of one client's work before the next client's work; with 250 clients the wait is 25 ms
+# seconds of work for one client before the next client's turn; with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
 # number of jobs for which a client counts as new; until then, its jobs are expected to take as long as those of other
 # new clients

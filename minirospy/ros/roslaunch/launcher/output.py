@@ -69,7 +69,7 @@ class Output:
         stream = sys.stderr if level == ERROR else sys.stdout
         # Write each line in one call, because nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # Even if the reader of the output (`| head`) has exited, terminate the nodes in order.
+        # Even if the reader of the output (`| head`) has exited, terminate the nodes in the right order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()

@@ -199,7 +199,7 @@ def end_processes(
 
 
 def _own_group() -> _Group:
-    """Return the options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in order."""
+    """Return the options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in the right order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}

@@ -110,7 +110,7 @@ class ROSLaunchRunner:
             monitor.close()
             raise
         monitor.watch()
-        # If the program exits without calling stop(), still terminate the launched processes in order.
+        # If the program exits without calling stop(), still terminate the launched processes in the right order.
         atexit.register(self._end_with_program)
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 

@@ -55,7 +55,7 @@ _run = _Run()
 
 
 class RosTestCase(unittest.TestCase):
-    """Declares the attributes of :func:`createUnitTest`'s classes. Programs may also define such classes."""
+    """Declares the attributes of the classes that :func:`createUnitTest` returns. Programs may also define such classes."""
 
     config: ROSLaunchConfig
     test_file: str
