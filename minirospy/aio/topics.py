@@ -251,8 +251,7 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # `async for ... break` discards the subscription without closing it, so leave the topic when the subscription
-        # is garbage-collected.
+        # Leave the topic when the subscription is garbage-collected: `async for ... break` discards it without closing it.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 

@@ -26,8 +26,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
     The command line works in sh, cmd.exe and PowerShell. ``upgrade``: replace an installed version that is too old.
     """
-    # Import these modules here, where they are needed only to describe an error. Commands do not load them if no
-    # library is missing.
+    # Import these modules here, because only this error message needs them.
     import importlib.util
     import sysconfig
 
@@ -42,8 +41,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     if importlib.util.find_spec("pip") is None:
         return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
 
-    # In an externally managed environment (PEP 668), pip requires this option; the user also needed it to install
-    # minirospy.
+    # If the environment is externally managed (PEP 668), pip requires this option, as it did to install minirospy.
     marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
     if sys.prefix == sys.base_prefix and marker.is_file():
         option += " --break-system-packages"

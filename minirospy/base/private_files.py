@@ -37,8 +37,7 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     single hard link. With O_TRUNC the file is truncated only after these checks.
     """
     if os.path.islink(path):
-        # Check for a link explicitly: Windows has no O_NOFOLLOW. On other systems, the check only makes the error
-        # clearer.
+        # Check for a link explicitly: Windows has no O_NOFOLLOW. On other systems, the check only makes the error clearer.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
     file = os.open(path, (flags & ~os.O_TRUNC) | OPEN_FLAGS, mode)

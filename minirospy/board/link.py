@@ -185,8 +185,8 @@ class Link:
                 return None
             now = time.time()
             edges = []
-            # A killed server may not have saved the last changes. Repeat the setup of this process's pins, with their
-            # last levels in the mirror.
+            # A killed server may not have saved the last changes.
+            # Repeat the setup of this process's pins, with their last levels in the mirror.
             for pin in sorted(self._mine):
                 state = self.states[pin]
                 latch = state.latch if state.function is Function.OUT else None
@@ -279,9 +279,8 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 but no server responds: the new server exited because another one was still running, which has
-            # exited since. Negative status: a Ctrl-C for this process killed the new server before it had detached
-            # from the terminal.
+            # Status 0 without a responding server: the new server exited because of another one, which has exited since.
+            # Negative status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)

@@ -55,8 +55,7 @@ def main(argv: list[str]) -> int:
     """Serve the board NAME in FOLDER until it has no clients; return 0, also if another server is running."""
     directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
-        # Windows only: do not keep the log file open (other systems do), because neither the file nor its folder
-        # could then be removed.
+        # Windows only: do not keep the log file open, because an open file and its folder cannot be removed there.
         sys.stderr = _LogOnDemand(directory.log_path)
     # A board with saved state is not temporary, even if another process restarts it.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()

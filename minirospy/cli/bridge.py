@@ -291,8 +291,8 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     is_any = options.address in ("0.0.0.0", "::")
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
-        # localhost may resolve to ::1, where another user's server would receive the token. This cannot happen with a
-        # certificate, which identifies the server.
+        # localhost may resolve to ::1, where another user's server would receive the token.
+        # With a certificate this cannot happen, because it identifies the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     print(f"Foxglove protocol at {found.websocket[0]}", flush=True)

@@ -155,8 +155,7 @@ __all__ = [
     "wait_for_service",
 ]
 
-# Do this before the first message is imported: if ROS 2 is sourced, its packages with the same names come first on
-# the path.
+# Do this before the first message is imported: if ROS 2 is sourced, its packages of the same names come first on the path.
 prefer_ros1()
 find_packages_named_like_scripts()
 

@@ -30,8 +30,8 @@ class Identity:
 
     def __init__(self, previous: Identity | None = None) -> None:
         """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
-        # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node. Programs
-        # may change this dict and `mappings`
+        # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node.
+        # Programs may change this dict and `mappings`.
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
         # The namespace set by the program, or None

@@ -105,8 +105,8 @@ class Lifecycle:
         Return False, without waiting, if a shutdown is already in progress.
         """
         with self.deferral:
-            # Enter the deferral before claiming the shutdown. Otherwise a second signal right after the claim would
-            # leave the shutdown claimed but never performed.
+            # Enter the deferral before claiming the shutdown.
+            # Otherwise a second signal right after the claim would leave the shutdown claimed but never performed.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)

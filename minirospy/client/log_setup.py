@@ -158,8 +158,8 @@ def _log_to_file(session: Session, path: Path) -> None:
     root = logging.root
     if not root.handlers:
         root.setLevel(logging.INFO)
-    # Keep handlers that the program has added to the root logger (basicConfig), although rospy removes them. Filter
-    # them so that rosout lines do not appear on the terminal twice.
+    # Keep handlers that the program has added to the root logger (basicConfig), although rospy removes them.
+    # Filter them so that rosout lines do not appear on the terminal twice.
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)

@@ -186,8 +186,7 @@ class PublishedTopic(SharedTopic):
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Set this before registering: a subscriber may connect immediately, and publish() must work even before
-            # the master's response.
+            # Set this before registering: a subscriber may connect, and publish() must work, before the master responds.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
@@ -195,8 +194,7 @@ class PublishedTopic(SharedTopic):
     def leave(self, handle: Publisher[Message]) -> None:
         with self._session.lock:
             self._handles.discard(handle)
-            # After a fork, or after init_node has created another node, the session's table no longer contains this
-            # topic.
+            # After a fork, or after init_node has created another node, the session's table no longer contains this topic.
             if self._handles or self._session.published.get(self.resolved_name) is not self:
                 return
             del self._session.published[self.resolved_name]

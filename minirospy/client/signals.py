@@ -129,8 +129,7 @@ class SignalWatchdog:
         self._deferral.pending = True
         self._handled += 1
         if self._sending is not None:
-            # Wake the watchdog, even if an event loop has replaced the file descriptor. Send 0, which is not a signal
-            # number.
+            # Wake the watchdog, even if an event loop has replaced the file descriptor. Send 0, which is not a signal number.
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
 
@@ -217,8 +216,8 @@ class SignalWatchdog:
         self._number = int(signal.SIGINT)
         handler = signal.getsignal(self._number)
         if hasattr(sys, "ps1") or not callable(handler):
-            # Do not interrupt an interactive session: the user would lose its variables. Do not send a signal that is
-            # ignored or that would terminate the process.
+            # Do not interrupt an interactive session: the user would lose its variables.
+            # Do not send a signal that is ignored or that would terminate the process.
             self._machine.drop_request()
             return
 
@@ -234,8 +233,8 @@ class SignalWatchdog:
         """Run the handler in the main thread, interrupting its system call, if any."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
-                # Do not send a second nudge before the first has arrived: the handler counts signals, but the system
-                # merges undelivered ones.
+                # Do not send a second nudge before the first has arrived.
+                # The handler counts signals, but the system merges undelivered ones.
                 return
             self._nudges += 1
             self._is_nudge = True

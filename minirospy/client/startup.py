@@ -140,8 +140,7 @@ def _install_process_hooks() -> None:
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []
 
-        # Python drops a signal that reaches the child before the child is set up; Pool.terminate() would then wait
-        # forever.
+        # Python drops a signal that reaches the child before the child is set up; Pool.terminate() would then wait forever.
         def block_signals() -> None:
             mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
 
@@ -162,8 +161,7 @@ def _leave_with_child_process() -> None:
     """
     process, util = (sys.modules.get(f"multiprocessing.{name}") for name in ("process", "util"))
     if process and util and process.parent_process() is not None:
-        # Use a high priority so that the node, as with atexit, leaves the graph before the process joins its own
-        # children.
+        # Use a high priority: as with atexit, the node must leave the graph before the process joins its own children.
         util.Finalize(None, lambda: current_session().shut_down_at_exit(), exitpriority=100)
 
 

@@ -83,8 +83,7 @@ class Subscriber(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, queue_size, buff_size, tcp_nodelay)
-            # Read the links after joining. A message on a link that opens in the meantime may then be delivered
-            # twice, but is not lost.
+            # Read the links after joining: a message on a link that opens meanwhile may be delivered twice, but is not lost.
             links = state.links
         self.impl = state
 

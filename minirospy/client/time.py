@@ -251,8 +251,8 @@ class Timer(threading.Thread):
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:
-                    # A callback that is not a function cannot be called again, so stop. During a shutdown, ignore
-                    # errors in the callback.
+                    # A callback that is not a function cannot be called again, so stop.
+                    # During a shutdown, ignore errors in the callback.
                     if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
                         raise
                     session.callback_errors.log(self._callback, error)

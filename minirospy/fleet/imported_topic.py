@@ -239,8 +239,8 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # Forget the local copy, which may become outdated; the robot resends its latched message to the next
-            # subscriber.
+            # Forget the local copy, which may become outdated.
+            # The robot resends its latched message to the next subscriber.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
@@ -264,8 +264,8 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart when the robot reopens the topic, so a step back or a huge step forward does not
-            # mean lost messages.
+            # The numbers restart when the robot reopens the topic.
+            # A step back or a huge step forward therefore does not mean lost messages.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()

@@ -368,8 +368,7 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
-                    # By default, Zenoh withholds all replies until the last one has arrived or the timeout has
-                    # expired.
+                    # By default, Zenoh withholds all replies until the last one has arrived or the timeout has expired.
                     "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,

@@ -85,8 +85,8 @@ class Ros1Side:
 
         ``hidden`` contains the names of robots whose topics are imported; ``namespace`` is the keys' namespace.
         """
-        # Exclude /rosout_agg, which repeats /rosout: if both were forwarded, each log message would come back to its
-        # own master.
+        # Exclude /rosout_agg, which repeats /rosout.
+        # If both were forwarded, each log message would come back to its own master.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace

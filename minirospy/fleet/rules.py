@@ -112,8 +112,9 @@ class Throttle:
         """Return whether a message may be sent at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time instead of the current time: otherwise a limit of 10 Hz would pass only 7.5
-        # of 30 messages per second. After a pause, start again from the current time.
+        # Add the period to the due time instead of the current time.
+        # Otherwise a limit of 10 Hz would pass only 7.5 of 30 messages per second.
+        # After a pause, start again from the current time.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period

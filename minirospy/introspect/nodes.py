@@ -221,8 +221,8 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     # Use the node's name as the caller_id: the master removes only the caller's own registrations.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # Topics are unregistered by the node's URI, services by their own URI. If the node's name still has this URI
-        # after the services were looked up, none of them can belong to a newer node.
+        # Topics are unregistered by the node's URI, services by their own URI.
+        # If the node's name still has this URI after the services were looked up, none of them belongs to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:

@@ -163,8 +163,8 @@ def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Count
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # A row from rospy ends with messages and connected; one from roscpp with bytes of messages, messages
-                # and connected.
+                # rospy's rows end with messages and connected.
+                # roscpp's end with bytes of messages, messages and connected.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

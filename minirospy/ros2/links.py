@@ -97,8 +97,7 @@ def links(
         readers = [end for end in ros2[topic].subscribers if not is_bridge(end.node)]
 
         if publishers and readers and type_ is not None:
-            # A subscriber with transient local durability only receives messages from publishers with the same
-            # durability.
+            # A subscriber with transient local durability only receives messages from publishers that have it, too.
             keeps = any(end.is_transient_local for end in readers)
             latched = keeps or any(is_latched(topic, node) for node in publishers)
             found.append(Link(topic, Direction.TO_ROS2, type_, _type_of(readers, type_), latched))

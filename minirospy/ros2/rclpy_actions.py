@@ -136,8 +136,8 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Create the feedback subscription before the client: a server that has discovered the client's last endpoint
-        # has then discovered this one, too.
+        # Create the feedback subscription before the client.
+        # A server that has discovered the client's last endpoint has then discovered the subscription, too.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -319,8 +319,8 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # rclpy's constructor adds the server to the executor before it creates the logger; the executor may call the
-        # server with a goal in between.
+        # rclpy's constructor adds the server to the executor before it creates the logger.
+        # In between, the executor may call the server with a goal.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,

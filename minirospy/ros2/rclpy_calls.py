@@ -204,8 +204,7 @@ class Calls:
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
-            # If another process has a node of the same name, its response would not prove that this node has been
-            # reached.
+            # If another process has a node of the same name, its response would not prove that this node has been reached.
             if {_process(each) for each in self._writers(name)} != {_process(server)}:
                 return None
             names.add(name)

@@ -50,8 +50,7 @@ class ZenohClient:
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
-        # Send requests in a thread: on a slow network, sending may block for seconds, which would block the event
-        # loop.
+        # Send requests in a thread: on a slow network, sending may block for seconds, which would block the event loop.
         self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 

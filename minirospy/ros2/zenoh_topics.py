@@ -48,8 +48,7 @@ class ZenohPublisher(Handle):
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
-    # Count only remote subscribers, because the bridge's own subscription to the topic ignores this session's
-    # messages.
+    # Count only remote subscribers: the bridge's own subscription to the topic ignores this session's messages.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)

@@ -93,8 +93,7 @@ class SharedTopic:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # If the topic is being unsubscribed, its connections are still open, and they do not deliver the latched
-        # messages again.
+        # If the topic is being unsubscribed, its connections are still open and do not deliver the latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -300,8 +299,7 @@ class SharedGraph:
         pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
-        # Check the task, because asyncio.wait_for before Python 3.12 may lose a cancellation that coincides with the
-        # event.
+        # Check the task: before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the event.
         task = asyncio.current_task()
         while self._watching is task:
             self._refresh_soon.clear()

@@ -69,8 +69,7 @@ def width_of(text: str) -> int:
     if text.isascii():
         return 1
     if len(text) == 1:
-        # Do not use sys.getsizeof() of a single-character string, because from Python 3.12 on it includes the
-        # string's UTF-8 copy.
+        # Do not use sys.getsizeof() of a single-character string: since Python 3.12 it includes the string's UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
     # For longer strings, such a UTF-8 copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)

@@ -304,8 +304,8 @@ def configured(options: NetworkOptions) -> Config:
         put("mode", "router" if listens else "peer" if options.scouts else "client")
     mode = json.loads(config.get_json("mode"))
     put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router keeps retrying. A client that has no router fails to open, and its caller tries
-    # again.
+    # A gateway that loses its router keeps retrying.
+    # A client that has no router fails to open, and its caller tries again.
     for key, value in (
         ("connect/timeout_ms", CONNECT_MS if mode == "client" else -1),
         ("connect/exit_on_failure", mode == "client"),
@@ -314,8 +314,8 @@ def configured(options: NetworkOptions) -> Config:
         ("transport/unicast/accept_pending", 1000),
         # Keep-alive messages per lease of 10 s. One fewer than Zenoh's default is enough, because TCP retransmits lost data.
         ("transport/link/tx/keep_alive", 3),
-        # Data in the kernel's buffer is sent before any data of higher priority. With this size, it takes some 0.3 s
-        # at 4 Mbit/s instead of 1.3 s.
+        # Data in the kernel's buffer is sent before any data of higher priority.
+        # With this size, it takes some 0.3 s at 4 Mbit/s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
         # Shared memory would pass large messages between local gateways through /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),

@@ -364,8 +364,8 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # A list or dictionary can be written on one line. Skip long values: nobody edits a whole robot description on a
-    # command line.
+    # A list or dictionary can be written on one line.
+    # Skip long values: nobody edits a whole robot description on a command line.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 

@@ -179,8 +179,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
     view, streams = memoryview(data), 0
     stream: bz2.BZ2Decompressor | None = None
-    # Pass the data in parts: each stream copies the data that follows it, which a million short streams would do a
-    # million times.
+    # Pass the data in parts: each stream copies the data after it, which is slow for a million short streams.
     for start in range(0, len(data), _INPUT):
         part: Buffer = view[start : start + _INPUT]
         while part:

@@ -111,8 +111,9 @@ class McapReader(BagReader):
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
         selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
-        # Read a chunk when its first message may be the next one. This loads each chunk's data once, and keeps
-        # several chunks in memory only if they overlap in time. Positions are unique, so runs are never compared.
+        # Read a chunk when its first message may be the next one.
+        # This loads each chunk only once, and keeps several chunks in memory only if they overlap in time.
+        # Positions are unique, so runs are never compared.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
         while heap:

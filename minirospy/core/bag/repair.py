@@ -209,8 +209,7 @@ class Repair:
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
-            # The size in a chunk's header is filled in at the end, so the writer was killed before it completed this
-            # chunk.
+            # A chunk's size is written to its header at the end, so the writer was killed before it completed this chunk.
             raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)

@@ -186,8 +186,9 @@ class ParameterTree:
         left = _STEP_ITEMS
         root = self.get("/")
         assert isinstance(root, dict)
-        # The namespaces that contain the current item. Do not use a recursive function: such a closure forms a
-        # reference cycle with its list, and the master's garbage collector does not examine old objects.
+        # The namespaces that contain the current item.
+        # Do not use a recursive function: its closure and this list would form a reference cycle.
+        # The master's garbage collector does not examine old objects.
         around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
 
         while around:

@@ -103,8 +103,7 @@ class TransformBuffer(FrameTree):
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         fixed_frame = self._frames.get(fixed)
         if target_frame is None or source_frame is None:
-            # If the source frame is missing, report the fixed frame as missing: tf2 does so because it tests the
-            # wrong frame.
+            # If the source frame is missing, report the fixed frame as missing: tf2 does so because it tests the wrong frame.
             missing = "" if source_frame else f" fixed_frame: {fixed}does not exist."
             return self._unknown(target, source) + missing
         if fixed_frame is None:

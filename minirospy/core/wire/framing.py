@@ -201,8 +201,7 @@ class FrameReader:
         """Return the memory for the next bytes. It is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
-                # Let the buffer grow as bytes arrive, so that a length prefix alone cannot make this process allocate
-                # all of the memory.
+                # Let the buffer grow as bytes arrive, because a length prefix alone must not allocate all of the memory.
                 grown = bytearray(min(self._wanted, 2 * len(self._large)))
                 grown[: self._filled] = self._large
                 self._large = grown

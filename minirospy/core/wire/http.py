@@ -372,8 +372,7 @@ def _read_head(data: bytes) -> HttpHead:
     headers: dict[str, str] = {}
     for line in lines:
         name, separator, value = line.partition(":")
-        # Reject spaces before the colon: a proxy that reads them differently would see another request (request
-        # smuggling).
+        # Reject spaces before the colon: a proxy that reads them differently would see another request (request smuggling).
         if not separator or not name or name[-1] in " \t" or name[0] in " \t":
             raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
         name, value = name.lower(), value.strip()

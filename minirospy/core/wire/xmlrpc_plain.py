@@ -59,8 +59,7 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
 
     params: list[object] = []
     add: Callable[[object], None] = params.append
-    # The open elements, each with the start of its end tag, the function that adds it to the enclosing value, and its
-    # contents.
+    # The open elements: for each, its end tag's start, the function that adds it to the enclosing value, and its contents.
     opened: list[tuple[str, Callable[[object], None], Any]] = []
 
     for text, param_text, bare, param_bare, other in tokens:

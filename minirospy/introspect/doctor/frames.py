@@ -74,8 +74,8 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers have stopped together with the node, so ``seen`` no longer changes. In simulated time, stamps cannot
-    # be compared with arrival times.
+    # The workers have stopped together with the node, so ``seen`` no longer changes.
+    # In simulated time, stamps cannot be compared with arrival times.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 

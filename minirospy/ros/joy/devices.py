@@ -78,8 +78,8 @@ class LinuxDevice:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # The first events report the current state. After the first open(), they may report the state at the last
-            # close() instead, so open the device twice.
+            # The first events report the current state, but after the first open() they may report that at the last close().
+            # So open the device twice.
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:

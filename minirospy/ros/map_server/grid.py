@@ -66,8 +66,8 @@ class MapSettings(NamedTuple):
 def read_settings(text: str) -> MapSettings:
     """Return the settings in a map's YAML file. If they are invalid, raise MapError with the real program's message."""
     try:
-        # Load all scalars as strings, because yaml-cpp differs from YAML 1.1: it accepts `1e-3` as a number and
-        # rejects `false`.
+        # Load all scalars as strings.
+        # yaml-cpp differs from YAML 1.1: it accepts `1e-3` as a number and rejects `false`.
         found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)

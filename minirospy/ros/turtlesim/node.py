@@ -165,8 +165,7 @@ class Simulator:
         with self._changing:
             with self.lock:
                 self.world.remove_all()
-            # Reuse the topics of an earlier turtle with the same name, so that their subscribers receive every
-            # message.
+            # Reuse the topics of an earlier turtle with the same name, so that their subscribers receive every message.
             first = self._add(self.world.spawn_first)
             for name in set(self._ends) - {first}:
                 self._remove(name)

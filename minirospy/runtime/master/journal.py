@@ -94,8 +94,7 @@ class Journal:
         # During an incremental rewrite: the records appended since it started, and the new file's descriptor.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Counts the incremental rewrites that have finished or been abandoned, so that a rewrite can tell whether it
-        # was abandoned.
+        # Counts the rewrites in steps that have finished or been abandoned; a rewrite compares it to see if it was abandoned.
         self._rewrites = 0
 
     @property
@@ -155,8 +154,7 @@ class Journal:
             # On Windows, the file may already be closed.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # Remove the incomplete new file to free space on a full disk, because appending to the old file may need
-            # it.
+            # Remove the incomplete new file to free space on a full disk: appending to the old file may need it.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise
@@ -171,8 +169,8 @@ class Journal:
         try:
             if record[0] == "put":
                 if record[2] not in self._stored:
-                    # The disk failed in the meantime. The parts of the value were lost with the old file, so write
-                    # everything again.
+                    # The disk failed in the meantime, and the parts of the value were lost with the old file.
+                    # Write everything again.
                     self.rewrite()
                     return
                 self._stored.discard(record[2])

@@ -117,8 +117,8 @@ class LogFile(LogFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master. Discard the stream; closing it normally would fail again
-                # because of its unwritten data.
+                # A full disk must not stop the master.
+                # Discard the stream; closing it normally would fail again because of its unwritten data.
                 if self.stream:
                     with contextlib.suppress(OSError, ValueError):
                         self.stream.close()

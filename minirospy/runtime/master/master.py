@@ -49,8 +49,7 @@ _MAX_CONCURRENT_CHECKS = 100
 QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 LOCK_SECONDS = 3.0
-# Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's
-# lock
+# Seconds between attempts to lock the journal: the system may release a killed master's port before the lock
 _LOCK_PAUSE = 0.02
 
 # maximum age of a killed master's journal at which a new master still resumes its session

@@ -169,8 +169,8 @@ class Node:
             return_exceptions=True,
         )
 
-        # Close the Unix socket before the port. Otherwise the next server on that port could not bind the socket's
-        # name.
+        # Close the Unix socket before the port.
+        # Otherwise the next server on that port could not bind the socket's name.
         await close_all([self.unix_listener.close, self.listener.close])
         tables = (self.publications, self.subscriptions, self.services)
         close_each([part.close for table in tables for part in table.values()])

@@ -32,8 +32,7 @@ from minirospy.runtime.transport.workers import InOrder, Workers
 __all__ = ["Registrations"]
 
 _log = logging.getLogger(__name__)
-# Time limit in seconds for a call. It is long, because many nodes that start at the same time on a small computer
-# delay each other
+# Time limit in seconds for a call; long, because many nodes that start together on a small computer delay each other
 _CALL_SECONDS = 30.0
 
 # Time limit in seconds for checking whether this node is registered. It is short, because the check is repeated soon
@@ -193,8 +192,8 @@ class Registrations:
     def _has_registered(self, task: asyncio.Task[None]) -> None:
         self._registering.discard(task)
         if not task.cancelled():
-            # Retrieve the task's exception, because asyncio logs exceptions that are never retrieved. A caller that
-            # is waiting also receives it; otherwise it is ignored, because the call will be retried.
+            # Retrieve the task's exception, because asyncio logs exceptions that are never retrieved.
+            # A caller that is waiting also receives it. Otherwise it is ignored: the call will be retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -265,8 +264,8 @@ class Registrations:
             try:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
-                        # As in ROS, a service belongs to the node that registered it last, so this entry says nothing
-                        # about this node's registration.
+                        # As in ROS, a service belongs to the node that registered it last.
+                        # The entry therefore says nothing about this node's registration.
                         self.taken.add(asked)
                         continue
                 else:
@@ -277,8 +276,8 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # A missing entry proves nothing if the name has been unregistered since, or is illegal: the master
-                # always refuses illegal names.
+                # A missing entry proves nothing if the name has been unregistered since.
+                # It also proves nothing for an illegal name, which the master always refuses.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
             except RpcError as error:

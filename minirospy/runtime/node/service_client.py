@@ -83,8 +83,7 @@ class ServiceClient:
         responses need only one wait. If the server sends no header, it has not started to process the request.
         """
         try:
-            # Do this only on a Unix socket, which only minirospy's servers use: rospy may lose data that arrives
-            # together with a header.
+            # Only do this on a Unix socket, which only minirospy uses: rospy may lose data that arrives together with a header.
             if request is not None and len(request) < _RECEIVE and self._sock.family not in sockets.FAMILIES:
                 self._send(request)
                 self._is_asked = True
@@ -115,8 +114,8 @@ class ServiceClient:
 
     def has_ended(self) -> bool:
         """Return whether the server has disconnected and would not read another request."""
-        # A server sends data only in response to requests, so a readable socket means end of file. Reuse the poll
-        # object, because each call does this check.
+        # A server sends data only in response to requests, so a readable socket means end of file.
+        # Reuse the poll object, because each call does this check.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:

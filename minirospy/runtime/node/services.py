@@ -252,8 +252,8 @@ class LoopServiceServer(ServiceServer):
             # A task that raises SystemExit would end the asyncio loop, and with it everything that the node does.
             return self._failure(error)
         except asyncio.CancelledError:
-            # Either this task was cancelled or an operation awaited by the handler was; only Python 3.11 and later
-            # can tell the two apart.
+            # Either this task or an operation that the handler awaited was cancelled.
+            # Only Python 3.11 and later can tell the two apart.
             if not self._closed:
                 _log.error("service %s: the handler of a call was cancelled", self.name)
                 with contextlib.suppress(OSError):

@@ -163,8 +163,8 @@ class Publication:
             if other.peer == link.peer and other.waiting:
                 # A node has only one connection per topic, so it has lost the old link and no longer receives frames on it.
                 other.close()
-        # A subscriber that has received the header expects all messages published from then on, so let the link
-        # accept frames before the header is sent.
+        # A subscriber that has received the header expects all messages published from then on.
+        # The link must therefore accept frames before the header is sent.
         with self._latch_lock:
             self.links += (link,)
             latched = self._latched if self.latch else None
@@ -456,8 +456,8 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and it may be the last one, so retry now: the publisher may
-                # accept.
+                # A newer list arrived after this refusal, and it may be the last one.
+                # Retry now, because the publisher may accept.
                 self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
@@ -535,8 +535,8 @@ class Subscription:
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # Connecting to the Unix socket failed: something, such as a sandbox, isolates the two processes from each
-            # other. Use TCP.
+            # The Unix socket does not connect: the processes are isolated from each other, for example by a sandbox.
+            # Use TCP.
             host, port = unix.host, unix.port
         else:
             host, port = _tcpros_address(answer, uri, self.topic)
@@ -582,8 +582,7 @@ class Subscription:
         del self._links[link.uri]
         self._notify_ended()
         if link.returned:
-            # The closed connection belonged to the publisher's previous registration; connect to its current one
-            # immediately.
+            # The closed connection belonged to the publisher's previous registration; connect to its current one now.
             self.start_connecting(Connect(link.uri))
             return
         fault = link.fault or EOFError("the publisher closed the connection")
@@ -609,8 +608,8 @@ class Subscription:
             return
 
         nameless = isinstance(cause, socket.gaierror)
-        # Publishers that are shutting down refuse connections or disconnect. Report all other errors immediately: a
-        # timeout indicates a wrong address or a firewall.
+        # Publishers that are shutting down refuse connections or disconnect.
+        # Report all other errors immediately: a timeout indicates a wrong address or a firewall.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self.plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)

@@ -18,8 +18,7 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
-# Seconds; the kernel accepts connections even while the server's program is busy, so a slower server is considered
-# unreachable
+# Seconds; the kernel accepts connections even for a busy program, so a slower server counts as unreachable
 _CONNECT_SECONDS = 5.0
 
 

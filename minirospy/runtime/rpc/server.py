@@ -36,8 +36,8 @@ _log = logging.getLogger(__name__)
 MAX_HELD = 72 * 1024 * 1024
 LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are never refused because of MAX_HELD
 
-# Maximum bytes of unread responses to all clients together; above it, disconnect the client that has gone longest
-# without reading
+# Maximum bytes of unread responses to all clients together.
+# Above it, disconnect the client that has gone longest without reading.
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 
 _BACKLOG = 4096
@@ -60,8 +60,7 @@ _ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from the
 # Number of connections to read before accepting new ones, which takes some 1 ms; thousands may be readable together
 _READS_AT_ONCE = 16
 
-# Maximum number of connections to read from per loop iteration, and the maximum seconds for that; the rest are read
-# first in the next iteration
+# Maximum number of connections to read per loop iteration, and the maximum seconds; the rest are read first in the next one
 _MAX_READS, _READS_SECONDS = 256, 0.01
 
 
@@ -108,8 +107,7 @@ class RpcServer:
         self._bind_host = bind_host
         self._ports = ports
         self._most = most_idle
-        # If only few clients may stay connected, the clients accepted in one batch may displace each other, so read
-        # from each one first.
+        # If only few clients may stay connected, those accepted in one batch may displace each other, so read from each first.
         self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
@@ -226,8 +224,8 @@ class RpcServer:
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate between new and other connections (idle ones that disconnect, and busy ones), so that many of
-            # one kind do not delay the other.
+            # Alternate between new and other connections, so that many of one kind do not delay the other kind.
+            # The others are idle ones that disconnect, and busy ones.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:

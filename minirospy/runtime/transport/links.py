@@ -165,8 +165,7 @@ class OutLink:
         """Append ``frame`` to the outbox and return True. Return False if the outbox has become empty in the meantime."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
-            # Send from this thread, because a thread that publishes without pause would not let the loop's thread
-            # send.
+            # Send from this thread: a thread that publishes without pause would not let the loop's thread send.
             self._help()
             if not outbox:
                 return False
@@ -204,8 +203,8 @@ class OutLink:
         left = size
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # A socket does not accept a large message in one call, but a peer that is reading frees space within
-            # microseconds. Waiting here is cheaper than handing each step to the loop.
+            # A socket does not accept a large message in one call, but a reading peer frees space within microseconds.
+            # Waiting here is cheaper than handing each step to the loop.
             try:
                 left -= self._gather(buffers)
             except (BlockingIOError, InterruptedError):

@@ -85,8 +85,9 @@ class LoopThread:
         return functools.partial(self._wait, tasks, pending)
 
     def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
-        # Do not use concurrent.futures.Future. The caller holds its lock during parts of the wait, and the loop needs
-        # that lock; if a signal handler waited for the loop at that moment, it would deadlock.
+        # Do not use concurrent.futures.Future.
+        # Its caller holds a lock during parts of the wait, and the loop needs that lock.
+        # A signal handler that waited for the loop at that moment would deadlock.
         try:
             if not pending.acquire(timeout=-1 if timeout is None else timeout):
                 raise TimeoutError
@@ -118,8 +119,7 @@ class LoopThread:
         finally:
             with self._lock:
                 self._is_ending = True
-            # Let posted calls become tasks here, and let finished tasks report their results; otherwise callers would
-            # wait forever.
+            # Let posted calls become tasks and finished tasks report their results; otherwise callers would wait forever.
             self.loop.run_until_complete(asyncio.sleep(0))
             tasks = asyncio.all_tasks(self.loop)
             for task in tasks:

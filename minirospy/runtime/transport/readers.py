@@ -203,8 +203,8 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # The flag is also False if bytes were ready but this thread had to wait for the GIL, because other threads in
-        # this process then need the GIL.
+        # The flag is also False if bytes were ready but this thread had to wait for the GIL.
+        # Other threads in this process then need the GIL.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count

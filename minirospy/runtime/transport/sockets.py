@@ -36,8 +36,8 @@ BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process
 KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence before probing (on macOS called TCP_KEEPALIVE), seconds between probes, number of probes."""
 
-# Buffer size to request for a Unix socket, in bytes; as much as TCP buffers. Linux limits it to net.core.wmem_max
-# (208 kB by default)
+# Buffer size to request for a Unix socket, in bytes; as much as TCP buffers.
+# Linux limits it to net.core.wmem_max (208 kB by default).
 _SEND_BUFFER = 4 * 1024 * 1024
 
 _PEER = struct.Struct("iII")  # layout of the kernel's credentials for a peer, see Peer

@@ -196,8 +196,8 @@ class Listener:
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
-            # No file descriptors are free, or the peer has already disconnected; accepting the next connection may
-            # succeed a moment later.
+            # No file descriptors are free, or the peer has already disconnected.
+            # Accepting the next connection may succeed a moment later.
             self.log_refusal(f"a connection could not be accepted: {explain(error)}")
             if is_file_limit(error):
                 self._end_oldest("this process has no file descriptor left")

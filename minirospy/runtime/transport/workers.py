@@ -37,8 +37,7 @@ class Workers:
         """
         with self._lock:
             if self._idle:
-                # A claimed worker always takes an entry: a worker that exits without one first removes itself from
-                # the idle workers.
+                # A claimed worker always takes an entry: one that exits without an entry first leaves the idle workers.
                 self._idle -= 1
                 self._work.put((function, args))
                 return

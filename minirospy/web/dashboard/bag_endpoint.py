@@ -234,8 +234,8 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # A step publishes all messages that have the same time. After a seek, the messages at that time have been
-        # shown but not published.
+        # A step publishes all messages that have the same time.
+        # After a seek, the messages at that time have been shown but not published.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:

@@ -248,8 +248,8 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # The lock protects the attributes below: a command (sent on the loop) and the guard's zero velocity must not
-        # be published concurrently.
+        # The lock protects the attributes below.
+        # A command (sent on the loop) and the guard's zero velocity must not be published concurrently.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))

@@ -219,8 +219,7 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # Log the messages of all other errors only on the terminal, because they may contain details that
-                    # clients must not see.
+                    # Log other errors' messages only on the terminal: they may contain details that clients must not see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
                     )
@@ -322,9 +321,9 @@ class JsonEndpoint(Generic[_S]):
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
     """Wait for an event until the loop's clock reaches ``end``. On a timeout, the clock is guaranteed to be past ``end``."""
-    # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event. Add
-    # the clock's resolution, because a loop may run timers early by that much; a caller that compares times would
-    # then spin until the clock advances.
+    # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event.
+    # Add the clock's resolution, because a loop may run timers early by that much.
+    # Otherwise, a caller that compares times would spin until the clock advances.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + CLOCK_SECONDS, event.set) if end < math.inf else None
     try:

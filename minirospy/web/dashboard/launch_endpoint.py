@@ -129,8 +129,8 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return whole lines only, because the data may end in the middle of a character. Exceptions: a very long
-        # line, and the last line after the node's exit.
+        # Return whole lines only, because the data may end in the middle of a character.
+        # Exceptions are a very long line, and the last line after the node's exit.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]

@@ -107,8 +107,7 @@ class Recording:
             "rosbag record",
             command,
             environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
-            # `python -m` imports from the working folder first, so do not run it in a folder that may contain the
-            # user's modules.
+            # Run `python -m` in a folder without the user's modules, because it imports from the working folder first.
             folder=Path(minirospy.__file__).parents[2],
             stdout=subprocess.PIPE,
             log_errors=True,

@@ -63,8 +63,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
 def _built(events: Iterator[Event], name: str) -> object:
     """Return the document's value. Raise RvizFileError if it is invalid."""
     result: list[object] = []
-    # The open collections, each with the keys whose values have not been parsed yet; the first collection is the
-    # stream.
+    # The open collections (first the stream), each with the keys whose values have not been parsed yet.
     stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
     for event in events:
         line = event.start_mark.line + 1 if event.start_mark else 0

@@ -114,8 +114,7 @@ class Parameters:
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # The master's notification does not distinguish a deleted namespace from an empty one, so query the master
-        # for the value.
+        # Query the master for the value: its notification does not distinguish a deleted namespace from an empty one.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):

@@ -59,8 +59,7 @@ class _LargeWork:
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
         """Run ``work`` in the thread and return its result."""
-        # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
-        # immediately.
+        # Do not queue work in the executor: if a client leaves while its work waits here, its message is freed immediately.
         async with self._is_busy:
             if self._is_closed:
                 raise asyncio.CancelledError

@@ -34,8 +34,7 @@ def _installed(get: Callable[[str], _Class | None], name: str, kind: str) -> _Cl
     try:
         found = get(name)
     except Exception as error:
-        # Importing a third-party message module may raise any exception. Report it as the reason why the type is
-        # unknown.
+        # Importing a third-party message module may raise any exception. Report it as the reason why the type is unknown.
         raise _unknown(
             name, kind, f"{type(error).__name__}: {error}" if _is_foreign(error) else str(error)
         ) from error

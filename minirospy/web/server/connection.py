@@ -144,8 +144,7 @@ class Connection:
         self._are_jobs_held = False  # True while a job continues in a thread; see hold_jobs()
         self._held = 0  # bytes of memory that the session uses for the client; see session_holds()
         self._is_in_turn = False  # True while _work() runs
-        # Calls _handshake_late until the handshake is done, then the periodic check of the open connection, and
-        # _abort while closing.
+        # Calls _handshake_late at first, then the periodic check of the open connection, and _abort while closing.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
 
     @property
@@ -371,8 +370,8 @@ class Connection:
     def framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
-            # Only the newest ping needs a response (RFC 6455, 5.5.3), so queue at most one, even for a client that
-            # does not read.
+            # Queue at most one ping response, even for a client that does not read.
+            # Only the newest ping needs one (RFC 6455, 5.5.3).
             self.stream(_PONG, (frame_head(_PONG, len(event.data)), event.data), newest_only=True)
         elif event:
             self._deliver(event)
@@ -419,8 +418,8 @@ class Connection:
     def _parse_head(self) -> None:
         try:
             request = self._websocket.next_request()
-            # If the target or Origin is not a URL, or the query has a thousand fields, refuse the client: the
-            # exception must not leave it connected.
+            # Refuse the client if its target or Origin is not a URL or its query has a thousand fields.
+            # The exception must not leave it connected.
             found = self._admitted(read_head(request)) if request else None
         except ValueError as error:
             found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")

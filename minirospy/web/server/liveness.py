@@ -44,8 +44,7 @@ class Liveness:
         """Return the action to take now for the client."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
-        # Check that a ping was sent: after the machine was suspended, the last data is old even though no ping is
-        # unanswered.
+        # Check that a ping was sent: after a suspension of the machine, the last data is old even if no ping is unanswered.
         if self._is_pinged and now - self.received > self._silent_seconds:
             return Verdict.SILENT
         if is_full:

@@ -149,8 +149,7 @@ class Output:
         piece = file.take()
         if piece is None:
             if file.has_failed:
-                # Close the pipe, because the size has been sent and the client would mistake any further data for the
-                # file.
+                # Close the pipe: the size has been sent, and the client would mistake any further data for the file.
                 self.abort()
             return None
         if file.is_done:

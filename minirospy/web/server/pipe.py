@@ -179,8 +179,7 @@ class PlainPipe:
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         with contextlib.suppress(OSError):
-            # Shut down first: closing a socket with unread data resets the connection, and the peer could lose data
-            # that was already sent.
+            # Shut down first: closing a socket with unread data resets the connection, and the peer could lose data sent to it.
             self._sock.shutdown(socket.SHUT_WR)
         self._sock.close()
         self._events.ended()

@@ -32,14 +32,14 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
 # seconds of work for one client before the next client's turn; with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# number of jobs for which a client counts as new; until then, its jobs are expected to take as long as those of other
-# new clients
+# number of jobs for which a client counts as new: each is expected to take as long as those of other new clients
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which the expected seconds decay after each job that takes less
 IMMEDIATE_SHARE = 0.5  # fraction of the time for work that starts without being queued
-# Maximum burst of an interactive client in slices, 1 ms in total: a request takes 0.1 to 0.5 ms, 64 kB of empty
-# frames take 100 ms. A new client has one slice, and gets one more with each short burst, so that 250 new clients
-# that flood the server each get one slice, and are then served after its other clients.
+# Maximum burst of an interactive client in slices, 1 ms in total.
+# A request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms.
+# A new client has one slice, and gets one more with each short burst.
+# If 250 new clients flood the server, each gets one slice; after that, its other clients are served first.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
@@ -215,8 +215,7 @@ class FairTurns:
             queue = self._next_queue()
             end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
-                # A new client's work is now expected to take longer than when this work was queued, so queue it
-                # again.
+                # A new client's work is now expected to take longer than when this work was queued, so requeue it.
                 self._push(share, start)
                 continue
             share.is_queued = False

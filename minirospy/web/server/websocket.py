@@ -180,6 +180,7 @@ def _select(
     return select(names)  # type: ignore[return-value]
 
 
-# The library logs each frame at DEBUG, and headers, which contain tokens. This logger is not part of the logging
-# hierarchy, and drops everything below CRITICAL, so no logging configuration can show its messages.
+# The library logs each frame at DEBUG, and headers, which contain tokens.
+# This logger is not part of the logging hierarchy, and drops everything below CRITICAL.
+# Its messages therefore never appear, whatever the logging configuration.
 _QUIET = logging.Logger(__name__, logging.CRITICAL)

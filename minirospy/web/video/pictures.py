@@ -59,8 +59,7 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
     except Exception as error:  # image libraries raise many types of exceptions for invalid data
         why: object = error
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
-            # Do not include the install command, which contains the server's interpreter path: clients receive this
-            # text.
+            # Clients receive this text, so do not include the install command, which contains the interpreter's path.
             why = "it needs OpenCV or Pillow: install minirospy[images] on the server"
         raise BridgeError(f"the image cannot be shown: {why}") from error
 

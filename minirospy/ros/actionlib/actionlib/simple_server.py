@@ -58,8 +58,7 @@ class SimpleActionServer:
         self.action_server = ActionServer(
             name, ActionSpec, self.internal_goal_callback, self.internal_preempt_callback, auto_start=False
         )
-        # Share the action server's lock. With two locks, a goal that arrives while another ends could cause a
-        # deadlock.
+        # Share the action server's lock. With two locks, a goal that arrives while another ends could cause a deadlock.
         self.lock = self.action_server.lock
         self.execute_condition = threading.Condition(self.lock)
 
@@ -206,8 +205,8 @@ class SimpleActionServer:
         try:
             self.execute_callback(goal)
         except BaseException as error:  # noqa: BLE001 - user code failed; serve the next goals
-            # Exceptions are expected during a shutdown: Ctrl-C interrupts sleeps, and a hook may have closed the
-            # callback's resources.
+            # Exceptions are expected during a shutdown.
+            # Ctrl-C interrupts sleeps, and a hook may have closed the callback's resources.
             if not rospy.is_shutdown_requested():
                 rospy.logerr("Exception in your execute callback: %s\n%s", error, traceback.format_exc())
                 self.set_aborted(None, f"Exception in execute callback: {error}")

@@ -21,8 +21,8 @@ __all__ = [
 # Connection header field on goal topics, set by minirospy clients to announce that they accept fast responses.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 
-# Seconds for which the server delays goals from other clients: Python's actionlib drops results that arrive before
-# send_goal returns.
+# Seconds for which the server delays goals from other clients.
+# Python's actionlib drops results that arrive before send_goal returns.
 SEND_SECONDS = 1e-3
 
 # Seconds for which cancel requests are delayed, because the goal, which was sent earlier on another connection, is delayed too.

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv", "Server"]
 
-# Python types allowed for each parameter type. An int is allowed for a double, because rosparam stores a number
-# without a decimal point as an int.
+# Python types allowed for each parameter type.
+# An int is allowed for a double, because rosparam stores a number without a decimal point as an int.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "double": (float, int),

@@ -136,8 +136,8 @@ def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")
-    # The longest matching topic takes precedence: a topic with the full name wins over a field of a topic with a
-    # shorter name.
+    # The longest matching topic takes precedence.
+    # A topic with the full name wins over a field of a topic with a shorter name.
     holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
     topic = max(holders, key=len, default="")
     return {

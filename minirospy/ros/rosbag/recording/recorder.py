@@ -337,8 +337,7 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Write compressed chunks now to free memory; otherwise they would only be written when the next
-                # message arrives.
+                # Write compressed chunks now to free memory; otherwise they would stay until the next message arrives.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1

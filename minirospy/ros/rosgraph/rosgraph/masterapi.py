@@ -1,8 +1,8 @@
 """The Master API for Python programs: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 # mypy: disable-error-code="no-any-return"
-# The annotations state what a master should return. Values are returned unchanged, because a program may replace the
-# master.
+# The annotations state what a master should return.
+# Values are returned unchanged, because a program may replace the master.
 
 from __future__ import annotations
 

@@ -39,8 +39,8 @@ __all__ = [
 
 STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
-# maximum number of files per launch; a chain of 26 files that each include the next one twice would mean reading
-# 67,108,863 files
+# maximum number of files per launch;
+# a chain of 26 files that each include the next one twice would mean reading 67,108,863 files
 _MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]

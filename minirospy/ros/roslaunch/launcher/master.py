@@ -66,8 +66,7 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # Call the master for the error message, which states the reason, such as an unknown host name or a
-            # suspended master.
+            # Call the master for its error, which states the reason, such as an unknown host name or a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")

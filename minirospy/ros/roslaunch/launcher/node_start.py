@@ -37,8 +37,8 @@ class NodeStarter:
         environ = node_environment(node, self._environment)
         screen = self._uses_screen(node)
         if not screen or not sys.stdout.isatty():
-            # Show a node's output immediately. On a terminal, Python flushes each line anyway, and writes whole
-            # lines, so that the lines of several nodes do not mix.
+            # Show a node's output immediately.
+            # On a terminal, Python flushes each line anyway, and writes whole lines, so that the nodes' lines do not mix.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         folder = self._made(folder)
 

@@ -110,8 +110,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # A process that is started outside the job would remain, suspended, if its parent were killed while starting
-        # it.
+        # A process that is started outside the job would remain, suspended, if its parent were killed while starting it.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,

@@ -232,8 +232,8 @@ def _depends_manifests(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # Only check the package: rosbuild created these files when it generated messages, and catkin packages do not
-    # contain them.
+    # Only check the package.
+    # rosbuild created these files when it generated messages, and catkin packages do not contain them.
     tree.all(_package(line))
     print()
 

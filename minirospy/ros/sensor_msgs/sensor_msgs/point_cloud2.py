@@ -85,8 +85,7 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # Creating the tuples takes most of the time. zip is fastest, because it reuses tuples that the caller has
-        # dropped.
+        # Creating the tuples takes most of the time. zip is fastest: it reuses tuples that the caller has dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
 
@@ -106,8 +105,8 @@ def read_points_list(
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Convert the first point here, so that a field with more than one value raises TypeError immediately. One point
-    # is enough: all have the same number of values.
+    # Convert the first point here, so that a field with more than one value raises TypeError immediately.
+    # One point is enough: all have the same number of values.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
