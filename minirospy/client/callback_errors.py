@@ -14,7 +14,7 @@ from types import TracebackType
 
 __all__ = ["CallbackErrors"]
 
-_SECONDS = 10.0  # minimum seconds between two log lines about the same error
+_SECONDS = 10.0  # minimum seconds between log lines about the same error
 
 _log = logging.getLogger("rosout")
 

@@ -71,7 +71,7 @@ def width_of(text: str) -> int:
     if len(text) == 1:
         # Do not use sys.getsizeof() of a single-character string: since Python 3.12 it includes the string's UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
-    # For longer strings, such a UTF-8 copy can only make this value too large.
+    # In longer strings, the UTF-8 copy is also counted, so the result is at worst too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 

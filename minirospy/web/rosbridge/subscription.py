@@ -24,7 +24,7 @@ bytes.
 _MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
-"""Overhead in bytes per fragment, in addition to its text, and per incomplete message, in addition to its fragments."""
+"""Bytes of overhead of each fragment, beyond its text, and of each incomplete message, beyond its fragments."""
 
 
 @dataclass(frozen=True)

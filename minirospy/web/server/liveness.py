@@ -27,7 +27,7 @@ class Liveness:
     """
 
     def __init__(self, silent_seconds: float, now: float) -> None:
-        self.received = now  # time of the last data from the client
+        self.received = now  # time when the client last sent data
         self._silent_seconds = silent_seconds
         self._is_pinged = False  # True after a ping, until data arrives
 

@@ -16,7 +16,7 @@ from minirospy.ros.roslaunch.launcher.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_RESPAWN_SECONDS = 0.1  # minimum seconds between two starts of a node that exits right away
+_RESPAWN_SECONDS = 0.1  # minimum seconds between starts of a node that exits right away
 
 _SLICE = 0.5
 """Seconds per wait of the main thread, which receives signals.

@@ -19,7 +19,7 @@ from minirospy.ros.smach.smach.util import is_shutdown
 
 __all__ = ["Concurrence"]
 
-_SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
+_SHUTDOWN_CHECK = 0.1  # seconds between checks for a shutdown
 
 
 class Concurrence(Container):

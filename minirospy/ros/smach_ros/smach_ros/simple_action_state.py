@@ -20,7 +20,7 @@ from minirospy.ros.smach_ros.smach_ros.callbacks import StateCallback
 
 __all__ = ["SimpleActionState"]
 
-_LOOK = 0.1  # seconds between two checks for timeouts and for a shutdown
+_LOOK = 0.1  # seconds between checks for timeouts and for a shutdown
 _MINUTE = rospy.Duration(60.0)
 
 

@@ -57,7 +57,7 @@ class Output:
 
     @property
     def has_subscribers(self) -> bool:
-        """Return whether a node subscribes to the output."""
+        """Return whether any node subscribes to the output."""
         return self._publisher is not None and self._publisher.get_num_connections() > 0
 
     def advertise(self, message: AnyMsg) -> None:

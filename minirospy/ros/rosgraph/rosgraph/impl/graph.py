@@ -140,7 +140,7 @@ class Graph:
         self.last_master_refresh = 0.0
 
     def set_master_stale(self, stale_secs: float) -> None:
-        """Set the minimum number of seconds between two queries to the master."""
+        """Set the minimum number of seconds between queries to the master."""
         self.master_stale = stale_secs
 
     def set_node_stale(self, stale_secs: float) -> None:
