@@ -66,7 +66,7 @@ class TransformListener:
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time with the lock held: otherwise a thread that another one overtakes would seem to see a jump back.
+        # Read the time with the lock held: otherwise a thread overtaken by another one would detect a false jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now
