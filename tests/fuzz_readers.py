@@ -6,8 +6,7 @@
 Bags of both versions, MCAP files, XML (launch files, robot descriptions, manifests, test results), YAML (all of minirospy's
 loaders), with mutations of lengths and brackets, among others. Each kind of finding is written to
 ``fuzz-reader-finding-N.bin`` once, with the name of its reader in the first line; ``python tests/fuzz_readers.py FILE``
-runs it
-again. At the end the inputs, the errors by type, the slowest input and the peak memory are printed.
+runs it again. At the end, the number of inputs, the errors by type, the slowest input and the peak memory are printed.
 """
 
 from __future__ import annotations

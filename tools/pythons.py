@@ -1,10 +1,8 @@
 """Run the fast tests on every Python from 3.10 on: `make pythons`, or `python tools/pythons.py [-- ARGUMENT ...]`.
 
-Each gets an environment in build/pythons, and runs the tests with `-X dev`: a socket or file that is not closed fails its
-test.
-Versions as arguments (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`) choose some; a path of an interpreter is
-used as
-it is. Arguments after `--` are passed to pytest. The exit status is 1 if a test failed on one of them.
+Each version gets an environment in build/pythons, and runs the tests with `-X dev`, so that a test fails if it leaves a
+socket or file open. Arguments select versions (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`), or name an
+interpreter's path. Arguments after `--` are passed to pytest. The exit status is 1 if a test failed on any version.
 """
 
 from __future__ import annotations

@@ -102,9 +102,8 @@ class Link:
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
         """Perform ``operation``, and return when the mirror shows its effect.
 
-        If it is None, only wait for the operations sent before. Raise BoardError if the board refuses or does not respond
-        within
-        ``timeout`` seconds.
+        If it is None, only wait for the operations sent earlier. Raise BoardError if the board refuses, or does not
+        respond within ``timeout`` seconds.
         """
         with self._news:
             number = self._send(operation)

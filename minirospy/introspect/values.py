@@ -106,7 +106,7 @@ def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
     """Like :func:`parse_documents`, but yield each value as soon as its document is complete.
 
-    An example that needs this is `rostopic echo /a | rostopic pub /b TYPE`.
+    For example, `rostopic echo /a | rostopic pub /b TYPE` needs this.
     """
     text: list[str] = []
     for line in lines:
@@ -180,7 +180,7 @@ def check_parameter(value: object, name: str) -> None:
 
 
 def _is_digits(text: str) -> bool:
-    """Return whether a string is at most nine ASCII digits.
+    """Return whether a string consists of at most nine ASCII digits.
 
     Uses no regular expression, because compiling one slows the start.
     """

@@ -1,4 +1,4 @@
-"""Parse clients' JSON within limits, because `[]` fifty million times would use gigabytes and block all clients. Pure.
+"""Parse clients' JSON within limits, because fifty million `[]` would use gigabytes and block all clients. Pure.
 
 The standard library's parser holds Python's global interpreter lock (GIL) until it has parsed the whole string, and so
 blocks all threads of the process. Large strings are parsed in pieces instead, by :func:`load_json_in_pieces` in a separate

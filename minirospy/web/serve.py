@@ -116,8 +116,8 @@ def run(
     """Run a bridge on a node called ``name`` until it is shut down; return the exit status.
 
     ``argv``: remappings, as a launch file passes them (None: the process's own arguments). ``start`` creates the bridge,
-    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for
-    which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time,
+    which would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
     resources that may fail, before the node registers its name, because the master ends a running node with the same
     name.
     """

@@ -50,8 +50,8 @@ def cvtColorForDisplay(
     """Return an 8-bit image for display in a window; ``encoding_out`` is a color or mono encoding, or "" for bgr8.
 
     An image with one channel is scaled from ``min_image_value`` and ``max_image_value`` if they differ, or from its own
-    minimum
-    and maximum if ``do_dynamic_scaling``. Labels (32SC1) become colors. Raise RuntimeError if there is no such conversion.
+    minimum and maximum if ``do_dynamic_scaling``. Labels (32SC1) become colors. Raise RuntimeError if there is no such
+    conversion.
     """
     import numpy as np
 

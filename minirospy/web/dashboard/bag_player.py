@@ -1,4 +1,4 @@
-"""One opened bag: its timeline, and `rosbag play`'s player, which publishes to the dashboard's graph."""
+"""An open bag: its timeline, and `rosbag play`'s player, which publishes to the dashboard's graph."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class GraphOutput:
 
 
 class OpenBag:
-    """An opened bag: a timeline, and a player that is paused at the start. Methods block, so do not call them on the loop.
+    """An open bag: a timeline, and a player that is paused at the start. Methods block, so do not call them on the loop.
 
     ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError if the bag is
     invalid, OSError if it cannot be read.

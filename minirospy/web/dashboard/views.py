@@ -1,4 +1,4 @@
-"""A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
+"""Links to the page's views, and the fields in rqt_plot's arguments. Pure.
 
 A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
 """

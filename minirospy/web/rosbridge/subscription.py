@@ -60,7 +60,7 @@ class Budget:
 class Pacer(Generic[_T]):
     """Limits a topic's rate to one message per ``throttle`` seconds.
 
-    The newest ``queue_length`` messages are queued, older ones are dropped.
+    The newest ``queue_length`` messages are queued; older ones are dropped.
     """
 
     def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:

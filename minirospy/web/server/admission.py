@@ -1,12 +1,12 @@
 """Select a connection to close when a new one arrives and the maximum number is reached. Pure.
 
-An attacker occupies connections: it opens them and sends no request, or is served and then sends nothing, or only occasionally
-a little. It has few addresses and no token. Therefore connections are closed in this order:
+An attacker occupies connections: it opens them and sends no request, or is served and then sends nothing, or only a little
+now and then. It has few addresses and no token. Therefore connections are closed in this order:
 
-1. a connection without a request that is older than some seconds, or whose address has too many such connections; 2. a
-client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
-3. for an address with few connections, a client of an address that has more than half of all connections; 4. for the
-owner, any client of another user.
+1. a connection without a request, if it is older than some seconds or its address has too many such connections;
+2. a client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
+3. for an address with few connections, a client of an address that has more than half of all connections;
+4. for the owner, any client of another user.
 
 A client is closed only for a connection whose rights are at least equal.
 """

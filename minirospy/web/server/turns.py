@@ -5,7 +5,7 @@ together use less than half of the time; beyond that it is queued, and each iter
 milliseconds of it.
 
 There are two queues, like the classes in a multilevel feedback scheduler: one for interactive clients, which send little
-at a time and then nothing until they receive a response, and one for bulk clients, whose work never ends or takes long.
+and then wait for the response, and one for bulk clients, whose work never ends or takes a long time.
 Interactive clients are served first, so that none of them waits for a slice of each of 250 clients that flood the server;
 bulk clients get at least a fifth of the time.
 

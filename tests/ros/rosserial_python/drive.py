@@ -1,8 +1,7 @@
 """A simulated microcontroller on a pseudo-terminal and a node that communicate; prints the messages on both sides.
 
-`drive.py PROGRAM...` starts serial_node of either stack on the terminal; drive.txt is the output for the real one
-(rosserial 0.9.2,
-which Debian does not have).
+`drive.py PROGRAM...` starts serial_node of either stack on the terminal. drive.txt is the output for the real one (rosserial
+0.9.2, which Debian does not have).
 """
 
 from __future__ import annotations

@@ -103,8 +103,8 @@ class ActionClient:
         """Send a goal and return its handle. Keep a reference to the handle: the callbacks are only called while it exists.
 
         ``transition_cb(handle)`` is called on each state change, and ``feedback_cb(handle, feedback)`` for each feedback
-        message.
-        Both are called in the library's threads: one at a time for each goal, but concurrently for different goals.
+        message. Both are called in the library's threads: one at a time for each goal, but concurrently for different
+        goals.
         """
         impl = self.status_sub.impl
         subscription = impl and impl.subscription

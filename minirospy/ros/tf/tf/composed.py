@@ -171,10 +171,10 @@ def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> Floats:
 def superimposition_matrix(
     v0: ArrayLike, v1: ArrayLike, scaling: bool = False, usesvd: bool = True
 ) -> Floats:
-    r"""Return the rotation, translation and, on demand, scaling that moves points ``v0`` nearest to ``v1``.
+    r"""Return the rotation, translation and, if requested, scaling that moves points ``v0`` nearest to ``v1``.
 
-    Both have the shape (3, \*) or (4, \*), three points at least. By Kabsch's method of singular values (1976), or by Horn's
-    of quaternions (1987). Raise ValueError.
+    Both have the shape (3, \*) or (4, \*), with at least three points. Uses Kabsch's method with singular values (1976), or
+    Horn's with quaternions (1987). Raise ValueError if the shapes are different or too small.
     """
     import numpy
 

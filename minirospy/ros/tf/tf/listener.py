@@ -200,8 +200,7 @@ class Transformer:
         """Return the velocities of ``tracking_frame`` relative to ``observation_frame``, expressed in ``reference_frame``.
 
         The velocities are those of the origin of ``reference_point_frame``, averaged over ``averaging_interval`` around
-        ``time``
-        (0: until the newest data). ``ref_point`` has no effect, as in real ROS.
+        ``time`` (0: until the newest data). ``ref_point`` has no effect, as in real ROS.
         """
         import numpy
 

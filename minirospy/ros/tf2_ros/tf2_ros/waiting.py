@@ -22,7 +22,7 @@ _SIMULATED_SLICE = 0.01
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
     """Wait until ``is_possible()`` is true or ``timeout`` has passed in ROS time. Check whenever a transform is inserted.
 
-    ``step`` is the fraction of the timeout that the real implementation sleeps between two checks. Raise
+    ``step`` is the fraction of the timeout that the real implementation sleeps between checks. Raise
     ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep, ROSInterruptException
     if the node shuts down in the meantime, ROSInitException if init_node has not been called.
     """
