@@ -1,4 +1,4 @@
-"""`minirospy demo`: one command that runs the workshop's example, a button that lights an LED, on the virtual board."""
+"""`minirospy demo`: the workshop's button lights its LED, on the virtual board, from one command."""
 
 from __future__ import annotations
 
