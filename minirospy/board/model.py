@@ -101,7 +101,7 @@ class Release(NamedTuple):
 
 
 class Force(NamedTuple):
-    """Drive an input to ``level``, or set an output's latch in the same way as another program."""
+    """Drive an input to ``level``, or set an output's latch, as another program would."""
 
     pin: int
     level: int
