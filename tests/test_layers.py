@@ -244,7 +244,7 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
 
 
 def test_few_modules_import_types_in_a_circle() -> None:
-    """A part and its owner name each other's types in three places only."""
+    """A part and its owner name each other's types in only three places."""
     found = [circle for room in DEPTH for circle in circles(graph_of_imports(room, for_types=True))]
     owners = {"minirospy.aio.node", "minirospy.client.session", "minirospy.runtime.rpc.server"}
     assert [circle for circle in found if not circle & owners] == []

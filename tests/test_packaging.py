@@ -278,7 +278,7 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
 
 @pytest.mark.timeout(180)
 def test_folder_of_pip_target_offers_rospy(wheel: Path, tmp_path: Path) -> None:
-    """Python reads no `.pth` file there, but a program run by `minirospy python` can import rospy nevertheless."""
+    """Python reads no `.pth` file in such a folder, but a program run by `minirospy python` can import rospy nevertheless."""
     folder = tmp_path / "folder"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder)

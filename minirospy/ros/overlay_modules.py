@@ -27,7 +27,7 @@ __all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_ov
 
 PACKAGE = Path(__file__).parents[1]
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
-"""Maps Python modules that belong to no ROS package to their folders."""
+"""Folders of the Python modules that belong to no ROS package, keyed by module."""
 _NAMED_OTHERWISE = {
     "camera_info_manager_py": ("camera_info_manager",),
     "python_orocos_kdl": ("PyKDL",),
@@ -54,7 +54,7 @@ _INTERNAL = {
     "topic_tools": "expressions",
     "urdf_parser_py": "joints links",
 }
-"""Modules that ROS's Python modules do not have. Do not add entries: put a new module next to the Python module's folder."""
+"""Modules that ROS's Python packages do not have. Do not add entries: put a new module next to the Python package's folder."""
 _GENERATED = "generated from minirospy/"  # marks generated modules, in their docstrings
 _METADATA = "rospy-1.17.0.egg-info"  # programs query rospy's version through importlib.metadata
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
@@ -82,7 +82,9 @@ class _Source(NamedTuple):
     imported: dict[str, Origin]
     """Names bound by imports, including imports for type checkers only."""
     passed_on: frozenset[str]
-    """Names that an import binds in the form ``x as x``, and the functions ``__getattr__`` and ``__dir__``."""
+    """Names that an import binds in the form ``x as x``, and the functions ``__getattr__`` and ``__dir__`` if the module has
+    them.
+    """
 
 
 def write_overlay(folder: Path) -> list[str]:
@@ -150,7 +152,7 @@ def exported(source: Path) -> dict[str, Origin]:
 
 
 def _origin(asked: Origin) -> Origin:
-    """Return the place that defines a name, following modules that only re-export it."""
+    """Return the place that defines a name. Follow modules that only re-export the name."""
     source = _source_of(asked.module)
     if source is None:
         return asked
@@ -159,8 +161,8 @@ def _origin(asked: Origin) -> Origin:
         return asked
     module = _by_source().get(f"{inner.module}.{inner.name}")
     if module is not None:
-        # If the name is a module that the overlay also has, use the overlay's module, so that `rosgraph.names` is the
-        # module that `import rosgraph.names` returns.
+        # If the overlay has a module of this name, too, use that one.
+        # `rosgraph.names` must be the module that `import rosgraph.names` returns.
         parent, _, name = module[0].rpartition(".")
         is_kept = asked.name == name or asked.module == inner.module
         return Origin(parent or name, name if parent else "") if is_kept else inner
@@ -235,7 +237,7 @@ def _submodules(package: str) -> dict[str, str]:
 
 
 def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, has_hook: bool) -> list[str]:
-    """Return source lines that look up these names at first use. Type checkers and editors do not see such names."""
+    """Return source lines that look up these names on first use. Type checkers and editors do not see such names."""
     missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
     return [
         "",

@@ -1,4 +1,4 @@
-"""The asyncio API: nodes in one loop communicate with each other, and with nodes of the rospy API, over real sockets."""
+"""The asyncio API: nodes that share a loop communicate with each other and with nodes of the rospy API, over real sockets."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ Main = Callable[[], Coroutine[Any, Any, None]]
 
 
 def run(main: Main) -> None:
-    """Run a test's coroutine in a new loop; assert that no task remains."""
+    """Run a test's coroutine in a new loop; assert that no tasks remain."""
 
     async def bounded() -> None:
         await asyncio.wait_for(main(), SECONDS)
@@ -301,7 +301,7 @@ def test_queue_size_zero_is_refused(master: str) -> None:
 
 
 def test_publish_waits_with_queue_size_none(master: str) -> None:
-    """Send messages of 3 MB to a reader that has stopped. Data counts as written once its socket has accepted it."""
+    """Send messages of 3 MB to a reader that has stopped reading. Data counts as written once its socket has accepted it."""
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -436,7 +436,7 @@ def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFix
 
 
 def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterProxy) -> None:
-    """Several tasks do this before the registration has reached the master, or during the unregistration."""
+    """Several tasks do this before the registration has reached the master and during the unregistration."""
 
     async def main() -> None:
         async with Node("a") as node, Node("b") as other:
@@ -638,7 +638,7 @@ def test_errors_of_a_service_call(master: str, caplog: pytest.LogCaptureFixture)
 
 
 def test_service_is_registered_once_and_can_be_closed(graph: MasterProxy) -> None:
-    """This includes closing it before the master has registered it."""
+    """Also close it before the master has registered it."""
 
     async def main() -> None:
         async with Node("n") as node:

@@ -91,7 +91,7 @@ def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], obj
 
 
 def wait_elsewhere(event: SignalSafeEvent) -> None:
-    """Join a thread that waits for the event, as a hook does with a thread that sleeps."""
+    """Join a thread that waits for the event, like a hook that joins a sleeping thread."""
     thread = threading.Thread(target=event.wait, args=(0.001,), daemon=True)
     thread.start()
     thread.join()

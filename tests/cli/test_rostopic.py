@@ -150,7 +150,7 @@ def test_echo_waits_for_a_publisher_and_follows_it(robot: Any, program: Start) -
 
 
 def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
-    """`rostopic pub /t type "data: True"` latches the message until Ctrl-C."""
+    """`rostopic pub /t type "data: True"` latches the message, until Ctrl-C."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "data: True"])
     assert pub.stdout is not None
     assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
@@ -164,7 +164,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     waits: list[float] = []
 
     def wait(_: ToolNode, seconds: float) -> bool:
-        # On a busy machine a subscriber may need longer.
+        # On a busy machine, a subscriber may take longer.
         waits.append(seconds)
         wait_until(lambda: len(robot.heard) == len(waits))
         return False
@@ -370,7 +370,7 @@ def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.Mon
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
 def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
-    """In `rostopic echo /a | rostopic pub /b TYPE`, each message is published as soon as it arrives, not at end of file."""
+    """In `rostopic echo /a | rostopic pub /b TYPE`, each message is published when it arrives, not at the end of the input."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool"])
     assert pub.stdin is not None
     for text, heard in (("data: True\n---\n", [b"\x01"]), ("data: False\n---\n", [b"\x01", b"\x00"])):
@@ -463,7 +463,7 @@ def test_argument_that_yaml_cannot_hold_is_misuse(master: str, command: Any, tex
 
 @pytest.mark.skipif(os.name == "nt", reason="select() supports only sockets on Windows")
 def test_documents_on_stdin_are_read_as_soon_as_they_arrive() -> None:
-    """Several lines in one write do not wait in a buffer for the next write."""
+    """Several lines in one write do not wait in a buffer until the next write."""
     program = "import rostopic\nfor document in rostopic.stdin_yaml_arg():\n    print(document, flush=True)\n"
     with subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE

@@ -53,7 +53,7 @@ def emulated_modules() -> tuple[str, ...]:
 
 
 LISTED = "COMPARED_MODULES"
-"""The variable that gives :func:`emulated_modules` to the other interpreter."""
+"""The variable that passes :func:`emulated_modules` to the other interpreter."""
 
 
 @functools.cache
@@ -186,7 +186,7 @@ LEFT_OUT = [
     ("rosunit.rosunit_main", "BareTestCase", "the inside of the command rosunit"),
     ("", "logger", "the module's own logger"),
 ]
-"""(module or start of it, names or "*", the reason why they are not offered)."""
+"""(module or the start of its name, names or "*", the reason why they are not offered)."""
 
 MEMBERS_INSIDE = {
     "acquire_impl": "rospy's inside",

@@ -130,7 +130,7 @@ def test_loopback_is_known_by_name_and_address() -> None:
 def test_tokens_are_random_and_have_their_form() -> None:
     made = {new_token() for _ in range(100)}
     assert len(made) == 100
-    # 22 base64 characters represent 128 bits.
+    # 22 base64 characters encode 128 bits.
     assert {len(each) for each in made} == {22}
     for token in (*made, "a" * 8, "_-" * 100):
         assert is_token(token) is True

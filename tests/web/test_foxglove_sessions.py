@@ -283,7 +283,7 @@ def test_changes_of_parameters_reach_subscribers(bridge: Running) -> None:
     assert everything.next("parameterValues")["parameters"] == [{"name": "/ns/x", "value": 5}]
     assert everything.next("parameterValues")["parameters"] == [{"name": "/a"}]
     client.send(op="unsubscribeParameterUpdates", parameterNames=["/a", "/ns", "/ns/x"])
-    # Its response shows that the bridge has read the earlier messages.
+    # The response to it shows that the bridge has read the earlier messages.
     client.send(op="getParameters", parameterNames=["/a"], id="unsubscribed")
     client.next("parameterValues", lambda message: message.get("id") == "unsubscribed")
     everything.close()

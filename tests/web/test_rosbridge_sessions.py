@@ -180,7 +180,7 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
     latched(bridge, "/large", String("a" * 100_000))
     latched(bridge, "/small", String("b"))
     fields = {"compression": compression, "fragment_size": fragment_size}
-    # The clients do not read all fragments, so they do not receive a close frame either.
+    # The clients do not read all fragments, so they do not receive a close frame.
     client, other = (bridge.rosbridge(close_timeout=0.1) for _ in range(2))
     client.send(op="subscribe", topic="/large", **fields)
     assert has_started.wait(30)
@@ -306,7 +306,7 @@ def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Run
         client = bridge.rosbridge(path=f"/?token={opening}")
         client.socket.send(cbor2.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 9000}))
         assert "bytes of CBOR is too large: this token is read-only" in client.next("status")["msg"]
-        # A token in parts is not accepted, either.
+        # A token in fragments is not accepted, either.
         client = bridge.rosbridge(path=f"/?token={opening}")
         text = json.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 25_000})
         for at, half in enumerate((text[:40_000], text[40_000:])):

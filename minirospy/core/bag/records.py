@@ -66,7 +66,7 @@ BAG_HEADER_SIZE = 4096
 closed.
 """
 
-# maximum bytes in a record's header, which contains definitions in version 1.2 bags
+# maximum bytes in a record's header; in version 1.2 bags it contains definitions
 MAX_HEADER = 16 * 1024 * 1024
 
 MAX_UINT32 = 0xFFFFFFFF
@@ -90,7 +90,7 @@ _PAIR = struct.Struct("<II")
 _ENTRY = struct.Struct("<III")
 
 Fields = dict[str, bytes]
-"""A header's fields; the values are bytes, because definitions are not always UTF-8."""
+"""A header's fields. The values are bytes, because definitions are not always UTF-8."""
 
 
 class BagHeader(NamedTuple):
@@ -153,7 +153,7 @@ class IndexEntry(NamedTuple):
 
 
 class IndexData(NamedTuple):
-    """The entries for one connection in the chunk that precedes this record."""
+    """The entries of one connection for the chunk that precedes this record."""
 
     connection: int
     entries: list[IndexEntry]
@@ -250,7 +250,7 @@ def read_version(stream: BinaryIO) -> int:
 
 
 def read_record(stream: BinaryIO, limit: int) -> Record:
-    """Read the header of the record at the stream's position, and the length of its data, which follows.
+    """Read the header and data length of the record at the stream's position; leave the stream at the start of the data.
 
     ``limit`` is the stream's size. Raise BagFormatError if the record is damaged, or a length goes beyond ``limit``.
     """

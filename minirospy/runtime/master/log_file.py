@@ -20,7 +20,7 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 FLUSH_SECONDS = 0.5
-# Maximum number of characters to collect, because writing megabytes in one call would block the master
+# Maximum number of buffered characters; writing megabytes in one call would block the master
 _MAX_PENDING = 64 * 1024
 
 
@@ -117,8 +117,8 @@ class LogFile(LogFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master. Discard the stream: its unwritten data would make closing it
-                # fail again.
+                # A full disk must not stop the master.
+                # Discard the stream; closing it normally would fail again because of its unwritten data.
                 if self.stream:
                     with contextlib.suppress(OSError, ValueError):
                         self.stream.close()
@@ -136,6 +136,6 @@ class _Formatter(logging.Formatter):
         return self._stamp(record.created)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's
-        # Peers choose the names and URIs in the message: escape them, so that they cannot start another line.
+        # Escape the names and URIs in the message: peers choose them, and must not be able to start another line.
         record.message = escaped(record.message)
         return super().formatMessage(record)

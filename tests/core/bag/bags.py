@@ -1,4 +1,4 @@
-"""Build bags of any shape, record by record: the test chooses the messages in each chunk, and their order."""
+"""Build bags of any shape, record by record. The test chooses the messages of each chunk and their order."""
 
 from __future__ import annotations
 

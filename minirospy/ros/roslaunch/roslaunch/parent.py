@@ -87,7 +87,7 @@ class ROSLaunchParent:
         try:
             runner.launch()
         except RLException:
-            # Allow another attempt to start.
+            # Allow the program to call start() again.
             self.runner = None
             raise
         if auto_terminate and self.pm:

@@ -8,7 +8,7 @@ DEFAULT_BUFF_SIZE = 65536
 """The default value for Subscriber's ``buff_size``."""
 
 
-# Classes that are imported on first use: few programs use them, and `import rospy` need not import their module.
+# Imported on first use: few programs use these classes, and `import rospy` must not load their module.
 _CLASSES = ("DeadTransport", "ProtocolHandler", "Transport")
 
 
