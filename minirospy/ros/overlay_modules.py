@@ -45,7 +45,7 @@ _INTERNAL = {
     "message_filters": "stamps",
     "rosauth": "authentication",
     "rosbag": "exceptions internals opening private readers records",
-    "rospy": "live passing",
+    "rospy": "live",
     "rostopic": "echo rates",
     "smach_ros": "callbacks pickled",
     "sound_play": "node players programs tones",
@@ -176,9 +176,7 @@ def _text(name: str, source: Path) -> str:
     passed_on = _passed_on(name, listed(source))
     is_package = source.name == "__init__.py" and name not in _ALSO
     later = {**(_submodules(name) if is_package else {}), **passed_on}
-    hook = names_here.pop("__getattr__", None) if later else None
-    if hook:
-        names_here["_find_more"] = hook
+    assert not (later and "__getattr__" in names_here), f"{where}: overlay/ needs a __getattr__ of its own"
     for bound, (module, imported) in names_here.items():
         if imported:
             by_module.setdefault(module, []).append(f"{imported} as {bound}")
@@ -202,7 +200,7 @@ def _text(name: str, source: Path) -> str:
             *_wrapped(f'"{each}"' for each in passed_on),
             "]",
         ]
-        lines += _text_of_later(name, later, starred if passed_on else [], has_hook=hook is not None)
+        lines += _text_of_later(name, later, starred if passed_on else [])
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -234,9 +232,8 @@ def _submodules(package: str) -> dict[str, str]:
     return {name: f"{package}.{name}" for name in sorted(names)}
 
 
-def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, has_hook: bool) -> list[str]:
+def _text_of_later(module: str, names: dict[str, str], starred: list[str]) -> list[str]:
     """Return source lines that look up these names at first use. Type checkers and editors do not see such names."""
-    missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
     return [
         "",
         "import typing as _typing",
@@ -252,7 +249,7 @@ def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, ha
         "    def __getattr__(name):",
         "        if name in _LATER:",
         "            return _import_passed_on(globals(), name, _LATER[name])",
-        f"        {'return _find_more(name)' if has_hook else missing}",
+        f"        raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")",
     ]
 
 

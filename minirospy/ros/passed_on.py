@@ -805,7 +805,7 @@ PASSED_ON = {
             "rospydebug rospyerr rospyinfo rospywarn signal_shutdown xmlrpcapi"
         ),
         "rospy.exceptions": "ROSException ROSInitException ROSInternalException",
-        "rospy.impl.transport": "BIDIRECTIONAL",
+        "rospy.impl.transport": "BIDIRECTIONAL Transport",
         "rospy.impl.validators": "ParameterInvalid",
         "rospy.names": (
             "SERVICE_ANYTYPE TOPIC_ANYTYPE canonicalize_name get_caller_id=get_name get_mappings "
@@ -873,6 +873,7 @@ PASSED_ON = {
             "rospydebug rospyerr rospyinfo rospywarn signal_shutdown xmlrpcapi"
         ),
         "rospy.exceptions": "ROSException ROSInitException",
+        "rospy.impl.transport": "DeadTransport ProtocolHandler Transport",
         "rospy.impl.validators": "ParameterInvalid",
         "rospy.names": (
             "SERVICE_ANYTYPE TOPIC_ANYTYPE canonicalize_name get_caller_id=get_name get_mappings "

@@ -5,8 +5,6 @@ from minirospy.client.services import Service, ServiceProxy
 from minirospy.ros.rospy.rospy.core import service_logger as logger
 from minirospy.ros.rospy.rospy.impl.registration import Registration, ServiceManager
 from minirospy.ros.rospy.rospy.impl.transport import BIDIRECTIONAL, INBOUND, OUTBOUND
-from minirospy.ros.rospy.rospy.passing import service_dir as __dir__
-from minirospy.ros.rospy.rospy.passing import service_getattr as __getattr__
 
 __all__ = [
     "BIDIRECTIONAL",
@@ -17,7 +15,5 @@ __all__ = [
     "ServiceException",
     "ServiceManager",
     "ServiceProxy",
-    "__dir__",
-    "__getattr__",
     "logger",
 ]
