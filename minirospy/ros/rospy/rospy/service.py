@@ -1,7 +1,8 @@
 """Provides the names in ROS's module rospy.service."""
 
 from minirospy.base.errors import ServiceException
-from minirospy.client.services import Service, ServiceProxy
+from minirospy.client.service import Service
+from minirospy.client.service_proxy import ServiceProxy
 from minirospy.ros.rospy.rospy.core import service_logger as logger
 from minirospy.ros.rospy.rospy.impl.registration import Registration, ServiceManager
 from minirospy.ros.rospy.rospy.impl.transport import BIDIRECTIONAL, INBOUND, OUTBOUND
