@@ -55,6 +55,11 @@ _INTERNAL = {
     "urdf_parser_py": "joints links",
 }
 """Modules that ROS's Python modules do not have. Do not add entries: put a new module next to the Python module's folder."""
+_WITHOUT_STANDARD_LIBRARY = {
+    *("PyKDL", "angles", "camera_calibration_parsers", "cv_bridge"),
+    *("genmsg", "genpy", "image_geometry", "sensor_msgs"),
+}
+"""Packages that in real ROS import no XML, XML-RPC or logging handlers. Programs that use only messages start faster."""
 _GENERATED = "generated from minirospy/"  # marks generated modules, in their docstrings
 _METADATA = "rospy-1.17.0.egg-info"  # programs query rospy's version through importlib.metadata
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
@@ -186,7 +191,7 @@ def _text(name: str, source: Path) -> str:
         lines += [f"from {module} import (", *_wrapped(names), ")"]
     if public is not None:
         lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
-    if is_package and "." not in name:
+    if is_package and "." not in name and name not in _WITHOUT_STANDARD_LIBRARY:
         lines += [
             *([""] if lines[-1] else []),
             "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
