@@ -4,7 +4,7 @@ Each module re-exports names from the module of the same name in this package.
 
 The names that `import rosgraph.masterapi` provides are in `ros/rosgraph/rosgraph/masterapi.py`; the module in `overlay/`
 re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. In real ROS, a star
-import also brings names from other modules (`os`, `rospy`: passed_on.py); the module in `overlay/` finds these names when a
+import also brings names from other modules (`os`, `rospy`: passed_on.json); the module in `overlay/` finds these names when a
 program first uses them. The build writes `overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it
 again. This module reads the sources without importing them.
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
@@ -20,12 +21,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.core.idl.own_packages import own_definitions
-from minirospy.ros.passed_on import PASSED_ON
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
-__all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_overlay"]
+__all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "read_passed_on", "write_overlay"]
 
 PACKAGE = Path(__file__).parents[1]
+_PASSED_ON = PACKAGE / "ros" / "passed_on.json"  # written by tests/referee/compare_surface.py
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
 """Maps Python modules that belong to no ROS package to their folders."""
 _NAMED_OTHERWISE = {
@@ -217,11 +218,22 @@ def listed(source: Path) -> list[str]:
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
     """Map the names that a star import brings from other modules to their `MODULE` or `MODULE:NAME`."""
     found = {}
-    for place, names in PASSED_ON.get(module, {}).items():
+    for place, names in read_passed_on().get(module, {}).items():
         for each in names.split():
             name, _, there = each.partition("=")
             found[name] = ":".join(filter(None, (place, there or name)))
     return {name: found[name] for name in sorted(found.keys() - set(own))}
+
+
+@functools.cache
+def read_passed_on() -> dict[str, dict[str, str]]:
+    """Return the names that star imports bring in real ROS because its modules have no ``__all__``.
+
+    The result maps modules to the modules that define the names ("" if the names are modules themselves), and these to the
+    names, separated by spaces: NAME, or NAME=NAME_THERE.
+    """
+    table: dict[str, dict[str, str]] = json.loads(_PASSED_ON.read_text(encoding="utf-8"))
+    return table
 
 
 def _submodules(package: str) -> dict[str, str]:
