@@ -378,7 +378,7 @@ def test_chunk_that_has_been_compressed_is_written_without_another_message() -> 
     stream = io.BytesIO()
     with ThreadPoolExecutor(1) as executor:
         writer = BagWriter(
-            stream, chunk_threshold=0, compression=BZ2, executor=executor, most_waiting=sys.maxsize
+            stream, chunk_threshold=0, compression=BZ2, executor=executor, max_waiting=sys.maxsize
         )
         writer.write(writer.add_connection("/t", header("/t")), 1, b"x" * 1000)
     writer.write_ready()
