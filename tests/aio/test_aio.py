@@ -875,7 +875,7 @@ def test_simulated_time(master: str) -> None:
 def test_silent_clock_is_reported_once(
     master: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 0.0)
 
     async def main() -> None:
         async with Node("n") as setting:
