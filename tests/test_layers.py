@@ -447,7 +447,7 @@ ROS_PROGRAMS = [
     "ros/tf2_ros/transformations_calls.py",
 ]  # fmt: skip
 """These use private names of ROS's own packages, as other people's programs do: their accesses have no limit."""
-MAX_PRIVATE_ACCESSES = 240  # of tests to members that begin with one underscore; to be lowered, never raised
+MAX_PRIVATE_ACCESSES = 214  # of tests to members that begin with one underscore; to be lowered, never raised
 
 
 def private_accesses(path: Path) -> list[str]:

@@ -112,6 +112,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/share/msgs/std_msgs/msg/Bool.msg",
         "minirospy/share/rpi_feros/package.xml",
         "minirospy/share/launch/package.xml",
+        "minirospy/ros/passed_on.json",
         "minirospy/workspace/shell/ros.bash",
         "minirospy/workspace/shell/ros.bat",
         "minirospy/workspace/shell/ros.ps1",

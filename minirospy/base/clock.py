@@ -36,7 +36,7 @@ On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just be
 
 _POLL_SECONDS = 0.1
 # seconds to wait for the first /clock message before warning; a simulator normally sends it sooner
-_SILENT_SECONDS = 2.0
+SILENT_SECONDS = 2.0
 
 SILENT_CLOCK = (
     "/use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the simulator or "
@@ -142,7 +142,7 @@ class FirstTimeWait:
 
     def check(self, started: float) -> None:
         """Call the function if the wait that began at ``started`` (in seconds of time.monotonic()) has lasted too long."""
-        if self._pending and time.monotonic() - started >= _SILENT_SECONDS:
+        if self._pending and time.monotonic() - started >= SILENT_SECONDS:
             try:
                 on_silence = self._pending.pop()
             except IndexError:

@@ -80,7 +80,7 @@ def _demo(presses: int | None) -> int:
                     took = _follow(board, level)
                     failures += took is None
                     show.tell(count, level, took)
-                    _rest(board, launch, show, _HOLD_SECONDS if level else _REST_SECONDS)
+                    _rest(launch, show, _HOLD_SECONDS if level else _REST_SECONDS)
         if failures:
             print(f"GPIO {LED} did not follow GPIO {BUTTON} {failures} times", file=sys.stderr)
         return 1 if failures else 0
@@ -191,7 +191,7 @@ def _wait_for(board: Board, level: int, timeout: float) -> int | None:
     return None
 
 
-def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: float) -> None:
+def _rest(launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: float) -> None:
     end = time.monotonic() + seconds
     while (rest := end - time.monotonic()) > 0:
         if launch.poll() is not None:

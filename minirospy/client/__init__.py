@@ -62,7 +62,8 @@ from minirospy.client.params import (
     search_param,
     set_param,
 )
-from minirospy.client.services import Service, ServiceProxy, wait_for_service
+from minirospy.client.service import Service
+from minirospy.client.service_proxy import ServiceProxy, wait_for_service
 from minirospy.client.session import current_session
 from minirospy.client.startup import init_node
 from minirospy.client.time import Duration, Rate, Time, Timer, get_rostime, get_time, is_wallclock, sleep

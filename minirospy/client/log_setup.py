@@ -100,7 +100,7 @@ def _offer_logger_services() -> None:
     from roscpp.msg import Logger
     from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
 
-    from minirospy.client.services import Service
+    from minirospy.client.service import Service
 
     def get_loggers(request: object) -> GetLoggersResponse:
         levels = logger_levels(sorted(logging.root.manager.loggerDict))

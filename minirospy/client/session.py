@@ -25,7 +25,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 if TYPE_CHECKING:
     # For type checking only: a program without a node does not import asyncio.
     from minirospy.client.publisher import PublishedTopic
-    from minirospy.client.services import Service
+    from minirospy.client.service import Service
     from minirospy.client.subscriber import SubscribedTopic
     from minirospy.runtime.node.node import Node
     from minirospy.runtime.transport.loop import LoopThread

@@ -42,7 +42,7 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """How much a thread in the program knows about the shutdown."""
+    """States whether, and how, a thread of the program has been notified of the shutdown."""
 
     NONE = 0  # the thread has never called is_shutdown()
     POLLS = 1

@@ -23,7 +23,7 @@ MAX_HOLDS = 5_000
 class _Hold:
     claim: Claim
     left: float | None = None
-    """When the gateway left, in seconds of the clock; None while it is present."""
+    """The time at which the gateway left, in seconds of the clock; None while it is present."""
 
 
 class Holders:

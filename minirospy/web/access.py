@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from minirospy.base.errors import BridgeError
 
@@ -185,11 +185,6 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def without_token(target: str) -> str:
-    """Return a request's path without the query, which may contain a token, for use in logs."""
-    return unquote(urlsplit(target).path)[:200]
 
 
 def header_items(headers: Mapping[str, str], name: str) -> list[str]:

@@ -375,7 +375,7 @@ class _Builder:
         allowed = {plan.name, *self._closure(plan.message_depends)}
         for file in plan.definitions:
             for spec in self._specs(plan, file):
-                self._check_fields(plan, file, spec, allowed)
+                self._check_fields(file, spec, allowed)
 
         named = set(plan.manifest.depends())
         return tuple(
@@ -392,7 +392,7 @@ class _Builder:
             return [service.request, service.response]
         return list(self._catalogue.action(f"{plan.name}/{file.stem}").messages)
 
-    def _check_fields(self, plan: Plan, file: Path, spec: MessageSpec, allowed: Collection[str]) -> None:
+    def _check_fields(self, file: Path, spec: MessageSpec, allowed: Collection[str]) -> None:
         for field in spec.fields:
             if field.type.is_primitive:
                 continue

@@ -37,6 +37,7 @@ from minirospy.base.errors import (
 )
 from minirospy.base.times import Duration, Time
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from tests.waiting import until
 
@@ -875,7 +876,7 @@ def test_simulated_time(master: str) -> None:
 def test_silent_clock_is_reported_once(
     master: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 0.0)
 
     async def main() -> None:
         async with Node("n") as setting:
@@ -957,11 +958,12 @@ def test_aio_node_and_rospy_node_exchange_messages(master: str) -> None:
     run(main)
 
 
-def test_unreachable_master_is_an_error(master: str) -> None:
+def test_unreachable_master_is_an_error() -> None:
     async def main() -> None:
-        async with Node("n", master_uri=master) as node:
-            node._environment = node._environment._replace(master_uri="http://localhost:1")
-            node._node.registrations._environment = node._environment
+        master = Master()
+        await master.start()
+        async with Node("n", master_uri=f"http://localhost:{master.port}", rosout=False) as node:
+            await master.close()
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
 

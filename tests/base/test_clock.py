@@ -169,11 +169,11 @@ def test_sleep_before_the_first_time_starts_at_it() -> None:
 def test_silent_clock_is_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
     reports: list[str] = []
     clock = SimulatedClock(on_silence=lambda: reports.append("silent"))
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 1000.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 1000.0)
     sleeping = Sleeping(clock, SECOND)
     sleeping.at(0)
     assert reports == []
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 0.0)
     sleeping.at(0)
     sleeping.at(0)
     assert reports == ["silent"]

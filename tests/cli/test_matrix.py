@@ -256,7 +256,7 @@ def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
             ghost.register_service(service, "rosrpc://localhost:1", "http://localhost:1/")
         ghost.set_param("/text", "日本")
 
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.02)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.02)
     return robot
 
 

@@ -157,7 +157,7 @@ def test_folders_that_cannot_be_created_are_reported(
     assert f"setting /run_id to {run_id}\n" in core.said
 
     # The /rosout node receives log messages, and continues without its file.
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.2)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
 

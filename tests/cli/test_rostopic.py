@@ -179,7 +179,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
         assert verbose.out == "publishing and latching [data: False] for 3.0 seconds\n"
     assert waits == [3.0, 3.0]
     assert robot.heard == [b"\x01", b"\x00"]
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     for words in (
         ("geometry_msgs/Point", "1", "-2.5", "-3"),
         ("std_msgs/Float32", "-0.5"),
@@ -191,7 +191,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
 def test_pub_from_standard_input_and_file(
     robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._REGISTERED_CONNECT_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.REGISTERED_CONNECT_SECONDS", 60.0)
     file = tmp_path / "messages.yaml"
     file.write_text("data: True\n---\ndata: False\n---\n")
     pub = ("pub", "-r", "50", "/listen", "std_msgs/Bool")
@@ -237,7 +237,7 @@ def test_pub_that_cannot_be(master: str, command: Any, argv: list[str], status: 
 
 
 def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "/listen", "std_msgs/String", "x")
     assert (
         "WARNING: topic [/listen] is of type [std_msgs/Bool] already, not [std_msgs/String]\n" in result.err
@@ -247,7 +247,7 @@ def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch:
 def test_pub_without_subscribers_suggests_a_similar_topic(
     robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     misspelt = command("rostopic", "pub", "-1", "/lisen", "std_msgs/Bool", "true")
     assert misspelt.status == 0
     assert misspelt.err == "WARNING: topic [/lisen] has no subscribers yet; did you mean /listen?\n"
@@ -363,7 +363,7 @@ def test_pub_options_that_exclude_each_other(master: str, command: Any) -> None:
 
 
 def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "")
     assert result == (0, "publishing and latching [data: ''] for 0.1 seconds\n", "")
 
@@ -447,7 +447,7 @@ def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: St
 
 
 def test_a_value_is_no_remapping(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "data: 'x:=1'")
     assert result == (0, 'publishing and latching [data: "x:=1"] for 0.1 seconds\n', "")
 

@@ -388,7 +388,7 @@ def test_a_service_that_one_thread_ends_another_may_offer_at_that_moment(started
         started,
         """
 import threading
-import minirospy.client.services as module
+import minirospy.client.service as module
 import rospy
 from std_srvs.srv import Trigger
 

@@ -166,7 +166,7 @@ def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> No
 def test_large_message_is_encoded_in_a_thread_while_others_are_served(
     bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
 ) -> None:
-    encode, names = shared._encoded, list[str]()
+    encode, names = shared.encode_arrival, list[str]()
     has_started, may_end = threading.Event(), threading.Event()
 
     def slow(topic: str, *arguments: Any) -> bytes:
@@ -176,7 +176,7 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
             may_end.wait(30)
         return encode(topic, *arguments)
 
-    monkeypatch.setattr(shared, "_encoded", slow)
+    monkeypatch.setattr(shared, "encode_arrival", slow)
     latched(bridge, "/large", String("a" * 100_000))
     latched(bridge, "/small", String("b"))
     fields = {"compression": compression, "fragment_size": fragment_size}
@@ -205,14 +205,14 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
 def test_client_may_leave_while_its_large_message_is_encoded(
     bridge: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    encode, has_started, may_end = shared._encoded, threading.Event(), threading.Event()
+    encode, has_started, may_end = shared.encode_arrival, threading.Event(), threading.Event()
 
     def slow(*arguments: Any) -> bytes:
         has_started.set()
         may_end.wait(30)
         return encode(*arguments)
 
-    monkeypatch.setattr(shared, "_encoded", slow)
+    monkeypatch.setattr(shared, "encode_arrival", slow)
     latched(bridge, "/large", String("a" * 100_000))
     client = bridge.rosbridge()
     client.send(op="subscribe", topic="/large")

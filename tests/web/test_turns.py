@@ -1,4 +1,4 @@
-"""How a server's clients share its event loop: the order of their work, with a clock that the test controls."""
+"""A server's clients share its event loop: the order of their work, with a clock that the test controls."""
 
 from __future__ import annotations
 

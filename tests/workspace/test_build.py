@@ -920,7 +920,7 @@ def test_src_of_a_folder_above_is_no_workspace(scene: Scene) -> None:
 
 
 def test_a_macro_of_a_package_does_not_replace_catkins(scene: Scene) -> None:
-    """This happens with dynamic_reconfigure in a workspace: its macro would run CMake's add_custom_command."""
+    """dynamic_reconfigure is such a package: its macro would run CMake's add_custom_command."""
     scene.package(
         "p",
         "include(cmake/own.cmake)\nfind_package(catkin REQUIRED COMPONENTS message_generation)\n"

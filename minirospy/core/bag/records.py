@@ -32,8 +32,6 @@ __all__ = [
     "ChunkInfo",
     "Connection",
     "Fields",
-    "IndexData",
-    "IndexEntry",
     "MessageData",
     "Record",
     "parse_bag_header",
@@ -41,7 +39,6 @@ __all__ = [
     "parse_chunk_info",
     "parse_connection",
     "parse_fields",
-    "parse_index_data",
     "parse_message_data",
     "parse_record",
     "parse_records",
@@ -87,7 +84,6 @@ _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")
 _TIME = struct.Struct("<II")
 _PAIR = struct.Struct("<II")
-_ENTRY = struct.Struct("<III")
 
 Fields = dict[str, bytes]
 """A header's fields. The values are bytes, because definitions are not always UTF-8."""
@@ -143,20 +139,6 @@ class MessageData(NamedTuple):
     connection: int
     time: int
     body: bytes
-
-
-class IndexEntry(NamedTuple):
-    """A message's location: its time, and its record's offset in the chunk's decompressed data."""
-
-    time: int
-    offset: int
-
-
-class IndexData(NamedTuple):
-    """The entries of one connection for the chunk that precedes this record."""
-
-    connection: int
-    entries: list[IndexEntry]
 
 
 class Chunk(NamedTuple):
@@ -349,22 +331,6 @@ def parse_message_data(record: Record, body: bytes) -> MessageData:
     """Parse a message record. Raise BagFormatError if it is invalid."""
     record.expect(OP_MESSAGE_DATA)
     return MessageData(record.uint32("conn"), record.time("time"), body)
-
-
-def parse_index_data(record: Record, data: bytes) -> IndexData:
-    """Parse the entries of a version 2.0 index record. Raise BagFormatError if the record is invalid."""
-    record.expect(OP_INDEX_DATA)
-    version, count = record.uint32("ver"), record.uint32("count")
-    if version != 1:
-        raise BagFormatError(f"expecting index version 1, got {version}", record.position)
-    if len(data) < count * _ENTRY.size:
-        raise BagFormatError(f"an index of {count} messages has only {len(data)} bytes", record.position)
-
-    entries = [
-        IndexEntry(seconds * _BILLION + nanoseconds, offset)
-        for seconds, nanoseconds, offset in _ENTRY.iter_unpack(data[: count * _ENTRY.size])
-    ]
-    return IndexData(record.uint32("conn"), entries)
 
 
 def parse_chunk_header(record: Record) -> Chunk:

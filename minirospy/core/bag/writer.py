@@ -114,7 +114,7 @@ class BagWriter:
     """Writes a version 2.0 bag to a binary stream, which it does not close. Use it in one thread at a time.
 
     ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without an
-    executor, the calling thread compresses them. If more than ``most_waiting`` chunks are queued for compression,
+    executor, the calling thread compresses them. If more than ``max_waiting`` chunks are queued for compression,
     :meth:`write` blocks. ``continued``: append to the bag in the stream, overwriting its index. Raise
     BagCompressionError if the compression is unknown or its library is missing.
 
@@ -129,14 +129,14 @@ class BagWriter:
         compression: str = NONE,
         chunk_threshold: int = CHUNK_THRESHOLD,
         executor: Executor | None = None,
-        most_waiting: int = 4,
+        max_waiting: int = 4,
         continued: Continued | None = None,
     ) -> None:
         self.chunk_threshold = chunk_threshold
         self.chunks: list[ChunkInfo] = []  # the chunks already written
         self._stream = stream
         self._executor = executor
-        self._most_waiting = most_waiting
+        self._max_waiting = max_waiting
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
@@ -276,7 +276,7 @@ class BagWriter:
         self._start_chunk()
         self._complete.append(complete)
         self._waiting += complete.size
-        self._write_complete(self._most_waiting)
+        self._write_complete(self._max_waiting)
 
     def write_ready(self) -> None:
         """Write the complete chunks that are already compressed. Raise OSError if the stream fails."""

@@ -240,10 +240,6 @@ class Registry:
         """Return the type of each topic that has ever been registered with a type."""
         return dict(self.type_rows())
 
-    def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
-        """Return (topic, type) for each published topic below the namespace ``subgraph``."""
-        return list(self.published_rows(subgraph))
-
     def publishers(self) -> dict[str, list[str]]:
         """Return the nodes that publish each topic."""
         return dict(self.publisher_rows())
@@ -261,7 +257,7 @@ class Registry:
         return self._types.rows()
 
     def published_rows(self, subgraph: str = "") -> Iterator[tuple[str, str]]:
-        """Yield the items of :meth:`published_topics`. The table may change during the iteration."""
+        """Yield (topic, type) for each published topic below the namespace ``subgraph``. The table may change meanwhile."""
         prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
         return (
             (topic, self._types[topic])

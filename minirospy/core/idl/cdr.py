@@ -41,7 +41,7 @@ _SPARE = 10_000  # number of zero-size elements allowed in addition to one per b
 
 
 class Side(Enum):
-    """Whether an item exists in both message types, or in only one.
+    """States whether an item exists in both message types, or in only one.
 
     An item that exists only in the source is skipped; one that exists only in the target is written as zeros.
     """
@@ -117,7 +117,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
 
 
 class _Position(NamedTuple):
-    """What is known about a position in CDR: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
+    """A position in CDR of which only the remainder after division by ``modulus`` (1, 2, 4 or 8) is known."""
 
     modulus: int
     remainder: int
@@ -126,7 +126,7 @@ class _Position(NamedTuple):
         return _Position(self.modulus, (self.remainder + size) % self.modulus)
 
     def after_any(self, width: int) -> _Position:
-        """Return what is known about the position after any number of items of ``width`` bytes."""
+        """Return the position after any number of items of ``width`` bytes."""
         modulus = min(self.modulus, width)
         return _Position(modulus, self.remainder % modulus)
 

@@ -25,7 +25,6 @@ _LABEL_COLORS = bytes.fromhex(
 )
 """Red, green and blue for labels 0, 1, ...: CSS's named colors in alphabetical order, rounded as in ROS."""
 
-_BACKGROUND = -1  # the label that is displayed as black
 _SHOWN = ("rgb8", "bgr8", "rgba8", "bgra8", "mono8")
 _GRAY = 128  # gray level for an image without contrast
 _LEGACY = {

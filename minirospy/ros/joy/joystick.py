@@ -81,7 +81,7 @@ class Joystick:
         self._published(now + _FIRST_SECONDS)
 
     deadline: float | None
-    """When to publish the state if no event occurs; None if the state is only published on events."""
+    """The time at which to publish the state if no event occurs; None to publish only on events."""
 
     def handle(self, event: Event, now: float) -> bool:
         """Process an event; return whether to publish the state immediately. Raise ValueError if the event's type is unknown."""

@@ -46,9 +46,6 @@ _MAX_BYTES = 256 * 1024
 Longer messages are dropped, so that no node can fill the memory of the master's process.
 """
 
-_MAX_SUBSCRIBERS = 200
-"""Maximum number of subscribers to /rosout_agg. Limited because each one may queue messages of maximum size."""
-
 _LARGE, _MAX_LARGE = 16 * 1024, 100
 """Size in bytes, and number of messages: a message larger than this is not sent to a subscriber with that many queued
 messages.

@@ -30,23 +30,23 @@ class LogFileHandler(RotatingFileHandler):
     Otherwise another user could predict the log file's name and create a link there.
     """
 
-    def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """Open ``path``. If ``most_bytes`` is 0, there is no size limit. Raise OSError if the file cannot be opened."""
-        super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
+    def __init__(self, path: Path, max_bytes: int = 0, older_files: int = 0) -> None:
+        """Open ``path``. If ``max_bytes`` is 0, there is no size limit. Raise OSError if the file cannot be opened."""
+        super().__init__(path, maxBytes=max_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:
         return cast("TextIOWrapper", private_files.open_text(Path(self.baseFilename), "a"))
 
 
 class LogFile(LogFileHandler):
-    """The log file ``path``, of at most ``most_bytes``, with up to three rotated files.
+    """The log file ``path``, of at most ``max_bytes``, with up to three rotated files.
 
     Used as a logging handler, it writes warnings and errors immediately. :meth:`line` and :meth:`text` add plain strings
     and must be called on the loop.
     """
 
-    def __init__(self, path: Path, most_bytes: int, name: str) -> None:
-        super().__init__(path, most_bytes, older_files=3)
+    def __init__(self, path: Path, max_bytes: int, name: str) -> None:
+        super().__init__(path, max_bytes, older_files=3)
         self.setFormatter(_Formatter(self._stamp))
         self._line_head = f"[{name}][INFO] "
         self._lines: list[str] = []

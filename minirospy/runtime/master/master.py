@@ -81,7 +81,7 @@ class Master(MasterApi):
         access: Access | None = None,
         fresh: bool = False,
         timeout: float = 3.0,
-        most_clients: int = 4000,
+        max_clients: int = 4000,
         same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
@@ -109,7 +109,7 @@ class Master(MasterApi):
             self.serve,
             bind_host=bind_host,
             port=port,
-            most_idle=most_clients,
+            max_idle=max_clients,
             access=access,
             known_as=_names_of(host, bind_host) if same_host else (),
         )

@@ -130,7 +130,7 @@ class Node:
             bind_host=host,
             port=xmlrpc_port,
             ports=ports,
-            most_idle=MAX_IDLE,
+            max_idle=MAX_IDLE,
             access=self._access,
             known_as=(self.environment.uri_host,) if self.environment.same_host else (),
         )

@@ -81,7 +81,7 @@ class RpcServer:
         bind_host: str = "127.0.0.1",
         port: int = 0,
         ports: range | None = None,
-        most_idle: int | None = None,
+        max_idle: int | None = None,
         access: Access | None = None,
         known_as: Iterable[str] = (),
     ) -> None:
@@ -89,7 +89,7 @@ class RpcServer:
 
         ``known_as``: host names by which processes on this machine may connect through a Unix socket.
 
-        The ``most_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
+        The ``max_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
         disconnected.
         """
         self.dispatch = dispatch
@@ -106,9 +106,10 @@ class RpcServer:
 
         self._bind_host = bind_host
         self._ports = ports
-        self._most = most_idle
-        # If only few clients may stay connected, those accepted in one batch may displace each other, so read from each first.
-        self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
+        self._most = max_idle
+        # If only few clients may stay connected, clients that are accepted together may displace each other, so read
+        # from each first.
+        self._reads_all = max_idle is not None and max_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None

@@ -61,7 +61,7 @@ def _thread_limits() -> list[str]:
             limits.append(f"ulimit -v: {most // 1024} KiB")
     with contextlib.suppress(OSError, IndexError):
         group = Path("/proc/self/cgroup").read_text(encoding="utf-8").strip().rpartition("::")[2]
-        most_tasks = (_CGROUP / group.lstrip("/") / "pids.max").read_text(encoding="utf-8").strip()
-        if most_tasks != "max":
-            limits.append(f"pids.max of {group}: {most_tasks}")
+        max_tasks = (_CGROUP / group.lstrip("/") / "pids.max").read_text(encoding="utf-8").strip()
+        if max_tasks != "max":
+            limits.append(f"pids.max of {group}: {max_tasks}")
     return limits

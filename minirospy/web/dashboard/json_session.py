@@ -57,7 +57,7 @@ class JsonSession:
     longest: ClassVar[int] = 256_000
     """Maximum number of characters in an operation. Parsing delays all clients, so it must be short."""
 
-    most_waiting: ClassVar[int] = 100
+    max_waiting: ClassVar[int] = 100
     pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
 
     def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
@@ -106,7 +106,7 @@ class JsonSession:
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """Queue an operation."""
-        if len(self._operations) >= self.most_waiting:
+        if len(self._operations) >= self.max_waiting:
             self.send_error("too many operations wait: this one was dropped", fields)
             return
         self._operations.append((name, fields, self._operation_size))

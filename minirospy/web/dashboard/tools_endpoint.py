@@ -130,7 +130,7 @@ class ToolsSession(JsonSession):
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
-    most_waiting: ClassVar[int] = 20
+    max_waiting: ClassVar[int] = 20
 
     def __init__(self, endpoint: ToolsEndpoint, client: WebClient) -> None:
         self._endpoint = endpoint
@@ -161,7 +161,7 @@ class ToolsSession(JsonSession):
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """See :meth:`JsonSession.dispatch`."""
-        if len(self._running) >= self.most_waiting:
+        if len(self._running) >= self.max_waiting:
             self.send_error("too many requests wait for their answers", fields)
             return
         task = asyncio.ensure_future(self.carry_out(name, fields))

@@ -19,7 +19,7 @@ from minirospy.web.rosbridge.cbor import encode_cbor
 from minirospy.web.rosbridge.services import ClientService
 from minirospy.web.rosbridge.types import ArrivingTypes
 
-__all__ = ["RosbridgeOptions", "RosbridgeShared"]
+__all__ = ["RosbridgeOptions", "RosbridgeShared", "encode_arrival"]
 
 _LOG_LINES = 20
 
@@ -144,7 +144,7 @@ class RosbridgeShared:
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:
-            made = found[compression] = _encoded(topic, class_, arrival, compression, dump_json)
+            made = found[compression] = encode_arrival(topic, class_, arrival, compression, dump_json)
         return made
 
     async def encoded_large(
@@ -155,7 +155,7 @@ class RosbridgeShared:
 
         def encode() -> bytes:
             # The encoding may have been created for another client in the meantime.
-            return found.get(compression) or _encoded(
+            return found.get(compression) or encode_arrival(
                 topic, class_, arrival, compression, dump_json_in_pieces
             )
 
@@ -171,13 +171,14 @@ class RosbridgeShared:
         return known[1]
 
 
-def _encoded(
+def encode_arrival(
     topic: str,
     class_: type[Message] | None,
     arrival: Arrival,
     compression: str,
     dump: Callable[[object], str],
 ) -> bytes:
+    """Return a message encoded for clients; ``dump`` encodes JSON. Raise BridgeError if it cannot be encoded."""
     if compression == "cbor-raw":
         secs, nsecs = divmod(arrival.nanoseconds, 1_000_000_000)
         raw = {"secs": secs, "nsecs": nsecs, "bytes": bytes(arrival.body)}

@@ -248,7 +248,7 @@ def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch
 
 def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
     async def start() -> Master:
-        serving = Master(most_clients=20)
+        serving = Master(max_clients=20)
         await serving.start()
         return serving
 

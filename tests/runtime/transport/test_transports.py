@@ -1,4 +1,4 @@
-"""How two nodes on one machine connect by a Unix socket, and use TCP otherwise."""
+"""Two nodes on one machine connect by a Unix socket; other nodes use TCP."""
 
 from __future__ import annotations
 

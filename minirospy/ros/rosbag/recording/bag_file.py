@@ -184,5 +184,5 @@ def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | 
         chunk_threshold=options.chunk_size,
         executor=executor,
         # the recorder itself limits the queued bytes
-        most_waiting=_UNLIMITED,
+        max_waiting=_UNLIMITED,
     )

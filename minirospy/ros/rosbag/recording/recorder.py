@@ -68,7 +68,6 @@ class Recorder:
         self._file: BagFile | None = None
         self._is_complete = False
         self._latched: dict[tuple[str, str], tuple[Mapping[str, str], bytes, bytes]] = {}
-        self._has_space = True
         self._reported: Counter[str] = Counter()
         self._clock: Callable[[], int] = time.time_ns
         self._announcement: client.Publisher[Message] | None = None

@@ -240,7 +240,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         fresh=options.fresh,
         access=access,
         timeout=options.timeout,
-        most_clients=_most_clients(),
+        max_clients=_max_clients(),
         same_host=environment.same_host,
         owns_process=True,
     )
@@ -381,8 +381,8 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
     warn(f"ROS_MASTER_URI {what}: nodes find it with ROS_MASTER_URI={master.uri.rstrip('/')}")
 
 
-def _most_clients() -> int:
-    """Raise the open-file limit. Return the number of clients that it allows, reserving some files for other uses."""
+def _max_clients() -> int:
+    """Raise the open-file limit. Return the number of clients that it allows, with some files reserved for other uses."""
     if sys.platform == "win32":
         return 400
     import resource

@@ -49,16 +49,12 @@ if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log
 
     from minirospy.client.log import Keywords
-    from minirospy.ros.rospy.rospy.passing import core_dir as __dir__
-    from minirospy.ros.rospy.rospy.passing import core_getattr as __getattr__
 
 __all__ = [
     "MASTER_NAME",
     "ROSRPC",
     "Log",
     "NullHandler",
-    "__dir__",
-    "__getattr__",
     "_base_logger",
     "add_client_shutdown_hook",
     "add_preshutdown_hook",

@@ -35,10 +35,10 @@ __all__ = ["VERB"]
 _SHIELD = "\0"
 _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
 
-_LATCH_SECONDS = 3.0
+LATCH_SECONDS = 3.0
 _FILE_RATE = 10.0
 _CONNECT_SECONDS = 0.5
-_REGISTERED_CONNECT_SECONDS = 5.0
+REGISTERED_CONNECT_SECONDS = 5.0
 _CLOCK_SECONDS = 5.0
 
 
@@ -191,8 +191,8 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
             return
         messages: Iterable[Message] = itertools.repeat(message)
         if from_documents:
-            # Wait for subscribers to connect; otherwise the first messages from a file would be lost.
-            seconds = _REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
+            # Wait for subscribers to connect, because otherwise the first messages from a file would be lost.
+            seconds = REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
             publisher.wait_for_subscriber(node.wait, seconds)
             messages = itertools.chain([message], map(filled, all_values))
         elif options.substitute_keywords:
@@ -262,11 +262,11 @@ def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:
 
 
 def _latch(node: ToolNode, publisher: TopicPublisher, message: Message, options: _Publishing) -> None:
-    how_long = f" for {_LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
+    how_long = f" for {LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
     shown = f"[{message}]" if options.verbose else "message"
     print(f"publishing and latching {shown}{how_long}", flush=True)
     publisher.publish(message)
-    while not node.wait(_LATCH_SECONDS):
+    while not node.wait(LATCH_SECONDS):
         if options.once:
             return
 
