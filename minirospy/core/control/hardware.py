@@ -178,6 +178,9 @@ class RobotHardware:
     def write(self, time: Time, period: Duration) -> None:
         """Send the commands of the joints whose ``active`` is not None to the motors."""
 
+    def close(self) -> None:
+        """Close the device, after a last ``write`` in which no joint is active; both are called even if the hardware failed."""
+
     def find_conflicts(self, controllers: Sequence[ControllerInfo]) -> list[Conflict]:
         """Return the joints that several of these controllers, which would run together, claim."""
         return find_conflicts(controllers)
