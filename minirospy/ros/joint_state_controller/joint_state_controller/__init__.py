@@ -19,6 +19,7 @@ from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
 
 __all__ = ["JointStateController"]
 
+_STATE = ("position", "velocity", "effort")
 _XMLRPC_TYPES = {
     bool: 1,
     int: 2,
@@ -46,8 +47,8 @@ class JointStateController(Controller):
         self._rate = PublishRate.read(context.parameters)
         self._joints = [hardware.joint_state(name) for name in names]
         extra = list(_extra_joints(context.parameters, names))
-        self._names = names + [name for name, *_ in extra]
-        self._extra = [[each[column] for each in extra] for column in (1, 2, 3)]
+        self._names = names + [name for name, _ in extra]
+        self._extra = tuple([values[each] for _, values in extra] for each in _STATE)
         self._publisher = RealtimePublisher(
             f"{context.root.rstrip('/')}/joint_states", JointState, queue_size=4
         )
@@ -79,8 +80,8 @@ class JointStateController(Controller):
             self._publisher.close()
 
 
-def _extra_joints(parameters: Parameters, names: list[str]) -> Iterator[tuple[str, float, float, float]]:
-    """Yield name, position, velocity and effort of each extra joint. Log the reason for each one that is ignored."""
+def _extra_joints(parameters: Parameters, names: list[str]) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield the name and the state of each extra joint. Log the reason for each one that is ignored."""
     listed = parameters.get("extra_joints")
     if listed is None:
         return
@@ -104,10 +105,10 @@ def _extra_joints(parameters: Parameters, names: list[str]) -> Iterator[tuple[st
         if name in known:
             rospy.logwarn("Joint state interface already contains specified extra joint '%s'.", name)
             continue
-        state = {key: each.get(key, 0.0) for key in ("position", "velocity", "effort")}
+        state = {key: each.get(key, 0.0) for key in _STATE}
         wrong = [key for key, value in state.items() if not isinstance(value, float)]
         if wrong:
             rospy.logerr("Extra joint '%s' does not specify a valid default %s. Ignoring.", name, wrong[0])
             continue
         known.add(name)
-        yield name, state["position"], state["velocity"], state["effort"]
+        yield name, state
