@@ -19,7 +19,7 @@ from controller_manager_msgs.srv import (
 from std_msgs.msg import Bool
 
 from minirospy import client as rospy
-from minirospy.base.clock import SignalSafeEvent
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.ros.rosparam.rosparam import RosParamException, load_file, set_param_raw
 
 __all__ = ["main", "new_parser"]
@@ -177,9 +177,9 @@ def _wait_for_true(topic: str, timeout: float | None) -> None:
         is_true.set()
 
     with rospy.interrupting(interrupt):
-        if not has_message.wait(timeout):
+        if not wait_for_event(has_message, timeout):
             rospy.logwarn(f'Controller Spawner hasn\'t heard anything from its "wait for" topic ({topic})')
-        is_true.wait()
+        wait_for_event(is_true, None)
     subscriber.unregister()
     if rospy.is_shutdown():
         raise rospy.ROSInterruptException("rospy shutdown")
