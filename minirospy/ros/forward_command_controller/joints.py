@@ -43,8 +43,9 @@ class CommandTopic:
     def __init__(self, context: ControllerContext, joints: int, *, is_group: bool) -> None:
         """Subscribe to Float64MultiArray for a group of joints, else to Float64."""
         self.values: Sequence[float] = (0.0,) * joints
+        self._name = f"{context.namespace}/command"
         self._subscriber = rospy.Subscriber(
-            f"{context.namespace}/command",
+            self._name,
             Float64MultiArray if is_group else Float64,
             self._receive_group if is_group else self._receive,
             queue_size=1,
@@ -71,6 +72,4 @@ class CommandTopic:
         if all(map(math.isfinite, values)):
             self.values = values
         else:
-            rospy.logwarn_throttle(
-                1.0, f"Command on {self._subscriber.resolved_name} is not finite: {list(values)}. Ignoring."
-            )
+            rospy.logwarn_throttle(1.0, f"Command on {self._name} is not finite: {list(values)}. Ignoring.")
