@@ -22,12 +22,14 @@ def claim_joint(hardware: Resources, context: ControllerContext, interface: Inte
 
 
 def claim_group(hardware: Resources, context: ControllerContext, interface: Interface) -> list[Joint]:
-    """Return the joints of the parameter ``joints``. Raise ControllerError if there are none."""
+    """Return the joints of the parameter ``joints``. Raise ControllerError if there are none, or one twice."""
     names = context.parameters.names("joints")
     if names is None:
         raise ControllerError(f"Failed to getParam 'joints' (namespace: {context.namespace}).")
     if not names:
         raise ControllerError("List of joint names is empty.")
+    if len(set(names)) < len(names):
+        raise ControllerError(f"A joint is listed twice in {names} (namespace: {context.namespace}).")
     try:
         return [hardware.joint(name, interface) for name in names]
     except HardwareError as error:
