@@ -60,9 +60,9 @@ class Plugin(NamedTuple):
             for part in name.split("."):
                 found = getattr(found, part)
         except Exception as error:  # the user's module may raise anything
-            raise PluginError(
-                f"cannot import {self.python} ({self.origin}): {describe_error(error)}"
-            ) from error
+            trace = error.__traceback__
+            why = describe_error(error.with_traceback(trace and trace.tb_next))  # without this function
+            raise PluginError(f"cannot import {self.python} ({self.origin}): {why}") from error
         if not (isinstance(found, type) and issubclass(found, Controller)):
             raise PluginError(
                 f"{self.python} ({self.origin}) is not a subclass of controller_interface.Controller"
@@ -108,7 +108,8 @@ def _of_file(file: Path, folder: Path) -> Iterator[Plugin]:
 
 def _find_module(module: str, folder: Path) -> None:
     """Let Python find a module of a package that was not built or sourced: its folder is ``src`` or the package's."""
-    if importlib.util.find_spec(module) is None:
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:  # a folder of that name without code, such as the package's own
         for place in (folder / "src", folder):
             if (place / module).is_dir() or (place / f"{module}.py").is_file():
                 sys.path.append(str(place))
