@@ -36,7 +36,7 @@ _REPORT_SECONDS = 1.0
 _WARN_SECONDS = 10.0  # between two warnings about overruns, or about commands that are not finite
 _WARN_SHARE = 0.05  # of the cycles of a second; a busy computer delays single ones
 # Another thread that computes gives way to the loop after this time; Python's default is 5 ms.
-_SWITCH_SECONDS = 0.0005
+_SWITCH_SECONDS = 0.0002
 
 
 def run(hardware: RobotHardware, rate: float = 100.0, namespace: str = "") -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +23,9 @@ from minirospy.core.control.manager import describe_error
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
 
-__all__ = ["Plugin", "PluginError", "find_plugins"]
+__all__ = ["Plugin", "PluginError", "find_plugins", "forget_modules"]
+
+_OWN = Path(__file__).parents[1]
 
 _GROUP = "controller_interface.controllers"
 _BASES = {
@@ -85,6 +87,18 @@ def find_plugins(warn: Callable[[str], object] = lambda line: rospy.logwarn("%s"
     for point in metadata.entry_points(group=_GROUP):
         found.setdefault(point.name, Plugin(point.name, point.value, f"entry point of {point.module}"))
     return found
+
+
+def forget_modules(plugins: Iterable[Plugin]) -> None:
+    """Let the next load of these controllers read their files again; minirospy's own modules stay."""
+    folders = [
+        each.folder.resolve() for each in plugins if each.folder and not each.folder.is_relative_to(_OWN)
+    ]
+    for name, module in list(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if file and any(Path(file).resolve().is_relative_to(folder) for folder in folders):
+            del sys.modules[name]
+    importlib.invalidate_caches()
 
 
 def _of_package(name: str, folder: Path) -> Iterator[Plugin]:

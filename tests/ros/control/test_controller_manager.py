@@ -130,6 +130,17 @@ def test_controller_that_raises_is_stopped_and_the_loop_goes_on(start: Start, wo
     assert line.endswith(f"Controller 'faulty' is stopped: update raised RuntimeError: no oil {place}")
 
 
+def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT)
+    loads = LOADS + 'cm.load_controller("one"), cm.start_controller("one")'
+    call(loads)
+    robot.read_until("one starts")
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    file.write_text(file.read_text().replace('"starts"', '"begins"') + "# of another size\n")
+    call("cm.reload_libraries(True)\n" + loads)
+    robot.read_until("one begins")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there")
 def test_end_stops_the_controllers_and_releases_the_joints(start: Start, number: signal.Signals) -> None:
