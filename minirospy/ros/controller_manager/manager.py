@@ -221,7 +221,7 @@ class ControllerManager:
 
     def _list_types(self) -> ListControllerTypesResponse:
         with self._lock:
-            types = list(self._types())
+            types = sorted(self._types())
             return ListControllerTypesResponse(types, [_BASE_CLASS] * len(types))
 
     def _on_load(self, request: LoadControllerRequest) -> bool:

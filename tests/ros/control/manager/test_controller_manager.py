@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ros.control.conftest import ROBOT, Start, call
+from tests.ros.control.manager.conftest import ROBOT, Start, call
 
 LOADS = """
 rospy.set_param("/one", {"type": "my_controllers/Hold", "joint": "a", "step": 0.001})

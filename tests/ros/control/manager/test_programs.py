@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.ros.control.conftest import ROBOT, Program, Start, call
+from tests.ros.control.manager.conftest import ROBOT, Program, Start, call
 
-ARM = Path(__file__).parents[2] / "core" / "urdf" / "arm.urdf"
+ARM = Path(__file__).parents[3] / "core" / "urdf" / "arm.urdf"
 HOLD = """rospy.set_param("/%s", {"type": "my_controllers/Hold", "joint": "%s"})\n"""
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a Ctrl-C for one process")
