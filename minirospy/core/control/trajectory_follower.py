@@ -16,6 +16,7 @@ from minirospy.core.control.goal import MonitoredGoal, Outcome
 from minirospy.core.control.parameters import Parameters
 from minirospy.core.control.trajectory import (
     NEVER,
+    UNCHECKED,
     ErrorCode,
     JointPath,
     JointTolerances,
@@ -298,7 +299,9 @@ class TrajectoryFollower:
         start = uptime + points.stamp - self.time if points.stamp else uptime
         first = max(points.first, points.next_after(uptime - start))
         bridge_start = max(start, uptime)
-        bridge_end = max(start + points.times[first], bridge_start)
+        bridge_end = start + points.times[first]
+        if bridge_end <= uptime:
+            bridge_end = uptime + 1  # all points have passed since the message was checked: go to the last
 
         paths = []
         for path, column, tolerances, is_continuous in zip(
@@ -309,6 +312,7 @@ class TrajectoryFollower:
                 path.set_goal(goal)
                 paths.append(path)
                 continue
+            allowed = UNCHECKED if goal is None else tolerances
             kept = path.until(bridge_start)
             state = State(*kept[-1].sample(bridge_start))
             target = points.points[first].positions[column]
@@ -319,9 +323,9 @@ class TrajectoryFollower:
                 bridge_end,
                 points.points[first].state(column, offset),
                 goal,
-                tolerances,
+                allowed,
             )
-            tail = Tail(points, column, first, start, offset, tolerances)
+            tail = Tail(points, column, first, start, offset, allowed)
             paths.append(JointPath([*kept, bridge], tail, goal))
         self._paths = paths
 

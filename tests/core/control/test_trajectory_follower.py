@@ -413,6 +413,15 @@ class TestTolerances:
         assert goal.outcome is not None
         assert goal.outcome.result[0] == ErrorCode.PATH_TOLERANCE_VIOLATED
 
+    def test_a_joint_that_moves_by_a_command_is_not_checked_by_a_partial_goal(self) -> None:
+        arm = Arm(tolerances=JointTolerances(path_position=0.2), allows_partial_goals=True)
+        arm.blocked = "a"
+        arm.follower.request_plan(arm.follower.plan(["a"], [Point(SECOND, [1.0])], 0), None)
+        arm.run(0.5)
+        goal = arm.send((0.1, [1.0]), names="b")
+        arm.run(0.6)
+        assert goal.outcome == SUCCEEDED
+
     def test_a_goal_overrides_tolerances(self) -> None:
         default = JointTolerances(0.1, 0.2, 0.3, 0.4, 5)
         arm = Arm(tolerances=default)
