@@ -289,7 +289,7 @@ class TrajectoryFollower:
                 segment = _stop(before, position, velocity, self._stop_duration, goal)
             else:
                 here = State(actual if math.isfinite(actual) else position)
-                segment = Segment(self.uptime, here, self.uptime, here, goal)
+                segment = Segment(before, here, before, here, goal)
             paths.append(JointPath([segment], goal=goal))
         self._paths = paths
 
