@@ -287,6 +287,10 @@ struct Tested : Base {
   bool query(control_msgs::QueryTrajectoryState::Request& request, control_msgs::QueryTrajectoryState::Response& response) {
     return queryStateService(request, response);
   }
+  vector<double> states() {
+    return {desired_state_.time_from_start, current_state_.time_from_start, desired_state_.acceleration[0],
+            desired_state_.acceleration[1], state_error_.velocity[0], state_error_.velocity[1]};
+  }
   void cancel() {
     if (rt_active_goal_) cancelCB(actionlib::GoalHandle(rt_active_goal_->gh_));
   }
@@ -392,7 +396,7 @@ static void run(bool is_first) {
   tested.init(&tested.hardware, handle, handle);
   ros::Time time(BEGIN, 0);
   tested.starting(time);
-  vector<double> commands;
+  vector<double> commands, states;
   vector<string> outcomes;
   vector<bool> reported;
   const char* between = "";
@@ -437,6 +441,7 @@ static void run(bool is_first) {
     }
     time = next;
     tested.update(time, ros::Duration(0, TICK));
+    if (tick % 10 == 0) for (double each : tested.states()) states.push_back(each);
     for (size_t g = 0; g < tested.goals.size(); ++g) {
       reported.resize(tested.goals.size());
       auto& goal = *tested.goals[g].state;
@@ -456,6 +461,7 @@ static void run(bool is_first) {
   }
   printf("],\n  \"start\": "); print(start);
   printf(",\n  \"commands\": "); print(commands);
+  printf(",\n  \"states\": "); print(states);
   printf(",\n  \"outcomes\": [");
   for (size_t i = 0; i < outcomes.size(); ++i) printf("%s%s", i ? ", " : "", outcomes[i].c_str());
   printf("]}");

@@ -112,6 +112,7 @@ def test_commands_and_outcomes_are_those_of_ros(number: int) -> None:
     positions, velocities, time = list(recorded["start"]), [0.0, 0.0], 100 * SECOND
     run.follower.start(time, positions, velocities)
     commands: list[float] = []
+    states: list[float] = []
 
     for tick in range(1, CYCLES + 1):
         if tick in events:
@@ -119,10 +120,13 @@ def test_commands_and_outcomes_are_those_of_ros(number: int) -> None:
         time += TICK
         run.follower.update(time, TICK, positions, velocities)
         run.report(tick)
-        before, positions = positions, [position * 0.99 for position in run.follower.positions]
-        velocities = [(now - then) * 100.0 for now, then in zip(positions, before, strict=True)]
         if tick % RECORDED_EVERY == 0:
             commands += run.follower.positions
+            states += run.follower.times_from_start()
+            states += run.follower.accelerations
+            states += run.follower.velocity_errors
+        before, positions = positions, [position * 0.99 for position in run.follower.positions]
+        velocities = [(now - then) * 100.0 for now, then in zip(positions, before, strict=True)]
 
     found, expected = sorted(run.outcomes), sorted(recorded["outcomes"])
     assert [outcome[:4] for outcome in found] == [outcome[:4] for outcome in expected]
@@ -135,3 +139,4 @@ def test_commands_and_outcomes_are_those_of_ros(number: int) -> None:
         assert words == right_words
         assert math.remainder(float(error), math.tau) == pytest.approx(float(right_error), abs=2e-6)
     assert commands == pytest.approx(recorded["commands"], abs=1e-6)
+    assert states == pytest.approx(recorded["states"], rel=1e-6, abs=1e-4)
