@@ -35,6 +35,7 @@ from minirospy.core.urdf.model import JointType, Robot
 __all__ = ["FollowedJoint", "GoalTolerance", "JointsError", "Plan", "TrajectoryFollower", "read_joints"]
 
 _SECOND = 1_000_000_000  # ns
+_MAX_REQUESTS = 100  # trajectories kept while the loop pauses, like a simulation; the oldest are dropped
 _remainder, _turn = math.remainder, math.tau
 _SUCCEEDED = Outcome(GoalEvent.SUCCEED, (ErrorCode.SUCCESSFUL, ""))
 
@@ -87,7 +88,7 @@ class TrajectoryFollower:
         self._all_reached = (1 << len(joints)) - 1
         self._stop_duration = stop_duration
         self._allows_partial_goals = allows_partial_goals
-        self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque()
+        self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque(maxlen=_MAX_REQUESTS)
         self._paths: list[JointPath] = []
         self.is_running = False
         self.time = 0  # ns of ROS time, of the last update
@@ -289,7 +290,7 @@ class TrajectoryFollower:
                 segment = _stop(before, position, velocity, self._stop_duration, goal)
             else:
                 here = State(actual if math.isfinite(actual) else position)
-                segment = Segment(self.uptime, here, self.uptime, here, goal)
+                segment = Segment(before, here, before, here, goal)
             paths.append(JointPath([segment], goal=goal))
         self._paths = paths
 
