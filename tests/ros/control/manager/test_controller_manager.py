@@ -211,6 +211,29 @@ def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: St
     assert "time jumped back by 49." in errors
 
 
+SET_BACK = """
+import os, time
+time_ns = time.time_ns
+time.time_ns = lambda: time_ns() - (100_000_000_000 if os.path.exists("set_back") else 0)
+"""
+
+
+def test_controllers_are_started_again_if_the_computers_time_is_set_back(
+    start: Start, workspace: Path
+) -> None:
+    robot = start("-c", SET_BACK + ROBOT)
+    call(LOADS + 'cm.load_controller("one"), cm.start_controller("one")')
+    before = int(robot.read_until("one starts").split()[-1])
+    robot.read_until("a 0.")
+    (workspace.parent / "set_back").touch()
+    robot.read_until("one stops")
+    assert int(robot.read_until("one starts").split()[-1]) < before
+    # The period is measured by a clock that cannot be set.
+    assert 0 < int(robot.read_until("a 0.").split()[-1]) < 90_000_000_000
+    robot.process.send_signal(signal.SIGINT)
+    assert "the controllers are started again" in robot.end()[2]
+
+
 def test_diagnostics_have_the_loops_times(start: Start) -> None:
     start("-c", ROBOT)
     status = call(
