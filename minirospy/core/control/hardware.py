@@ -16,6 +16,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.base.times import Duration, Time
 
 __all__ = [
+    "COMMAND_FIELDS",
     "COMMAND_INTERFACES",
     "Conflict",
     "ControllerInfo",
@@ -64,6 +65,13 @@ COMMAND_INTERFACES = frozenset(
     {Interface.POSITION, Interface.VELOCITY, Interface.EFFORT, Interface.POS_VEL, Interface.POS_VEL_ACC}
 )
 """Interfaces through which a controller commands joints. Only one running controller may claim a joint."""
+
+COMMAND_FIELDS = {
+    Interface.POSITION: "position_command",
+    Interface.VELOCITY: "velocity_command",
+    Interface.EFFORT: "effort_command",
+}
+"""The attribute of a joint that holds the command of an interface, for interfaces whose command is one number."""
 
 
 @dataclass(slots=True, eq=False)

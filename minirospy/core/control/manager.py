@@ -294,6 +294,9 @@ class ControllerTable:
             self._call(each, "waiting", ControllerState.WAITING, time)
 
     def _start(self, each: Loaded, time: Time) -> None:
+        for joint, _ in each.joints:
+            if joint.active is None:
+                joint.position_command = joint.position  # a command from before must not move the joint
         if self._call(each, "starting", ControllerState.RUNNING, time):
             for joint, interface in each.joints:
                 joint.active = interface

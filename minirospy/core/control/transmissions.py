@@ -45,7 +45,7 @@ def _read(element: Element, warn_of: Callable[[str], object]) -> list[Transmissi
     def warn(why: str) -> None:
         warn_of(f"transmission '{name}': {why}")
 
-    joints, actuators = element.all("joint"), element.all("actuator")
+    joints, actuators = list(element.all("joint")), list(element.all("actuator"))
     if not (name and kind and joints and actuators):
         missing = {"name": name, "type": kind, "joint": joints, "actuator": actuators}
         warn(
@@ -60,7 +60,7 @@ def _read(element: Element, warn_of: Callable[[str], object]) -> list[Transmissi
     found = []
     for joint in joints:
         interfaces: list[Interface] = []
-        for each in joint.all("hardwareInterface") or shared:
+        for each in list(joint.all("hardwareInterface")) or shared:
             try:
                 interface = Interface.parse(each.text)
             except HardwareError as error:
