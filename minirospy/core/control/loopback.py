@@ -23,7 +23,10 @@ _MOVABLE = {JointType.REVOLUTE, JointType.CONTINUOUS, JointType.PRISMATIC}
 
 
 class LoopbackHardware(RobotHardware):
-    """The joints of a robot description. Mimic joints follow theirs, and cannot be commanded."""
+    """The joints of a robot description.
+
+    A mimic joint follows its joint. It can be commanded only if it has a transmission, and then does not follow.
+    """
 
     def __init__(
         self,
@@ -34,7 +37,8 @@ class LoopbackHardware(RobotHardware):
     ) -> None:
         """Create the joints that have a transmission, or all movable ones, with all interfaces, if there is no transmission.
 
-        Raise HardwareError if ``initial`` names a joint that does not exist, or has a value that is not finite.
+        Call ``warn`` with a line for each transmission or initial position that is ignored. Raise HardwareError if
+        ``initial`` names a joint that the robot lacks, or has a value that is not finite.
         """
         super().__init__()
         movable = movable_joints(robot)
@@ -50,7 +54,7 @@ class LoopbackHardware(RobotHardware):
         self._bounds: list[tuple[Joint, float, float]] = []
         self._mimics: list[tuple[Joint, Joint, float, float]] = []
         for name, joint in movable.items():
-            if joint.mimic or (transmissions and name not in interfaces):
+            if name not in interfaces and (joint.mimic or transmissions):
                 continue
             lower, upper = _bounds(joint)
             position = initial.pop(name, min(max(0.0, lower), upper))
@@ -59,10 +63,12 @@ class LoopbackHardware(RobotHardware):
         for name, joint in movable.items():
             if joint.mimic and joint.mimic.joint in self.joints:
                 leader = self.joints[joint.mimic.joint]
-                follower = self.add_joint(name)
+                follower = self.joints.get(name) or self.add_joint(name)
                 self._mimics.append((follower, leader, joint.mimic.multiplier, joint.mimic.offset))
         for name in initial:
-            raise HardwareError(f"initial position of '{name}': the robot has no such joint")
+            if name not in movable:
+                raise HardwareError(f"initial position of '{name}': the robot has no such joint")
+            warn(f"the initial position of joint '{name}' is ignored, because it has no transmission")
         self._follow()
 
     def write(self, time: Time, period: Duration) -> None:
@@ -94,8 +100,9 @@ class LoopbackHardware(RobotHardware):
 
     def _follow(self) -> None:
         for joint, leader, factor, offset in self._mimics:
-            joint.position = leader.position * factor + offset
-            joint.velocity = leader.velocity * factor
+            if joint.active is None:
+                joint.position = leader.position * factor + offset
+                joint.velocity = leader.velocity * factor
 
 
 def movable_joints(robot: Robot) -> dict[str, UrdfJoint]:

@@ -46,6 +46,28 @@ def test_transmissions_choose_joints_and_interfaces() -> None:
     assert warnings == ["transmission 'u': the robot has no movable joint 'nope', so it is skipped"]
 
 
+def test_mimic_joint_with_a_transmission_follows_only_while_no_controller_has_it() -> None:
+    transmissions = [Transmission("t", "s", name, (Interface.POSITION,)) for name in ("left", "right")]
+    robot = hardware(*transmissions)
+    left, right = robot.joints["left"], robot.joints["right"]
+    assert right.interfaces == {Interface.POSITION}
+    left.active, left.position_command = Interface.POSITION, 0.02
+    robot.write(NOW, PERIOD)
+    assert (left.position, right.position) == (0.02, pytest.approx(0.14))
+    right.active, right.position_command = Interface.POSITION, 0.03
+    robot.write(NOW, PERIOD)
+    assert right.position == 0.03
+
+
+def test_initial_position_without_an_effect_is_named() -> None:
+    warnings: list[str] = []
+    transmissions = [Transmission("t", "s", "elbow", (Interface.EFFORT,))]
+    LoopbackHardware(ROBOT, transmissions, {"elbow": 1.0, "shoulder": 1.0}, warnings.append)
+    assert warnings == [
+        "the initial position of joint 'shoulder' is ignored, because it has no transmission"
+    ]
+
+
 def test_position_command_is_reached_within_the_limits() -> None:
     robot = hardware(shoulder=0.5)
     shoulder, _, left, right = robot.joints.values()
