@@ -10,13 +10,22 @@ import math
 from collections.abc import Callable, Mapping
 
 from minirospy.base.times import Duration, Time
-from minirospy.core.control.hardware import COMMAND_INTERFACES, HardwareError, Interface, Joint, RobotHardware
+from minirospy.core.control.hardware import (
+    COMMAND_INTERFACES,
+    ForceTorqueSensor,
+    HardwareError,
+    ImuSensor,
+    Interface,
+    Joint,
+    RobotHardware,
+)
 from minirospy.core.control.transmissions import Transmission
 from minirospy.core.urdf.model import Joint as UrdfJoint
 from minirospy.core.urdf.model import JointType, Robot
 
 __all__ = ["LoopbackHardware", "movable_joints"]
 
+_GRAVITY = 9.81  # m/s^2
 _MASS = 1.0  # kg or kg m^2
 _DAMPING = 1.0  # N s/m or N m s/rad
 _MOVABLE = {JointType.REVOLUTE, JointType.CONTINUOUS, JointType.PRISMATIC}
@@ -65,11 +74,29 @@ class LoopbackHardware(RobotHardware):
                 leader = self.joints[joint.mimic.joint]
                 follower = self.joints.get(name) or self.add_joint(name)
                 self._mimics.append((follower, leader, joint.mimic.multiplier, joint.mimic.offset))
+        if not self._bounds:
+            raise HardwareError(f"robot '{robot.name}' has no joint that can be commanded")
         for name in initial:
             if name not in movable:
                 raise HardwareError(f"initial position of '{name}': the robot has no such joint")
             warn(f"the initial position of joint '{name}' is ignored, because it has no transmission")
         self._follow()
+
+    def add_sensors(self, imus: Mapping[str, str], force_torque_sensors: Mapping[str, str]) -> None:
+        """Add sensors of a robot that stands still, each with its frame."""
+        for name, frame in imus.items():
+            self.imus[name] = ImuSensor(
+                name,
+                frame,
+                (0.0, 0.0, 0.0, 1.0),
+                [0.0] * 9,
+                (0.0, 0.0, 0.0),
+                [0.0] * 9,
+                (0.0, 0.0, _GRAVITY),
+                [0.0] * 9,
+            )
+        for name, frame in force_torque_sensors.items():
+            self.force_torque_sensors[name] = ForceTorqueSensor(name, frame)
 
     def write(self, time: Time, period: Duration) -> None:
         """Move the joints by one cycle."""

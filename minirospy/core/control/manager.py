@@ -36,7 +36,8 @@ __all__ = ["BEST_EFFORT", "STRICT", "ControllerTable", "Loaded", "Switch", "desc
 
 BEST_EFFORT, STRICT = 1, 2  # as in controller_manager_msgs/SwitchController
 
-_NOT_USERS = (os.path.dirname(os.__file__), str(Path(__file__).parents[2]))  # the standard library, minirospy
+_LIBRARY = (os.path.dirname(os.__file__), "<frozen ")  # the beginnings of the standard library's file names
+_MINIROSPY = str(Path(__file__).parents[2])
 
 Log = Callable[[int, str], object]
 """Called with a level of rosgraph_msgs/Log, and a line."""
@@ -332,13 +333,15 @@ def describe_error(error: BaseException) -> str:
 
 
 def _place(trace: TracebackType | None) -> str:
-    """Return ``file:line`` of the innermost code of the user, or of the innermost code if none of it is the user's."""
+    """Return ``file:line`` of the innermost code of the user, else of minirospy's innermost code."""
     frames = []
     while trace:
-        frames.append((trace.tb_frame.f_code.co_filename, trace.tb_lineno))
+        file = trace.tb_frame.f_code.co_filename
+        if not file.startswith(_LIBRARY):
+            frames.append((file.startswith(_MINIROSPY), f"{file}:{trace.tb_lineno}"))
         trace = trace.tb_next
-    users = [frame for frame in frames if not frame[0].startswith(_NOT_USERS)]
-    return ":".join(map(str, (users or frames)[-1])) if frames else ""
+    users = [place for is_ours, place in frames if not is_ours]
+    return (users or [place for _, place in frames] or [""])[-1]
 
 
 def _missing_interface(controller: Controller, resources: Resources) -> str:

@@ -10,7 +10,7 @@ import gc
 import sys
 import threading
 import time as wall
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -34,8 +34,9 @@ _BILLION = 1_000_000_000
 _END_SECONDS = 5.0  # the longest wait for the loop's end at shutdown, in case a driver hangs
 _REPORT_SECONDS = 1.0
 _WARN_SECONDS = 10.0  # between two warnings about overruns, or about commands that are not finite
+_WARN_SHARE = 0.05  # of the cycles of a second; a busy computer delays single ones
 # Another thread that computes gives way to the loop after this time; Python's default is 5 ms.
-_SWITCH_SECONDS = 0.0005
+_SWITCH_SECONDS = 0.0002
 
 
 def run(hardware: RobotHardware, rate: float = 100.0, namespace: str = "") -> int:
@@ -189,12 +190,13 @@ class ControlLoop:
             publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
             known, warned = 0, -_WARN_SECONDS
             while not self._stop.wait(_REPORT_SECONDS):
-                status = self._status_message(self._times.overruns - known)
+                overruns, (late, busy) = self._times.overruns - known, self._times.take()
+                status = self._status_message(overruns, late, busy)
                 message = DiagnosticArray(status=[status])
                 message.header.stamp = rospy.get_rostime()
                 publisher.publish(message)
                 known = self._times.overruns
-                if status.level != DiagnosticStatus.OK and wall.monotonic() - warned >= _WARN_SECONDS:
+                if overruns > len(busy) * _WARN_SHARE and wall.monotonic() - warned >= _WARN_SECONDS:
                     warned = wall.monotonic()
                     rospy.logwarn("%s", status.message)
                 if self._invalid:
@@ -206,9 +208,8 @@ class ControlLoop:
         except rospy.ROSException:
             pass  # the node shuts down
 
-    def _status_message(self, overruns: int) -> DiagnosticStatus:
+    def _status_message(self, overruns: int, late: Sequence[int], busy: Sequence[int]) -> DiagnosticStatus:
         times = self._times
-        late, busy = times.take()
         delays, durations = spread(late), spread(busy)
         status = DiagnosticStatus(
             name=f"{rospy.get_name()[1:]}: control loop", message="OK", hardware_id="none"

@@ -36,7 +36,7 @@ from minirospy.core.control.manager import BEST_EFFORT, ControllerTable
 from minirospy.core.control.parameters import Parameters
 from minirospy.core.urdf.model import Robot
 from minirospy.core.urdf.read import parse_robot
-from minirospy.ros.controller_manager.plugins import Plugin, PluginError, find_plugins
+from minirospy.ros.controller_manager.plugins import Plugin, PluginError, find_plugins, forget_modules
 
 __all__ = ["ControllerManager", "find_description", "log", "read_robot"]
 
@@ -221,7 +221,7 @@ class ControllerManager:
 
     def _list_types(self) -> ListControllerTypesResponse:
         with self._lock:
-            types = list(self._types())
+            types = sorted(self._types())
             return ListControllerTypesResponse(types, [_BASE_CLASS] * len(types))
 
     def _on_load(self, request: LoadControllerRequest) -> bool:
@@ -255,6 +255,7 @@ class ControllerManager:
                     if not self.unload(name):
                         log(ERROR, f"{cannot} failed to unload controller '{name}'")
                         return False
+            forget_modules((self._plugins or {}).values())
             self._plugins = None
             log(INFO, f"Controller manager: reloaded controller libraries for '{_BASE_CLASS}'")
             return True

@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +23,9 @@ from minirospy.core.control.manager import describe_error
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
 
-__all__ = ["Plugin", "PluginError", "find_plugins"]
+__all__ = ["Plugin", "PluginError", "find_plugins", "forget_modules"]
+
+_OWN = Path(__file__).parents[1]
 
 _GROUP = "controller_interface.controllers"
 _BASES = {
@@ -60,9 +62,9 @@ class Plugin(NamedTuple):
             for part in name.split("."):
                 found = getattr(found, part)
         except Exception as error:  # the user's module may raise anything
-            raise PluginError(
-                f"cannot import {self.python} ({self.origin}): {describe_error(error)}"
-            ) from error
+            trace = error.__traceback__
+            why = describe_error(error.with_traceback(trace and trace.tb_next))  # without this function
+            raise PluginError(f"cannot import {self.python} ({self.origin}): {why}") from error
         if not (isinstance(found, type) and issubclass(found, Controller)):
             raise PluginError(
                 f"{self.python} ({self.origin}) is not a subclass of controller_interface.Controller"
@@ -87,6 +89,18 @@ def find_plugins(warn: Callable[[str], object] = lambda line: rospy.logwarn("%s"
     return found
 
 
+def forget_modules(plugins: Iterable[Plugin]) -> None:
+    """Let the next load of these controllers read their files again; minirospy's own modules stay."""
+    folders = [
+        each.folder.resolve() for each in plugins if each.folder and not each.folder.is_relative_to(_OWN)
+    ]
+    for name, module in list(sys.modules.items()):
+        file = getattr(module, "__file__", None)
+        if file and any(Path(file).resolve().is_relative_to(folder) for folder in folders):
+            del sys.modules[name]
+    importlib.invalidate_caches()
+
+
 def _of_package(name: str, folder: Path) -> Iterator[Plugin]:
     manifest = folder / "package.xml"
     if not manifest.exists() or b"controller_interface" not in manifest.read_bytes():
@@ -108,7 +122,8 @@ def _of_file(file: Path, folder: Path) -> Iterator[Plugin]:
 
 def _find_module(module: str, folder: Path) -> None:
     """Let Python find a module of a package that was not built or sourced: its folder is ``src`` or the package's."""
-    if importlib.util.find_spec(module) is None:
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:  # a folder of that name without code, such as the package's own
         for place in (folder / "src", folder):
             if (place / module).is_dir() or (place / f"{module}.py").is_file():
                 sys.path.append(str(place))

@@ -1,10 +1,12 @@
 """The node ``rosrun minirospy_hardware loopback``: controllers without a robot.
 
 The joints are those of ``robot_description``, which is searched in the node's namespace and above. Private parameters: rate
-(100 Hz), initial (``{joint: position}``).
+(100 Hz), initial (``{joint: position}``), imus and force_torque_sensors (``{sensor: frame}``).
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 from minirospy import client as rospy
 from minirospy.base.errors import UrdfError
@@ -38,11 +40,21 @@ def _hardware() -> LoopbackHardware:
             "there is no parameter robot_description in the namespace "
             f"{rospy.get_namespace()} or above: a launch file or `rosparam set robot_description -t FILE` sets it"
         )
-    initial = rospy.get_param("~initial", {})
-    if not isinstance(initial, dict) or not all(isinstance(each, (int, float)) for each in initial.values()):
-        raise HardwareError(f"parameter ~initial must be a map from joint to position, not {initial!r}")
+    initial = _mapping("initial", (int, float), "from joint to position")
+    imus = _mapping("imus", (str,), "from sensor to frame")
+    sensors = _mapping("force_torque_sensors", (str,), "from sensor to frame")
 
     def warn(line: str) -> None:
         rospy.logwarn("%s", line)
 
-    return LoopbackHardware(parse_robot(text), read_transmissions(text, warn), initial, warn)
+    hardware = LoopbackHardware(parse_robot(text), read_transmissions(text, warn), initial, warn)
+    hardware.add_sensors(imus, sensors)
+    return hardware
+
+
+def _mapping(name: str, kinds: tuple[type, ...], meaning: str) -> dict[str, Any]:
+    """Return a private parameter that is a map. Raise HardwareError if it has another type."""
+    value = rospy.get_param(f"~{name}", {})
+    if not isinstance(value, dict) or not all(isinstance(each, kinds) for each in value.values()):
+        raise HardwareError(f"parameter ~{name} must be a map {meaning}, not {value!r}")
+    return value

@@ -111,3 +111,11 @@ def test_initial_positions_are_checked() -> None:
         hardware(nope=1.0)
     with pytest.raises(HardwareError, match="joint 'elbow': its position is nan"):
         hardware(elbow=math.nan)
+
+
+def test_sensors_stand_still() -> None:
+    robot = hardware()
+    robot.add_sensors({"imu": "imu_link"}, {"wrist": "tool"})
+    assert robot.imus["imu"].linear_acceleration == (0.0, 0.0, 9.81)
+    assert robot.force_torque_sensors["wrist"].frame_id == "tool"
+    assert robot.resources()[Interface.IMU] == ["imu"]

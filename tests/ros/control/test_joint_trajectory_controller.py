@@ -415,7 +415,7 @@ show(arm.joint("a").effort_command)
 
 def test_wrong_parameters_are_refused(run: Run) -> None:
     shown = run("""
-def init(**parameters): 
+def init(**parameters):
     values = {key: value for key, value in {**USUAL, **parameters}.items() if value is not None}
     return failure(lambda: Rig(KIND, values, "a", URDF))
 show([init(joints=None), init(joints=["a", "z"]), init(), init(joints=["a"], state_publish_rate=0),
