@@ -1,6 +1,6 @@
 """Hardware without a robot: joints whose state follows their commands within the limits of the description.
 
-A position command is reached in the same cycle, a velocity command is integrated, and an effort command accelerates a mass of
+A position command is reached before the next cycle, a velocity command is integrated, and an effort command accelerates a mass of
 1 kg (or 1 kg m^2) against a damping of 1 N s/m (or N m s/rad). A joint without a controller stands still.
 """
 
@@ -98,8 +98,12 @@ class LoopbackHardware(RobotHardware):
         for name, frame in force_torque_sensors.items():
             self.force_torque_sensors[name] = ForceTorqueSensor(name, frame)
 
-    def write(self, time: Time, period: Duration) -> None:
-        """Move the joints by one cycle."""
+    def read(self, time: Time, period: Duration) -> None:
+        """Move the joints by their last commands.
+
+        A motor would have moved them during the period that has passed. The cycles of a loop last differently long, so
+        write() does not know it yet.
+        """
         seconds = period.to_sec()
         for joint, lower, upper in self._bounds:
             before = position = joint.position
