@@ -32,6 +32,8 @@ VIEWS = (
     "launch",
     "bag",
     "joints",
+    "controllers",
+    "trajectory",
     "smach",
     "diagnostics",
     "panels",
