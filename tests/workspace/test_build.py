@@ -462,6 +462,13 @@ def test_an_invalid_name_is_an_error(scene: Scene, name: str) -> None:
     assert str(mistakes(scene)).startswith(f"{folder / 'package.xml'}:2: '{name}' is not a package name")
 
 
+def test_a_package_for_rosbuild_is_not_built(scene: Scene) -> None:
+    scene.package("p")
+    (scene.source / "old").mkdir()
+    (scene.source / "old" / "manifest.xml").write_text("<package/>")
+    assert [plan.name for plan in read_plans(scene.source)] == ["p"]
+
+
 def test_a_link_that_leads_back(scene: Scene) -> None:
     scene.package("p")
     try:
