@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import pytest
 import yaml
@@ -84,6 +85,35 @@ def test_angles() -> None:
 def test_a_colon_directly_before_a_bracket_is_accepted_as_in_ros(text: str, value: object) -> None:
     assert value == parse_value(text) == yaml.safe_load(text.replace("deg(180)", repr(math.pi)))
     assert list(parse_documents(f"a: 1\n---\n{text}\n---\nb\n", "it")) == [{"a": 1}, value, "b"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{data:[" + "[1], " * 300 + "]}",
+        "{a: &x {b:[1, 2]}, c: [*x, *x]}",
+        "{a:[" * 40 + "1" + "]}" * 40 + "\n" + "# [" * 200,
+    ],
+)
+def test_such_a_colon_is_accepted_with_many_brackets_or_aliases(text: str) -> None:
+    assert parse_value(text) == yaml.safe_load(text)
+    assert yaml_text.safe_load(text) == yaml.safe_load(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{a:[" * 150 + "1" + "]}" * 150,
+        "{a:[1], b: &b [1,1,1,1,1,1,1,1,1,1], "
+        + ", ".join(
+            f"{name}: &{name} [{', '.join([f'*{below}'] * 10)}]" for below, name in pairwise("bcdefgh")
+        )
+        + "}",
+    ],
+)
+def test_limits_hold_with_such_a_colon(text: str) -> None:
+    with pytest.raises(ValueTextError):
+        parse_value(text)
 
 
 def test_text_that_no_yaml_library_accepts_after_such_a_colon_is_refused() -> None:
