@@ -44,9 +44,12 @@ PASSED_ON = {
     },
     "catkin": {
         "": (
-            "find_in_workspaces=catkin.find_in_workspaces terminal_color=catkin.terminal_color "
-            "workspace=catkin.workspace"
+            "environment_cache=catkin.environment_cache find_in_workspaces=catkin.find_in_workspaces "
+            "terminal_color=catkin.terminal_color workspace=catkin.workspace"
         ),
+    },
+    "catkin.environment_cache": {
+        "": "ast os platform subprocess sys",
     },
     "catkin.find_in_workspaces": {
         "": "os",
