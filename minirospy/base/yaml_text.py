@@ -138,7 +138,7 @@ def check_yaml(text: str, loader: Loader | None = None) -> None:
         if loader is None or issubclass(loader, fast_loader()):
             raise
         # PyYAML's loader in Python accepts more, such as {data:[1]}; it takes ten times as long.
-        _check_events(yaml.parse(text, Loader=loader), has_aliases)  # type: ignore[arg-type]
+        _check_events(yaml.parse(text, Loader=loader), has_aliases)
 
 
 def _check_events(events: Iterator[yaml.Event], has_aliases: bool) -> None:

@@ -120,7 +120,7 @@ class _Evaluator:
         self._unary: dict[type[ast.unaryop], Callable[[Number], Number]] = {
             ast.USub: operator.neg,
             ast.UAdd: operator.pos,
-            ast.Invert: operator.invert,
+            ast.Invert: _inverted,
             ast.Not: operator.not_,
         }
         self._binary: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
@@ -210,6 +210,12 @@ def _function(node: ast.expr) -> Callable[..., Number]:
             return _BUILT_IN[name]
         case _:
             raise ValueError(_ALLOWED)
+
+
+def _inverted(number: Number) -> Number:
+    if isinstance(number, float):
+        raise TypeError("bad operand type for unary ~: 'float'")
+    return ~number
 
 
 def _power(base: Number, exponent: Number) -> Number:

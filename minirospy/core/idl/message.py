@@ -323,7 +323,7 @@ def _time_text(value: TVal, indent: str, offset: Time | None, width: int | None)
     return f"\n{indent}secs: {seconds}\n{indent}nsecs: {_integer(value.nsecs, width or 9)}"
 
 
-def _integer(number: object, width: int) -> str:
+def _integer(number: float, width: int) -> str:
     # With %, because programs store floats in times, as in `stamp.secs = time.time()`.
     return "%*d" % (width, number)  # noqa: UP031 - format() refuses floats
 
