@@ -263,7 +263,8 @@ def package_name(folder: Path) -> str | None:
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
-        return folder.name if (folder / ROSBUILD_MANIFEST).is_file() else None
+        # Unlike Path.is_file(), this does not raise an error for a name that is too long.
+        return folder.name if os.path.isfile(folder / ROSBUILD_MANIFEST) else None
     match = _NAME.search(text)
     return match[1].decode("utf-8", "replace") if match else folder.name
 
