@@ -178,13 +178,13 @@ def parse_manifest(manifest_name: str, string: str, filename: str = "string") ->
     result.url = _only(root, "url", filename)
     result.version = _only(root, "version", filename)
     result.license = _license(root)
-    result.author = ", ".join(map(_text, _children(root, "author"))) or None
+    result.author = ", ".join(map(element_text, child_elements(root, "author"))) or None
     result.brief = _attribute(root, "description", "brief")
     result.license_url = _attribute(root, "license", "url")
     result.status = _attribute(root, "review", "status", "unreviewed")
     result.notes = _attribute(root, "review", "notes")
 
-    depends = (each for each in _children(root, "depend") if not each.hasAttribute("thirdparty"))
+    depends = (each for each in child_elements(root, "depend") if not each.hasAttribute("thirdparty"))
     result.depends = [
         Depend(
             _required(
@@ -198,20 +198,20 @@ def parse_manifest(manifest_name: str, string: str, filename: str = "string") ->
     ]
     result.rosdeps = [
         RosDep(_required(each, "name", f"invalid rosdep tag in [{filename}]"))
-        for each in _children(root, "rosdep")
+        for each in child_elements(root, "rosdep")
     ]
-    result.platforms = [_platform(each) for each in _children(root, "platform")]
+    result.platforms = [_platform(each) for each in child_elements(root, "platform")]
     result.exports = [
-        Export(each.tagName, dict(each.attributes.items()), _text(each, strip=False))
-        for tag in _children(root, "export")
-        for each in _children(tag)
+        Export(each.tagName, dict(each.attributes.items()), element_text(each, strip=False))
+        for tag in child_elements(root, "export")
+        for each in child_elements(tag)
     ]
     if root.tagName == "stack":
         for name in ("exports", "rosdeps"):
             if getattr(result, name):
                 raise InvalidManifest(f"stack manifests are not allowed to have {name}")
-    result.is_catkin = bool(_children(root, "catkin") or _children(root, "name"))
-    result.unknown_tags = [each for each in _children(root) if each.tagName not in _TAGS]
+    result.is_catkin = bool(child_elements(root, "catkin") or child_elements(root, "name"))
+    result.unknown_tags = [each for each in child_elements(root) if each.tagName not in _TAGS]
     return result
 
 
@@ -233,19 +233,19 @@ def _root(tag: str, string: str, filename: str) -> Element:
 
 def _only(root: Element, tag: str, filename: str, *, raw: bool = False) -> str | None:
     """Return the text of a tag that must be unique, or None if there is none. ``raw``: with the tags inside it."""
-    found = _children(root, tag)
+    found = child_elements(root, tag)
     if len(found) > 1:
         raise InvalidManifest(f"Invalid manifest file [{filename}]: must have a single '{tag}' element")
     if not found:
         return None
-    return "".join(node.toxml() for node in found[0].childNodes) if raw else _text(found[0])
+    return "".join(node.toxml() for node in found[0].childNodes) if raw else element_text(found[0])
 
 
 def _license(root: Element) -> str:
-    found = _children(root, "license")
+    found = child_elements(root, "license")
     if len(found) > 1:
         raise InvalidManifest("Invalid manifest file: must have only one 'license' element")
-    return _text(found[0]) if found else ""
+    return element_text(found[0]) if found else ""
 
 
 def _platform(element: Element) -> Platform:
@@ -267,16 +267,18 @@ def _required(element: Element, attribute: str, missing: str) -> str:
 
 
 def _attribute(root: Element, tag: str, attribute: str, default: str = "") -> str:
-    found = _children(root, tag)
+    found = child_elements(root, tag)
     return found[0].getAttribute(attribute) if found else default
 
 
-def _children(parent: Element, tag: str = "") -> list[Element]:
+def child_elements(parent: Element, tag: str = "") -> list[Element]:
+    """Return the child elements with a tag, or all of them."""
     return [
         each for each in parent.childNodes if each.nodeType == each.ELEMENT_NODE and tag in ("", each.tagName)
     ]
 
 
-def _text(element: Element, *, strip: bool = True) -> str:
+def element_text(element: Element, *, strip: bool = True) -> str:
+    """Return the text directly inside an element."""
     text = "".join(each.data for each in element.childNodes if each.nodeType == each.TEXT_NODE)
     return text.strip() if strip else text
