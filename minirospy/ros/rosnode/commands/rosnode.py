@@ -241,8 +241,7 @@ def _machine(machine: str | None) -> None:
         except MasterUnreachableError as error:
             # ROS looks up the machine's address before it calls the master.
             if machine and not is_known_host(machine):
-                unknown = NotFoundError("machine", machine, hint="its name has no address")
-                raise WordedError(unknown, RosText(_NO_ADDRESS.format(name=machine))) from error
+                raise WordedError(error, RosText(_NO_ADDRESS.format(name=machine))) from error
             raise
         print("\n".join(found))
 
