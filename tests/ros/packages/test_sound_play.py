@@ -138,9 +138,11 @@ def test_another_device_is_one_of_the_sound_server() -> None:
     assert command is not None
     assert list(command.words) == ["paplay", "--device=alsa_output.usb", "--volume=32768", "/a.wav"]
     assert command.variables == {"PULSE_SINK": "alsa_output.usb"}
-    default = play_command("/a.wav", 0.5, lambda name: name)
-    assert default is not None
-    assert (default.words[0], default.variables) == ("paplay", {})
+    for name in ("", "default"):
+        default = play_command("/a.wav", 0.5, lambda name: name, name)
+        assert default is not None
+        assert list(default.words) == ["paplay", "--volume=32768", "/a.wav"]
+        assert default.variables == {}
 
 
 def test_speakers_get_a_text_as_no_option() -> None:

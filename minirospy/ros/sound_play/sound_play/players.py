@@ -64,6 +64,7 @@ _ON_DEVICE: dict[str, Callable[[str], list[str]]] = {
 }
 """Functions that return a player's option for an output device; other programs read the variables of _variables()."""
 
+_DEFAULTS = ("", "default")  # names of the machine's output device
 _ALSA = re.compile(r"(?:plug|dmix|sysdefault|front|surround\d+|iec958|hdmi)?(?:hw)?:(?:CARD=)?(\w+)")
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
@@ -93,7 +94,7 @@ def play_command(file: str, volume: float, which: Which, device: str = "") -> Co
     for name in names:
         program = which(name)
         if program:
-            option = _ON_DEVICE[name](device) if device and name in _ON_DEVICE else []
+            option = _ON_DEVICE[name](device) if device not in _DEFAULTS and name in _ON_DEVICE else []
             return Command([program, *option, *PLAYERS[name](file, volume)], None, _variables(device))
     return None
 
@@ -110,7 +111,7 @@ def say_command(text: str, voice: str, volume: float, which: Which, device: str 
 
 def _variables(device: str) -> dict[str, str]:
     """Return the variables that name an output device to the libraries of programs without an option for it."""
-    if not device:
+    if device in _DEFAULTS:
         return {}
     if alsa := _ALSA.match(device):
         return {"ALSA_CARD": alsa[1], "AUDIODEV": device, "SDL_AUDIODRIVER": "alsa"}
