@@ -9,12 +9,12 @@ from referee import outcome
 from sensor_msgs.msg import JointState, TimeReference
 from std_msgs.msg import Duration, Header, Time
 
-LATE, FRACTION, NEGATIVE = genpy.Time(1), genpy.Time(1), genpy.Time(1)
-LATE.secs, FRACTION.secs, NEGATIVE.nsecs = 2**33, 1.5, -1
+LATE, FRACTION = genpy.Time(1), genpy.Time(1)
+LATE.secs, FRACTION.secs = 2**33, 1.5
 LONG = genpy.Duration(1)
 LONG.secs = 2**33
 
-for time in (LATE, FRACTION, NEGATIVE):
+for time in (LATE, FRACTION):
     messages = [Header(stamp=time), Time(time), TimeReference(time_ref=time), GoalID(stamp=time, id="a")]
     messages += [
         PointStamped(header=Header(stamp=time)),
