@@ -56,7 +56,7 @@ def load(text: str, loader: Loader) -> Any:
 
     _require_text(text)
     try:
-        check_yaml(text)
+        check_yaml(text, loader)
         return yaml.load(text, Loader=guarded(loader))  # type: ignore[arg-type]
     except _RAISED as error:
         raise yaml.YAMLError(_reason(error)) from error
@@ -71,7 +71,7 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
 
     _require_text(text)
     try:
-        check_yaml(text)
+        check_yaml(text, loader)
         documents = yaml.load_all(text, Loader=guarded(loader))  # type: ignore[arg-type]
     except _RAISED as error:
         raise yaml.YAMLError(_reason(error)) from error
@@ -118,11 +118,11 @@ def guarded(loader: Loader) -> Loader:
     return Guarded
 
 
-def check_yaml(text: str) -> None:
+def check_yaml(text: str, loader: Loader | None = None) -> None:
     """Raise ValueError if a YAML text is nested too deeply, or expands too much through its aliases.
 
     YAML libraries accept such text: nesting may crash Python, and a value with aliases is small only until it is sent or
-    printed. Raise yaml.YAMLError if the text is not YAML.
+    printed. Raise yaml.YAMLError if the text is not YAML for ``loader`` (default: the compiled one).
     """
     # Compute an upper bound of the depth from brackets and indentation; it is within the limit for nearly all texts.
     indent = max(map(len, _INDENT.findall(text)), default=0)
@@ -131,11 +131,23 @@ def check_yaml(text: str) -> None:
         return
     import yaml
 
+    try:
+        _check_events(yaml.parse(text, Loader=fast_loader()), has_aliases)
+    except yaml.YAMLError:
+        if loader is None or issubclass(loader, fast_loader()):
+            raise
+        # PyYAML's loader in Python accepts more, such as {data:[1]}; it takes ten times as long.
+        _check_events(yaml.parse(text, Loader=loader), has_aliases)
+
+
+def _check_events(events: Iterator[yaml.Event], has_aliases: bool) -> None:
+    import yaml
+
     counts = [0]  # number of values in each open collection, outermost first
     anchors: list[str | None] = []
     # dict from anchor to the number of values in its node, or None while the node is open
     sizes: dict[str, int | None] = {}
-    for event in yaml.parse(text, Loader=fast_loader()):
+    for event in events:
         match event:
             case yaml.AliasEvent(anchor=name):
                 size = sizes.get(str(name), 1)

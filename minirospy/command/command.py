@@ -304,8 +304,10 @@ def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -
     return status
 
 
-def _is_without_master(error: Exception) -> bool:
-    return isinstance(error.__cause__ if isinstance(error, WordedError) else error, MasterUnreachableError)
+def _is_without_master(error: BaseException | None) -> bool:
+    while isinstance(error, WordedError):
+        error = error.__cause__
+    return isinstance(error, MasterUnreachableError)
 
 
 def _has_terminal() -> bool:

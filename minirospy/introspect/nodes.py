@@ -37,6 +37,7 @@ __all__ = [
     "find_node",
     "forget_node",
     "has_exited",
+    "is_known_host",
     "is_timeout",
     "is_unknown_host",
     "kill_node",
@@ -109,6 +110,11 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
     if not found:
         raise NotFoundError("machine", machine, hosts.values(), "no node runs on it")
     return found
+
+
+def is_known_host(machine: str) -> bool:
+    """Return whether a machine's name or address has an IPv4 address."""
+    return _ipv4_address(machine) is not None
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
@@ -264,10 +270,15 @@ def _service_uri(master: MasterProxy, service: str) -> str:
 def _is_same_host(one: str, other: str) -> bool:
     if one == other:
         return True
+    address = _ipv4_address(one)
+    return address is not None and address == _ipv4_address(other)
+
+
+def _ipv4_address(host: str) -> str | None:
     try:
-        return socket.gethostbyname(one) == socket.gethostbyname(other)
+        return socket.gethostbyname(host)
     except OSError:
-        return False
+        return None
 
 
 def _held_by(table: Mapping[str, Iterable[str]], node: str) -> list[str]:

@@ -7,7 +7,6 @@ Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/YAML%20Overview.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from minirospy.base import yaml_text
 from minirospy.base.errors import ValueTextError
 from minirospy.base.yaml_text import one_line
+from minirospy.introspect.arithmetic import BRACKETS, degrees, radians
 
 if TYPE_CHECKING:
     import yaml
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_angles",
-    "arithmetic",
     "check_parameter",
     "format_pretty",
     "format_value",
@@ -39,8 +38,7 @@ _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "nul
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
-_MAX_ANGLE_LENGTH = 200
-_MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer to show in an error message
+_MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer that an error message shows
 
 
 def parse_value(text: str) -> object:
@@ -227,61 +225,20 @@ def add_angles(loader_class: type[_Loader]) -> None:
     """Add angles to a YAML loader: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
     import yaml
 
-    in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
-
-    def construct(unit: float) -> Callable[[_Loader, yaml.ScalarNode], float]:
-        def angle(loader: _Loader, node: yaml.ScalarNode) -> float:
+    def constructor(
+        evaluate: Callable[[str], float | str],
+    ) -> Callable[[_Loader, yaml.ScalarNode], float | str]:
+        def construct(loader: _Loader, node: yaml.ScalarNode) -> float | str:
             text = loader.construct_scalar(node)
-            match = in_brackets.match(text)
             try:
-                return unit * arithmetic(match.group(2) if match else text)
+                return evaluate(text)
             except (ValueError, SyntaxError, ArithmeticError) as error:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"[{text}] is not an angle: {error}", node.start_mark
                 ) from error
 
-        return angle
+        return construct
 
-    for tag, name, unit in (("!degrees", "deg", math.pi / 180.0), ("!radians", "rad", 1.0)):
-        loader_class.add_constructor(tag, construct(unit))
-        loader_class.add_implicit_resolver(tag, re.compile(rf"^{name}\(.*\)$"), [name[0]])
-
-
-def arithmetic(text: str) -> float:
-    """Evaluate an arithmetic expression over numbers and ``pi``.
-
-    Raise ValueError, SyntaxError or ArithmeticError if it is invalid.
-    """
-    import ast
-    import operator
-
-    if len(text) > _MAX_ANGLE_LENGTH:
-        # Longer strings may exceed limits of Python's parser, which raises different errors then.
-        raise ValueError(f"more than {_MAX_ANGLE_LENGTH} characters")
-    binary = {
-        ast.Add: operator.add,
-        ast.Sub: operator.sub,
-        ast.Mult: operator.mul,
-        ast.Div: operator.truediv,
-        ast.FloorDiv: operator.floordiv,
-        ast.Mod: operator.mod,
-        # Compute with floats, so that 9**9**9 is an error instead of an integer that fills the memory.
-        ast.Pow: math.pow,
-    }
-
-    def value(node: ast.expr) -> float:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return float(number)
-            case ast.Name(id="pi"):
-                return math.pi
-            case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return -value(inner)
-            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                return value(inner)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in binary:
-                return float(binary[type(op)](value(left), value(right)))
-            case _:
-                raise ValueError("only numbers, pi, + - * / // % ** and brackets")
-
-    return value(ast.parse(text.strip(), mode="eval").body)
+    for tag, name, evaluate in (("!degrees", "deg", degrees), ("!radians", "rad", radians)):
+        loader_class.add_constructor(tag, constructor(evaluate))
+        loader_class.add_implicit_resolver(tag, re.compile(rf"^{name}{BRACKETS}$"), [name[0]])

@@ -18,6 +18,7 @@ from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.base.errors import MinirospyError, NotFoundError
 
 __all__ = [
+    "ROSBUILD_MANIFEST",
     "CrawlTime",
     "NotExecutableError",
     "Packages",
@@ -31,7 +32,9 @@ __all__ = [
 ]
 
 _MANIFEST = "package.xml"
-_IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"}
+ROSBUILD_MANIFEST = "manifest.xml"  # of packages for rosbuild, the build system before catkin
+_IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"}
+_NO_SUBFOLDERS = "rospack_nosubdirs"
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
@@ -52,7 +55,10 @@ class NotExecutableError(MinirospyError):
 
 
 class Packages:
-    """The packages that are visible in an environment. A package's name is taken from its package.xml."""
+    """The packages that are visible in an environment.
+
+    A package's name is taken from its package.xml. A package for rosbuild has the name of its folder.
+    """
 
     def __init__(self, environment: Environment | None = None) -> None:
         # Packages do not depend on ROS_MASTER_URI or the machine's name, so skip both look-ups.
@@ -164,7 +170,7 @@ class Packages:
 
     def _crawled(self, root: Path) -> list[Path]:
         if root not in self._crawls:
-            self._crawls[root] = list(crawl(root))
+            self._crawls[root] = list(crawl(root, rosbuild=True))
         return self._crawls[root]
 
 
@@ -184,8 +190,11 @@ def crawl_times(root: Path) -> list[CrawlTime]:
         if (folder / _MANIFEST).is_file():
             return True
         started = time.perf_counter()
+        entries = _entries(folder)
+        if any(entry.name == ROSBUILD_MANIFEST for entry in entries):
+            return True
         has_package = False
-        for below in _subfolders(folder):
+        for below in _subfolders(entries):
             has_package |= visit(below)
         found.append(CrawlTime(folder, time.perf_counter() - started, has_package))
         return has_package
@@ -204,23 +213,35 @@ def built_in_roots() -> tuple[Path, ...]:
     return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros")
 
 
-def crawl(root: Path) -> Iterator[Path]:
-    """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages."""
+def crawl(root: Path, *, rosbuild: bool = False) -> Iterator[Path]:
+    """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages.
+
+    ``rosbuild``: yield also packages for rosbuild, which have a manifest.xml and no package.xml; catkin ignores them.
+    """
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():
             yield root
         return
-    for folder in _subfolders(root):
-        yield from crawl(folder)
+    entries = _entries(root)
+    if rosbuild and any(entry.name == ROSBUILD_MANIFEST for entry in entries):
+        yield root
+        return
+    for folder in _subfolders(entries):
+        yield from crawl(folder, rosbuild=rosbuild)
 
 
-def _subfolders(folder: Path) -> list[Path]:
-    """Return the subfolders that may contain packages, sorted, or [] if a marker file marks the folder as ignored."""
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    """Return a folder's entries, sorted, or [] if a marker file marks the folder as ignored."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
         return []
-    if any(entry.name in _IGNORE for entry in entries):
+    return [] if any(entry.name in _IGNORE for entry in entries) else entries
+
+
+def _subfolders(entries: list[os.DirEntry[str]]) -> list[Path]:
+    """Return the subfolders that may contain packages, or [] if a marker file says that they contain none."""
+    if any(entry.name == _NO_SUBFOLDERS for entry in entries):
         return []
     return [
         Path(entry.path)
@@ -235,11 +256,15 @@ def _leads_back(entry: os.DirEntry[str]) -> bool:
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in a folder's package.xml (default: the folder's name), or None if there is no package.xml."""
+    """Return the name in a folder's package.xml (default: the folder's name), or None if the folder is not a package.
+
+    A folder with a manifest.xml is a package for rosbuild, which has the name of its folder.
+    """
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
-        return None
+        # Unlike Path.is_file(), this does not raise an error for a name that is too long.
+        return folder.name if os.path.isfile(folder / ROSBUILD_MANIFEST) else None
     match = _NAME.search(text)
     return match[1].decode("utf-8", "replace") if match else folder.name
 

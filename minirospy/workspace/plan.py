@@ -366,7 +366,9 @@ class _Collector:
         if self._message_depends is not None:
             self._refused(command, "generate_messages() must be called once")
         given = keyword_arguments(command.arguments, frozenset(["DEPENDENCIES", "LANGS"]))
-        self._message_depends = given.get("DEPENDENCIES", [])
+        # genmsg accepts the package's own name, which adds nothing.
+        names = given.get("DEPENDENCIES", [])
+        self._message_depends = [name for name in names if name != self._manifest.name]
         if not self._definitions:
             self.warn(
                 command.file,
@@ -456,7 +458,7 @@ class _Collector:
     def _install_python(self, command: Command) -> None:
         given = keyword_arguments(command.arguments, frozenset(["PROGRAMS", "DESTINATION", "OPTIONAL"]))
         programs, place = given.get("PROGRAMS", []), given.get("DESTINATION", [])
-        if not programs or len(place) != 1:
+        if "PROGRAMS" not in command.arguments[:1] or len(place) != 1:
             raise _error(command, "catkin_install_python(PROGRAMS file ... DESTINATION folder) is its form")
         rule = self._rule(command, programs, place[0])._replace(program=True, python=True)
         rule.check(self._folder)

@@ -226,6 +226,8 @@ def test_pub_from_standard_input_and_file(
         (["/b-ad", "std_msgs/Bool", "True"], 2, "topic [/b-ad]: that is not a legal name"),
         (["/t"], 2, "arguments are required"),
         (["-r", "0", "/t", "std_msgs/Bool", "True"], 2, "greater than zero"),
+        (["-r", "-5", "/t", "std_msgs/Bool", "True"], 2, "greater than zero"),
+        (["-r", "-1", "/t", "std_msgs/Bool", "True"], 2, "greater than zero"),
         (["-r", "fast", "/t", "std_msgs/Bool", "True"], 2, "must be a number"),
     ],
 )

@@ -462,6 +462,38 @@ def test_an_invalid_name_is_an_error(scene: Scene, name: str) -> None:
     assert str(mistakes(scene)).startswith(f"{folder / 'package.xml'}:2: '{name}' is not a package name")
 
 
+def test_messages_may_name_their_own_package_as_a_dependency(scene: Scene) -> None:
+    scene.package(
+        "p",
+        "find_package(catkin REQUIRED COMPONENTS message_generation)\nadd_message_files(FILES A.msg B.msg)\n"
+        "generate_messages(DEPENDENCIES std_msgs p)",
+        "std_msgs message_generation",
+        {"msg/A.msg": "std_msgs/Bool b", "msg/B.msg": "A a"},
+    )
+    assert [plan.message_depends for plan in read_plans(scene.source)] == [("std_msgs",)]
+    scene.build()
+    assert python(scene, "from p.msg import B; print(B().a.b.data)") == "False\n"
+
+
+def test_an_empty_list_of_programs_is_installed(scene: Scene) -> None:
+    """As for a pattern that matches no file: CMake and catkin accept the command."""
+    scene.package(
+        "p",
+        "find_package(catkin REQUIRED)\nfile(GLOB found ${PROJECT_SOURCE_DIR}/scripts/*.py)\n"
+        "catkin_install_python(PROGRAMS ${found} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})\n"
+        "install(PROGRAMS ${found} DESTINATION lib)\ninstall(FILES DESTINATION lib)",
+    )
+    assert [each.sources for each in read_plans(scene.source)[0].installs] == [(), (), ()]
+    scene.build()
+
+
+def test_a_package_for_rosbuild_is_not_built(scene: Scene) -> None:
+    scene.package("p")
+    (scene.source / "old").mkdir()
+    (scene.source / "old" / "manifest.xml").write_text("<package/>")
+    assert [plan.name for plan in read_plans(scene.source)] == ["p"]
+
+
 def test_a_link_that_leads_back(scene: Scene) -> None:
     scene.package("p")
     try:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple, TextIO, TypeVar, cast
@@ -135,6 +136,8 @@ class Message:
             _check_field(name, type_, getattr(self, name), checks)
         if isinstance(exc, OverflowError):
             raise OverflowError(str(exc))
+        if isinstance(exc, struct.error | TypeError):
+            raise SerializationError(f"{type(exc)}: '{exc}' when writing '{self}'")
         if exc is not None:
             raise SerializationError(str(exc))
 
@@ -316,7 +319,13 @@ def _list_text(values: Sequence[object], indent: str, options: _Options) -> str:
 def _time_text(value: TVal, indent: str, offset: Time | None, width: int | None) -> str:
     if offset is not None and isinstance(value, Time):
         value = value - offset
-    return f"\n{indent}secs: {value.secs:{width or 1}d}\n{indent}nsecs: {value.nsecs:{width or 9}d}"
+    seconds = value.secs if width is None else _integer(value.secs, width)
+    return f"\n{indent}secs: {seconds}\n{indent}nsecs: {_integer(value.nsecs, width or 9)}"
+
+
+def _integer(number: float, width: int) -> str:
+    # With %, because programs store floats in times, as in `stamp.secs = time.time()`.
+    return "%*d" % (width, number)  # noqa: UP031 - format() refuses floats
 
 
 def _number(value: object, width: int | None) -> str:

@@ -337,6 +337,28 @@ print(checked.wait(60), [handle.get_goal_status() for handle in handles])
         assert "SystemExit\n" in said
         assert "ValueError: bad callback of a lost goal\n" in said
 
+    def test_a_callback_that_raises_does_not_keep_a_status_from_other_goals(self) -> None:
+        said = run("""
+from actionlib.action_client import GoalManager
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib.msg import TestAction, TestGoal
+def changed(handle):
+    print(handles.index(handle), handle.get_comm_state() == actionlib.CommState.ACTIVE)
+    if handle != handles[2]:
+        raise ValueError(handles.index(handle))
+manager = GoalManager(TestAction)
+manager.register_send_goal_fn(lambda goal: None)
+handles = [manager.init_goal(TestGoal(), changed) for _ in range(3)]
+goals = [handle.comm_state_machine.action_goal.goal_id for handle in handles]
+try:
+    manager.update_statuses(GoalStatusArray(status_list=[GoalStatus(each, GoalStatus.ACTIVE, "") for each in goals]))
+except ValueError as error:
+    print("raised", error)
+""")
+        assert said.startswith("0 True\n1 True\n2 True\nraised 0\n[ERROR]")
+        assert said.count("bad callback: <function changed at ") == 1
+        assert "\nValueError: 1\n" in said
+
     def test_a_callback_waits_for_the_end_of_another_goal(self) -> None:
         """As in actionlib, one goal's callback does not block those of other goals."""
         said = run("""

@@ -162,6 +162,26 @@ def test_a_listener_may_fail_and_may_stop_the_launch(
         launch.shutdown()
 
 
+def test_no_node_starts_after_a_shutdown_has_begun(master: str, package: Path) -> None:
+    launch = roslaunch.scriptapi.ROSLaunch()
+    launch.start()
+    try:
+        launch.launch(roslaunch.core.Node("pkg", "wait.py", "a"))
+        monitor = launch.parent.pm
+        monitor.shutdown()
+        with pytest.raises(
+            roslaunch.RLException, match=r"cannot add process \[b\] after process monitor has"
+        ):
+            launch.launch(roslaunch.core.Node("pkg", "wait.py", "b"))
+        wait_until(lambda: monitor.done)
+        with pytest.raises(
+            roslaunch.RLException, match=r"cannot add process \[c\] after process monitor has"
+        ):
+            launch.launch(roslaunch.core.Node("pkg", "wait.py", "c"))
+    finally:
+        launch.stop()
+
+
 def test_a_start_that_failed_may_be_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://no-such-host.invalid:11399")
     launch = roslaunch.parent.ROSLaunchParent("run", [])

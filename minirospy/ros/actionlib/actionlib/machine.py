@@ -14,6 +14,7 @@ from typing import Any
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
 from minirospy import client as rospy
+from minirospy.client.session import current_session
 from minirospy.core.graph.goals import TERMINAL, client_steps
 from minirospy.core.idl.protocols import Action, ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.core.idl.protocols import GoalStatus as AnyGoalStatus
@@ -273,9 +274,21 @@ class GoalManager:
         return ClientGoalHandle(machine)
 
     def update_statuses(self, status_array: GoalStatusArray) -> None:
-        """Process a list of statuses."""
+        """Process a list of statuses, for all goals even if a goal's callback raises an error.
+
+        Raise the first of these errors at the end, and log the others.
+        """
+        first: BaseException | None = None
         for machine in self._get_live_statuses():
-            machine.update_status(status_array)
+            try:
+                machine.update_status(status_array)
+            except (Exception, SystemExit) as error:  # noqa: BLE001 - of the program's own callback
+                if first is None:
+                    first = error
+                else:
+                    current_session().callback_errors.log(machine.transition_cb, error)
+        if first is not None:
+            raise first
 
     def update_results(self, action_result: ActionResult) -> None:
         """Process a result."""

@@ -119,7 +119,8 @@ class ROSLaunchRunner:
 
         Raise RLException after a shutdown.
         """
-        if self._monitor().done:
+        monitor = self._monitor()
+        if monitor.is_shutdown or monitor.done:
             raise RLException(f"cannot add process [{node.name}] after process monitor has been shut down")
         node.give_name()
         process = self._launcher.start_node(node.spec)

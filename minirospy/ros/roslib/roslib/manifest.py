@@ -14,7 +14,7 @@ from minirospy.base.xml_text import XmlError, check_xml
 from minirospy.ros.roslib.roslib.exceptions import ROSLibException
 from minirospy.ros.roslib.roslib.packages import InvalidROSPkgException, get_pkg_dir
 from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE
-from minirospy.ros.rospkg.rospkg.manifest import Export
+from minirospy.ros.rospkg.rospkg.manifest import Export, child_elements, element_text
 from minirospy.ros.rospkg.rospkg.manifest import RosDep as ROSDep
 
 if TYPE_CHECKING:
@@ -137,43 +137,33 @@ def parse(string: str, filename: str = "string") -> Manifest:
 def _manifest(root: Element) -> Manifest:
     manifest = Manifest()
     for tag in ("description", "license", "author", "url"):
-        found = _children(root, tag)
+        found = child_elements(root, tag)
         if len(found) > 1 and tag != "author":
             have = "have only one" if tag == "license" else "have a single"
             raise ManifestException(f"Invalid manifest file: must {have} '{tag}' element")
         texts = (
-            "".join(node.toxml() for node in each.childNodes) if tag == "description" else _text(each)
+            "".join(node.toxml() for node in each.childNodes) if tag == "description" else element_text(each)
             for each in found
         )
         setattr(manifest, tag, ", ".join(texts))
-    for each in _children(root, "description"):
+    for each in child_elements(root, "description"):
         manifest.brief = each.getAttribute("brief")
-    for each in _children(root, "review"):
+    for each in child_elements(root, "review"):
         manifest.status, manifest.notes = each.getAttribute("status"), each.getAttribute("notes")
-    if _children(root, "version"):
+    if child_elements(root, "version"):
         raise ManifestException("<version> tag is not valid in a package manifest.xml file")
 
-    for each in _children(root, "depend"):
+    for each in child_elements(root, "depend"):
         if not each.hasAttribute("thirdparty"):
             if not each.hasAttribute("package"):
                 raise ManifestException("Invalid manifest file: depends is missing 'package' attribute")
             manifest.depends.append(Depend(each.getAttribute("package")))
-    manifest.rosdeps = [ROSDep(each.getAttribute("name")) for each in _children(root, "rosdep")]
-    for each in _children(root, "versioncontrol")[:1]:
+    manifest.rosdeps = [ROSDep(each.getAttribute("name")) for each in child_elements(root, "rosdep")]
+    for each in child_elements(root, "versioncontrol")[:1]:
         manifest.versioncontrol = VersionControl(each.getAttribute("type"), each.getAttribute("url"))
     manifest.exports = [
-        Export(each.tagName, dict(each.attributes.items()), _text(each))
-        for tag in _children(root, "export")
-        for each in _children(tag)
+        Export(each.tagName, dict(each.attributes.items()), element_text(each))
+        for tag in child_elements(root, "export")
+        for each in child_elements(tag)
     ]
     return manifest
-
-
-def _children(parent: Element, tag: str = "") -> list[Element]:
-    return [
-        each for each in parent.childNodes if each.nodeType == each.ELEMENT_NODE and tag in ("", each.tagName)
-    ]
-
-
-def _text(element: Element) -> str:
-    return "".join(each.data for each in element.childNodes if each.nodeType == each.TEXT_NODE).strip()

@@ -27,6 +27,10 @@ __all__ = ["main", "rosstack"]
 
 _OPTIONS = {"target", "attrib", "top", "lang", "length"}
 _FLAGS = {"deps-only", "zombie-only"}
+_MISSING = (
+    "{} '{}' depends on non-existent package '{}' and rosdep claims that it is not a system dependency. "
+    "Check the ROS_PACKAGE_PATH or try calling 'rosdep update'"
+)
 _FOOTER = """\
   Extra options:
     -q     Quiets error reports.
@@ -103,12 +107,14 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
             Packages(), os.environ, lambda error: complain("Warning", error), tool.name == "rosstack"
         )
         _checked(line, tool).body(line, tree)
+        for package, name in tree.missing:
+            complain("Error", _MISSING.format(tool.thing, package, name))
     except NotFoundError as error:
         complain("Error", _not_found(tool, line.verb, error))
     except MinirospyError as error:
         complain("Error", error)
     else:
-        return 0
+        return 1 if tree.missing else 0
     return 1
 
 
@@ -228,7 +234,7 @@ def _depends_indent(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_manifests(line: _Line, tree: Dependencies) -> None:
-    print(" ".join(str(tree.folder(name) / "package.xml") for name in tree.all(_package(line))))
+    print(" ".join(str(tree.manifest(name).path) for name in tree.all(_package(line))))
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import os
 import re
 import sys
@@ -20,10 +19,10 @@ from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFou
 from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.core.wire.xmlrpc_writer import is_numpy
 from minirospy.introspect import parameters
+from minirospy.introspect.arithmetic import degrees, radians
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import (
     add_angles,
-    arithmetic,
     format_pretty,
     format_value,
     parse_documents,
@@ -320,24 +319,24 @@ pattern = re.compile(r"^rad\([^\)]*\)$")
 """The second of ROS's two patterns for angles. Programs use this name."""
 
 
-def construct_angle_degrees(loader: Any, node: Any) -> float:
+def construct_angle_degrees(loader: Any, node: Any) -> float | str:
     """Convert a YAML node such as `deg(90)` or `90` to radians. Raise RosParamException if it is not a number."""
     value = loader.construct_scalar(node)
     try:
-        return math.radians(arithmetic(value.strip()[4:-1] if value.startswith("deg(") else value))
+        return degrees(value)
     except (ValueError, SyntaxError, ArithmeticError):
         raise _YamlError(f"invalid degree value: {value}") from None
 
 
-def construct_angle_radians(loader: Any, node: Any) -> float:
+def construct_angle_radians(loader: Any, node: Any) -> float | str:
     """Evaluate a YAML node such as `rad(pi/2)`.
 
-    Raise RosParamException if the expression is invalid. Only arithmetic with `pi` is evaluated, whereas ROS runs the
-    expression as Python code.
+    Raise RosParamException if the expression is invalid. Only operators and functions of numbers are evaluated, whereas ROS
+    runs the expression as Python code.
     """
     value = loader.construct_scalar(node).strip()
     try:
-        return arithmetic(value[4:-1] if value.startswith("rad(") else value)
+        return radians(value)
     except (ValueError, SyntaxError, ArithmeticError):
         raise _YamlError(f"invalid radian expression: {value}") from None
 

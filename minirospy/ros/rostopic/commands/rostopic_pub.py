@@ -46,9 +46,14 @@ class _PubParser(Parser):
     """A parser that accepts negative numbers as values, despite the option `-1`."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Parse the arguments to a dict keyed by name. Accept negative numbers as values."""
+        """Parse the arguments to a dict keyed by name. Accept negative numbers as values, and -1 as a rate."""
         options = super().parse(
-            [_SHIELD + word if word != "-1" and _NEGATIVE.match(word) else word for word in words]
+            [
+                _SHIELD + word
+                if _NEGATIVE.match(word) and (word != "-1" or previous in ("-r", "--rate"))
+                else word
+                for previous, word in zip(["", *words], words, strict=False)
+            ]
         )
         options["args"] = [word.removeprefix(_SHIELD) for word in cast("list[str]", options["args"])]
         return options
@@ -130,7 +135,7 @@ def _pub(
 
 def _positive(text: str) -> float:
     try:
-        rate = float(text)
+        rate = float(text.removeprefix(_SHIELD))
     except ValueError:
         raise argparse.ArgumentTypeError("rate must be a number") from None
     if not 0.0 < rate < 1e6:
