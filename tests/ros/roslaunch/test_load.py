@@ -388,7 +388,7 @@ def test_files_that_include_the_next_one_twice_are_refused(
     packages: Packages, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Without a limit, there would be 2^40 includes. Ten thousand, the limit of users, take seconds.
-    monkeypatch.setattr("minirospy.ros.roslaunch.launcher.load._MAX_INCLUDES", 300)
+    monkeypatch.setattr("minirospy.ros.roslaunch.launcher.load.MAX_INCLUDES", 300)
     for number in range(40):
         include = f'<include file="$(dirname)/f{number + 1}.launch"/>'
         (tmp_path / f"f{number}.launch").write_text(f"<launch>{include * 2}</launch>")
