@@ -804,17 +804,21 @@ def child():
 
 rospy.init_node("parent", argv=[])
 rospy.on_shutdown(lambda: print("hook of", rospy.get_name()))
-heard = []
-sub = rospy.Subscriber("t", Int32, lambda message: heard.append(message.data))
+heard, has_come = [], threading.Event()
+
+def hear(message):
+    heard.append(message.data)
+    if message.data == 7:
+        has_come.set()
+
+sub = rospy.Subscriber("t", Int32, hear)
 pub = rospy.Publisher("t", Int32, queue_size=10)
 service = rospy.Service("s", Empty, lambda request: {{}})
-while pub.get_num_connections() < 1:
-    time.sleep(0.01)
+pub.wait_for_subscribers()
 {FORKS[how]}
 assert not rospy.is_shutdown()
 pub.publish(7)
-while 7 not in heard:
-    time.sleep(0.01)
+has_come.wait()
 assert 99 not in heard
 assert rospy.get_master().lookupNode("/parent")[2] == rospy.get_node_uri()
 print("ends")
