@@ -1,0 +1,1 @@
+"""The base class of controllers, for controllers of the user's own."""

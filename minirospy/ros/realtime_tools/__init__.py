@@ -1,0 +1,1 @@
+"""Publishers and action servers for loops that must not wait."""
