@@ -45,7 +45,7 @@ check: lint
 	@$(BIN)/python -m pytest -q -n 2 --dist worksteal $(CHECKED)
 
 test: $(READY)
-	@$(BIN)/python -m pytest -n 3 --dist worksteal --ignore=tests/interop --ignore=tests/windows
+	@$(BIN)/python -m pytest -n 4 --dist worksteal --ignore=tests/interop --ignore=tests/windows
 
 interop: $(READY)
 	@sh tests/interop/install_ros.sh

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import os
 import random
 import signal
@@ -97,12 +98,21 @@ def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         assert not left, f"board servers without clients: {left}"
 
 
+@pytest.fixture(scope="session")
+def _homes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Return an endless iterator of new folders for ROS_HOME.
+
+    `mktemp` for each test would list all earlier folders to find a free number: milliseconds, for thousands of tests.
+    """
+    parent = tmp_path_factory.mktemp("homes")
+    return (parent / str(number) for number in itertools.count())
+
+
 @pytest.fixture(autouse=True)
-def _own_environment(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _board_folder: Path
-) -> None:
+def _own_environment(_homes: Iterator[Path], monkeypatch: pytest.MonkeyPatch, _board_folder: Path) -> None:
     """Remove the user's ROS variables. Put files into a temporary folder and sockets on loopback."""
-    home: Path = tmp_path_factory.mktemp("ros")
+    home = next(_homes)
+    home.mkdir(mode=0o700)
     for name in list(os.environ):
         if name.startswith(("ROS_", "MINIROSPY_")):
             monkeypatch.delenv(name)

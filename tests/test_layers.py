@@ -10,6 +10,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -160,24 +161,43 @@ FILES = sorted(
 )
 
 
+class Import(NamedTuple):
+    """The modules or names that a statement imports, and where the statement is."""
+
+    names: tuple[str, ...]
+    is_for_types: bool
+    is_in_function: bool
+
+
+@functools.cache
+def import_statements(path: Path) -> tuple[Import, ...]:
+    """Return every import of a file, anywhere in the file."""
+    found: list[Import] = []
+    blocks: list[tuple[ast.AST, bool, bool]] = [(ast.parse(path.read_text(encoding="utf-8")), False, False)]
+    while blocks:
+        node, is_for_types, is_in_function = blocks.pop()
+        if isinstance(node, ast.Import):
+            found.append(Import(tuple(alias.name for alias in node.names), is_for_types, is_in_function))
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
+            names = tuple(f"{node.module}.{alias.name}" for alias in node.names)
+            found.append(Import(names, is_for_types, is_in_function))
+        elif isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            blocks += ((each, True, is_in_function) for each in node.body)
+            blocks += ((each, is_for_types, is_in_function) for each in node.orelse)
+        elif not isinstance(node, ast.expr):
+            # Imports are statements, and expressions cannot contain statements.
+            inside = is_in_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
+            blocks += ((each, is_for_types, inside) for each in ast.iter_child_nodes(node))
+    return tuple(found)
+
+
 @functools.cache
 def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
     """Return every module that a file imports, anywhere in the file; without ``for_types``, only those imported at run time."""
-    found: set[str] = set()
-    blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
-    while blocks:
-        node = blocks.pop()
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-        elif isinstance(node, ast.If) and not for_types and ast.unparse(node.test) == "TYPE_CHECKING":
-            blocks += node.orelse
-        elif not isinstance(node, ast.expr):
-            # Imports are statements, and expressions cannot contain statements.
-            blocks += ast.iter_child_nodes(node)
-    return frozenset(found)
+    return frozenset(
+        name for each in import_statements(path) if for_types or not each.is_for_types for name in each.names
+    )
 
 
 def graph_of_imports(room: str, *, for_types: bool = False) -> dict[str, set[str]]:
@@ -204,36 +224,39 @@ def room_of(module: str) -> str:
     return parts[1] if parts[0] == "minirospy" and len(parts) > 1 else ""
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_go_downwards(path: Path) -> None:
-    room = path.relative_to(PACKAGE).with_suffix("").parts[0]
-    if room == "__init__":
-        return
-    for module in imports(path):
-        other = room_of(module)
-        is_known = (path.relative_to(PACKAGE).as_posix(), other) in UPWARDS
-        if other in DEPTH and other != room and not is_known:
-            assert DEPTH[other] > DEPTH[room], f"{room} imports {module}"
+def name_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if path.relative_to(PACKAGE).parts[0] in PURE or path in PURE_FILES],
-    ids=lambda path: path.name,
-)
-def test_pure_rooms_touch_no_outside(path: Path) -> None:
-    assert not {module.split(".")[0] for module in imports(path)} & IMPURE_MODULES
+@pytest.mark.parametrize("room", sorted(DEPTH))
+def test_imports_go_downwards(room: str) -> None:
+    upwards = []
+    for path in (each for each in FILES if each.relative_to(PACKAGE).with_suffix("").parts[0] == room):
+        for module in imports(path):
+            other = room_of(module)
+            is_known = (name_of(path), other) in UPWARDS
+            if other in DEPTH and other != room and not is_known and DEPTH[other] <= DEPTH[room]:
+                upwards.append(f"{name_of(path)} imports {module}")
+    assert upwards == []
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if any(folder in path.parents for folder in BYTES_ONLY)],
-    ids=lambda path: path.name,
-)
-def test_runtime_and_wire_know_no_messages(path: Path) -> None:
+def imported_of(paths: list[Path], packages: set[str]) -> dict[str, set[str]]:
+    """Return the packages that each file imports of those in ``packages``."""
+    assert paths
+    found = {name_of(path): {module.split(".")[0] for module in imports(path)} & packages for path in paths}
+    return {name: modules for name, modules in found.items() if modules}
+
+
+def test_pure_rooms_touch_no_outside() -> None:
+    pure = [path for path in FILES if path.relative_to(PACKAGE).parts[0] in PURE or path in PURE_FILES]
+    assert imported_of(pure, IMPURE_MODULES) == {}
+
+
+def test_runtime_and_wire_know_no_messages() -> None:
     generated = {each.parent.parent.name for each in (PACKAGE / "overlay").glob("*/msg/__init__.py")}
     assert "rosgraph_msgs" in generated
-    assert not {module.split(".")[0] for module in imports(path)} & generated
+    paths = [path for path in FILES if any(folder in path.parents for folder in BYTES_ONLY)]
+    assert imported_of(paths, generated) == {}
 
 
 @pytest.mark.parametrize("room", sorted(DEPTH))
@@ -324,22 +347,14 @@ def leaf_of_module(module: str) -> str:
     return next((leaf for path in paths for leaf in (leaf_of(path), leaf_of(f"{path}.py")) if leaf), "")
 
 
-@functools.cache
 def imported_on_import(path: Path) -> frozenset[str]:
     """Return the modules that are imported when a file is imported: not those in functions, or for types only."""
-    found: set[str] = set()
-    blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
-    while blocks:
-        node = blocks.pop()
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            blocks += node.orelse
-        elif not isinstance(node, (ast.expr, ast.FunctionDef, ast.AsyncFunctionDef)):
-            blocks += ast.iter_child_nodes(node)
-    return frozenset(found)
+    return frozenset(
+        name
+        for each in import_statements(path)
+        if not (each.is_for_types or each.is_in_function)
+        for name in each.names
+    )
 
 
 def test_nothing_outside_imports_a_leaf() -> None:

@@ -61,6 +61,10 @@ def start(script: str, *arguments: str) -> subprocess.Popen[str]:
 NO_REPORT = "from minirospy.client import shutdown; shutdown._REPORT_SECONDS = 1000.0\n"
 
 
+# First line of a program that reports earlier what its shutdown waits for: soon after it has interrupted its main thread.
+SOON_REPORT = "from minirospy.client import shutdown; shutdown._REPORT_SECONDS = 1.2\n"
+
+
 def deliver(process: subprocess.Popen[str], number: int) -> None:
     """Send a signal, and wait until the process has received it: of two pending signals, it would receive only one."""
     process.send_signal(number)
@@ -228,7 +232,7 @@ def test_one_signal_ends_a_program_that_python_can_interrupt(master: str, what: 
 )
 def test_a_second_signal_ends_a_program_that_goes_on(master: str, what: str, number: int) -> None:
     body, prints, waits_for, then = TWO_SIGNALS[what]
-    process = start(PROGRAM.format(textwrap.indent(body, "    ")))
+    process = start(SOON_REPORT + PROGRAM.format(textwrap.indent(body, "    ")))
     process.send_signal(number)
     report = read_report(process)
     assert f" {waits_for}" in report
@@ -287,7 +291,7 @@ REQUEST = {
         True,
     ),
     "the system's handler": (
-        "import signal\nsignal.signal(signal.SIGINT, signal.SIG_DFL)\nready(); time.sleep(3); print('after')",
+        "import signal\nsignal.signal(signal.SIGINT, signal.SIG_DFL)\nready(); time.sleep(1.5); print('after')",
         "hook after finally atexit",
         False,
     ),
@@ -451,7 +455,7 @@ finally:
     ],
 )
 def test_c_code_is_awaited_and_finally_runs(master: str, signals: int, prints: str, status: int) -> None:
-    process = start(IN_C_CODE)
+    process = start(SOON_REPORT + IN_C_CODE)
     process.send_signal(signal.SIGINT)
     report = read_report(process)
     assert "MainThread at <string>:" in report
@@ -563,7 +567,7 @@ def test_a_second_signal_ends_the_wait_for_a_silent_master(
     body: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with master_that_stops(monkeypatch) as stop:
-        process = start(LEAVES.format(body))
+        process = start(SOON_REPORT + LEAVES.format(body))
         stop()
         process.send_signal(signal.SIGINT)
 
@@ -804,17 +808,21 @@ def child():
 
 rospy.init_node("parent", argv=[])
 rospy.on_shutdown(lambda: print("hook of", rospy.get_name()))
-heard = []
-sub = rospy.Subscriber("t", Int32, lambda message: heard.append(message.data))
+heard, has_come = [], threading.Event()
+
+def hear(message):
+    heard.append(message.data)
+    if message.data == 7:
+        has_come.set()
+
+sub = rospy.Subscriber("t", Int32, hear)
 pub = rospy.Publisher("t", Int32, queue_size=10)
 service = rospy.Service("s", Empty, lambda request: {{}})
-while pub.get_num_connections() < 1:
-    time.sleep(0.01)
+pub.wait_for_subscribers()
 {FORKS[how]}
 assert not rospy.is_shutdown()
 pub.publish(7)
-while 7 not in heard:
-    time.sleep(0.01)
+has_come.wait()
 assert 99 not in heard
 assert rospy.get_master().lookupNode("/parent")[2] == rospy.get_node_uri()
 print("ends")

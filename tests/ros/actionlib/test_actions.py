@@ -288,10 +288,9 @@ print(client.wait_for_result(), client.get_state() == GoalStatus.LOST, client.ge
 from minirospy.ros.actionlib.actionlib import client as client_module
 import socket
 client_module.SERVER_SECONDS = 0.2
-client.send_goal(TestGoal(3))
-while client.get_state() != GoalStatus.ACTIVE:
-    time.sleep(0.01)
-checked = threading.Event()
+active, checked = threading.Event(), threading.Event()
+client.send_goal(TestGoal(3), active_cb=active.set)
+active.wait()
 check = client.action_client._check_server
 client.action_client._check_server = lambda goals, last: (check(goals, last), checked.set())
 subscription = client.action_client.status_sub.impl.subscription

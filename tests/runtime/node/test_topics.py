@@ -971,12 +971,14 @@ def test_subscription_closed_while_connecting_leaves_no_link() -> None:
 def test_a_closed_node_connects_to_nothing_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pending connections are closed by then; otherwise their tasks would be left in the program's loop."""
     ended: list[str] = []
+    cancelled, released = asyncio.Event(), asyncio.Event()
 
     async def connect(_: Subscription, uri: str) -> None:
         try:
-            await asyncio.sleep(60)
+            await asyncio.Event().wait()
         finally:
-            await asyncio.sleep(0.1)
+            cancelled.set()
+            await released.wait()
             ended.append(uri)
 
     async def scene() -> None:
@@ -986,7 +988,12 @@ def test_a_closed_node_connects_to_nothing_any_more(monkeypatch: pytest.MonkeyPa
             subscription = await listen(b, "/t", Box())
             await until(lambda: subscription.connecting)
             await asyncio.sleep(0)
-            await b.close()
+            closing = asyncio.ensure_future(b.close())
+            await cancelled.wait()
+            await asyncio.sleep(0)
+            assert not closing.done()
+            released.set()
+            await closing
             assert ended == [a.uri]
 
     run(scene)

@@ -41,7 +41,7 @@ STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
 # maximum number of files per launch;
 # a chain of 26 files that each include the next one twice would mean reading 67,108,863 files
-_MAX_INCLUDES = 10_000
+MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
 
@@ -265,11 +265,11 @@ class _File:
                 f"includes are nested deeper than {_MAX_INCLUDE_DEPTH}: does a file include itself?"
             )
 
-        if len(self._spec.includes) >= _MAX_INCLUDES:
+        if len(self._spec.includes) >= MAX_INCLUDES:
             raise _TooManyIncludesError(
                 self._file,
                 tag.line,
-                f"more than {_MAX_INCLUDES} files are included: do files include others twice?",
+                f"more than {MAX_INCLUDES} files are included: do files include others twice?",
             )
 
         inner = self._below(tag, scope)
