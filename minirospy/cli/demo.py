@@ -201,7 +201,7 @@ def _rest(launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: flo
 
 
 class _Lines:
-    """Prints a line per press, for an output that is not a terminal or cannot be redrawn."""
+    """Prints one line per key press, for output that is not a terminal or cannot be redrawn in place."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)

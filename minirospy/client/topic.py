@@ -82,7 +82,7 @@ class Topic(Generic[_M_co]):
         return self.impl.get_num_connections() if self.impl else 0
 
     def unregister(self) -> None:
-        """Unregister. The topic's last handle in this process also closes the connections. Idempotent.
+        """Unregister. Unregistering the topic's last handle in this process also closes the connections. Idempotent.
 
         As in rospy, only ``name`` remains usable.
         """

@@ -187,7 +187,7 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of a robot's token, or of a control room's if ``kind`` is "control"; its name may then be ``-``."""
+    """Return the key that stores a robot's token or, if ``kind`` is "control", a control room's, whose name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 

@@ -71,7 +71,7 @@ class Reachable(Protocol):
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers, or None if responses cannot be lost."""
+        """Return the ids of the existing servers, to detect lost responses; None if none can be lost."""
 
     def probe(self) -> Ros2Probe | None:
         """Return a probe of the servers, or None if there is no request without effect for them."""

@@ -197,7 +197,7 @@ class Calls:
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return a probe for a service's nodes, or None if one of them has no parameters or is not known yet.
+        """Return a probe for a service's nodes, or None if a node offers no parameter services or is not known yet.
 
         May be called from any thread.
         """

@@ -93,7 +93,7 @@ class SharedTopic:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # If the topic is being unsubscribed, its connections are still open and do not deliver the latched messages again.
+        # While an unsubscription is in progress, the connections are open, and would not deliver the latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))

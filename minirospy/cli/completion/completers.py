@@ -137,7 +137,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return the contents of the folder that contains ``word``. In each path, ``shown`` replaces ``root``."""
+    """Return the paths that may complete ``word``: its folder's contents, with ``shown`` in place of ``root``."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -395,7 +395,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Return ``pkg/`` first and then ``pkg/Type``, because a list of all types would be too long.
+    """Complete in two steps, ``pkg/`` and then ``pkg/Type``, because a list of all types would be too long.
 
     For `rosmsg show`, also return type names without the package.
     """

@@ -32,7 +32,7 @@ class Parameters:
         return isinstance(self.get(key), (int, float)) and not isinstance(self.get(key), bool)
 
     def number(self, key: str, default: float) -> float:
-        """Return an int or a float as a float, or the default. Not-a-number is returned: a caller that cannot use it checks."""
+        """Return an int or a float as a float, or the default. Callers that cannot handle NaN must check for it."""
         value = self.get(key)
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
 

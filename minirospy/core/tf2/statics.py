@@ -16,7 +16,7 @@ TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
 _LENGTH = struct.Struct("<I")
 _STAMP = 12
-_NUMBERS = 56  # bytes of a header's sequence number and time, and of a translation and rotation
+_NUMBERS = 56  # sizes in bytes: a header's sequence number and time; a translation and rotation
 MAX_FRAMES = 10_000
 MAX_BYTES = 8 << 20
 

@@ -190,7 +190,7 @@ def _near(topic: str, published: set[str]) -> str:
 
 
 def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield a finding for each publisher and subscriber that are not connected although they should be."""
+    """Yield a finding for each publisher-subscriber pair that should be connected but is not."""
     pairs = [
         _Pair(topic, publisher, subscriber)
         for topic, publishers in state.publishers.items()

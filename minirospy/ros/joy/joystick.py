@@ -15,7 +15,7 @@ EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
 """Event types from Linux's struct js_event, also used by the other backends."""
 
 MAX_VALUE = 32767.0
-_FIRST_SECONDS = 1.0  # seconds until the first repetition after opening, as in the real node
+_FIRST_SECONDS = 1.0  # seconds between opening the device and the first repetition, as in the real node
 
 
 class Event(NamedTuple):

@@ -169,7 +169,7 @@ def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator
 def represent_ordered_mapping(
     self: Any, tag: str, mapping: Any, flow_style: bool | None = None
 ) -> yaml.MappingNode:
-    """Return the YAML node for a dictionary in its own order, for use as `represent_mapping` of a PyYAML dumper."""
+    """Return the YAML node for a dictionary, in its order; for use as a PyYAML dumper's `represent_mapping`."""
     pairs: list[tuple[yaml.Node, yaml.Node]] = []
     node = yaml.MappingNode(tag, pairs, flow_style=flow_style)
     if self.alias_key is not None:

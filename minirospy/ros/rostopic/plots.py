@@ -64,7 +64,7 @@ def plot(
 
 
 def plot_cells(val: object, time_offset: Time | None, field_filter: FieldFilter | None) -> str | None:
-    """Return a value's cells, or None if the value has no cells."""
+    """Return the CSV cells of a value, or None if the value cannot be printed as CSV."""
     return _joined(text for _, text in _cells(val, "", time_offset, field_filter))
 
 

@@ -456,7 +456,7 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and it may be the last one.
+                # After the refusal a newer list of publishers arrived. Use it: no further one may come.
                 # Retry now, because the publisher may accept.
                 self.retry(uri, error)
         except _NoPublisher as error:

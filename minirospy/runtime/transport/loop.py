@@ -86,7 +86,7 @@ class LoopThread:
 
     def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
         # Do not use concurrent.futures.Future.
-        # Its caller holds a lock during parts of the wait, and the loop needs that lock.
+        # To wait here could deadlock: the caller holds a lock that the loop needs.
         # A signal handler that waited for the loop at that moment would deadlock.
         try:
             if not pending.acquire(timeout=-1 if timeout is None else timeout):

@@ -88,7 +88,7 @@ class Joystick:
         return not any(self.axes) and not any(self.buttons)
 
     def zero(self) -> Joystick:
-        """Return the same joystick with no control held."""
+        """Return a copy of the joystick's state with no control held."""
         return Joystick((0.0,) * len(self.axes), (0,) * len(self.buttons))
 
 

@@ -195,7 +195,7 @@ class SubscribeParameterUpdates:
 
 @dataclass(frozen=True)
 class UnsubscribeParameterUpdates:
-    """Unsubscribe from changes of parameters, or of all if ``names`` is empty."""
+    """Unsubscribe from changes to the named parameters, or to all if ``names`` is empty."""
 
     names: tuple[str, ...]
 

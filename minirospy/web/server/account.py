@@ -44,7 +44,7 @@ class Share:
 
     @property
     def weight(self) -> int:
-        """Return all bytes that the client uses, including those shared with other clients."""
+        """Return the number of bytes that the client uses, including those shared with other clients."""
         return self.size + self.large
 
     def set(self, size: int) -> None:
@@ -57,7 +57,7 @@ class Share:
                 self._account.enforce()
 
     def hold(self, pieces: Sequence[Piece]) -> None:
-        """Count the large pieces among ``pieces``."""
+        """Charge the large pieces among ``pieces`` to the account."""
         self.large += self._account.hold(pieces)
 
     def release(self, pieces: Sequence[Piece]) -> None:
@@ -94,7 +94,7 @@ class Account:
         share.size = 0
 
     def hold(self, pieces: Sequence[Piece]) -> int:
-        """Count the large pieces among ``pieces``; return their total bytes."""
+        """Charge the large pieces among ``pieces`` to the account; return their total size in bytes."""
         found = 0
         for piece in pieces:
             size = len(piece)

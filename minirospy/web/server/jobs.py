@@ -22,7 +22,7 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """The queued work for one client, oldest first, limited in number and in the bytes of the messages that it refers to.
+    """One client's queued jobs, oldest first. Their number and the bytes of the messages they refer to are limited.
 
     A large message counts in the client's share of the server's memory, but only once if it is queued for several clients.
     """

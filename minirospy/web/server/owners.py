@@ -92,7 +92,7 @@ def _by_table(end: _End, other_end: _End) -> int | None:
             continue
         for line in lines:
             if port not in line:
-                continue  # skip most of thousands of lines without parsing them
+                continue  # skip most lines without parsing them; there may be thousands
             _, local, remote, _, _, _, _, user, _, inode, *_ = line.split()
             if (_listed(local), _listed(remote)) == (end, other_end) and inode != "0":
                 return int(user)

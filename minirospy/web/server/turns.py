@@ -38,7 +38,7 @@ EXPECTED_DECAY = 0.9  # factor by which the expected seconds decay after each jo
 IMMEDIATE_SHARE = 0.5  # fraction of the time for work that starts without being queued
 # Maximum burst of an interactive client in slices, 1 ms in total.
 # A request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms.
-# A new client has one slice, and gets one more with each short burst.
+# A new client starts with one time slice, and gets another with each short burst of work.
 # If 250 new clients flood the server, each gets one slice; after that, its other clients are served first.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again

@@ -53,7 +53,7 @@ class FrameRate:
         return self.count >= self._max_frames
 
     def update(self, now: float) -> None:
-        """Start a new second if the current one has passed."""
+        """Start a new one-second window if the current one has passed."""
         if now - self._start >= 1.0:
             self._start, self.count = now, 0
 

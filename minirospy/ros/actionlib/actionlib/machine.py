@@ -230,7 +230,7 @@ class CommStateMachine:
 
 
 class GoalManager:
-    """The goals of one action client: creates the goals, and passes the server's messages to each.
+    """Creates one action client's goals, and passes the server's messages to each of them.
 
     The manager has only weak references to the goals, so a goal without handles receives no further messages.
     """

@@ -79,7 +79,7 @@ def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
 
 
 def _wait_for_master() -> None:
-    """Wait until the environment's master responds."""
+    """Wait until the master at ROS_MASTER_URI responds."""
     master = LaunchMaster(Environment.read(), Output(), time.sleep)
     try:
         if not master.is_online():

@@ -94,7 +94,7 @@ class ClientGoal(Generic[_R, _F]):
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
         elif self._is_known and self.state not in TERMINAL:
-            # The server no longer lists the goal, so the server has been restarted.
+            # The server no longer lists the goal, so it must have been restarted.
             self._end(GoalState.LOST, "the server does not know the goal any more", None)
 
     def _end(self, state: GoalState, text: str, result: _R | None) -> None:
