@@ -19,7 +19,7 @@ __all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
 
 
 class FileNeeds(NamedTuple):
-    """One launch file's dependencies: its nodes as (package, program), the files that it includes, every package that it names."""
+    """One launch file's dependencies: its nodes as (package, program), the files that it includes, all packages it names."""
 
     nodes: tuple[tuple[str, str], ...]
     includes: tuple[str, ...]
