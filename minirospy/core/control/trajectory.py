@@ -19,6 +19,7 @@ from minirospy.core.control.goal import MonitoredGoal
 
 __all__ = [
     "NEVER",
+    "UNCHECKED",
     "ErrorCode",
     "JointPath",
     "JointTolerances",
@@ -75,7 +76,7 @@ class JointTolerances(NamedTuple):
     goal_time: int = 0  # ns after the end, in which the joint may still reach its goal
 
 
-UNCHECKED = JointTolerances()  # those of a joint that is stopped
+UNCHECKED = JointTolerances()  # while a joint stops, or moves without a goal
 
 
 class Segment:
@@ -83,7 +84,8 @@ class Segment:
 
     It is a line, a cubic or a quintic polynomial: of the highest degree for which both ends have the derivatives. It meets the
     derivatives of both ends exactly, and so it may leave the range of the two positions, except for a line. After the end the
-    joint holds the last position. Raise TrajectoryError if it ends before it starts.
+    joint holds the last position; as in ROS, a segment without duration holds the first one. Raise TrajectoryError if it ends
+    before it starts.
     """
 
     __slots__ = ("coefficients", "duration", "end", "goal", "last", "start", "time_from_start", "tolerances")
@@ -103,7 +105,7 @@ class Segment:
         self.start = start
         self.end = end
         self.duration = end - start
-        self.last = last.position
+        self.last = last.position if end > start else first.position
         self.goal = goal
         self.tolerances = tolerances
         self.time_from_start = time_from_start

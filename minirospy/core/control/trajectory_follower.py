@@ -16,6 +16,7 @@ from minirospy.core.control.goal import MonitoredGoal, Outcome
 from minirospy.core.control.parameters import Parameters
 from minirospy.core.control.trajectory import (
     NEVER,
+    UNCHECKED,
     ErrorCode,
     JointPath,
     JointTolerances,
@@ -34,6 +35,7 @@ from minirospy.core.urdf.model import JointType, Robot
 __all__ = ["FollowedJoint", "GoalTolerance", "JointsError", "Plan", "TrajectoryFollower", "read_joints"]
 
 _SECOND = 1_000_000_000  # ns
+_MAX_REQUESTS = 100  # trajectories kept while the loop pauses, like a simulation; the oldest are dropped
 _remainder, _turn = math.remainder, math.tau
 _SUCCEEDED = Outcome(GoalEvent.SUCCEED, (ErrorCode.SUCCESSFUL, ""))
 
@@ -86,7 +88,7 @@ class TrajectoryFollower:
         self._all_reached = (1 << len(joints)) - 1
         self._stop_duration = stop_duration
         self._allows_partial_goals = allows_partial_goals
-        self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque()
+        self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque(maxlen=_MAX_REQUESTS)
         self._paths: list[JointPath] = []
         self.is_running = False
         self.time = 0  # ns of ROS time, of the last update
@@ -288,7 +290,7 @@ class TrajectoryFollower:
                 segment = _stop(before, position, velocity, self._stop_duration, goal)
             else:
                 here = State(actual if math.isfinite(actual) else position)
-                segment = Segment(self.uptime, here, self.uptime, here, goal)
+                segment = Segment(before, here, before, here, goal)
             paths.append(JointPath([segment], goal=goal))
         self._paths = paths
 
@@ -298,7 +300,9 @@ class TrajectoryFollower:
         start = uptime + points.stamp - self.time if points.stamp else uptime
         first = max(points.first, points.next_after(uptime - start))
         bridge_start = max(start, uptime)
-        bridge_end = max(start + points.times[first], bridge_start)
+        bridge_end = start + points.times[first]
+        if bridge_end <= uptime:
+            bridge_end = uptime + 1  # all points have passed since the message was checked: go to the last
 
         paths = []
         for path, column, tolerances, is_continuous in zip(
@@ -309,6 +313,7 @@ class TrajectoryFollower:
                 path.set_goal(goal)
                 paths.append(path)
                 continue
+            allowed = UNCHECKED if goal is None else tolerances
             kept = path.until(bridge_start)
             state = State(*kept[-1].sample(bridge_start))
             target = points.points[first].positions[column]
@@ -319,9 +324,9 @@ class TrajectoryFollower:
                 bridge_end,
                 points.points[first].state(column, offset),
                 goal,
-                tolerances,
+                allowed,
             )
-            tail = Tail(points, column, first, start, offset, tolerances)
+            tail = Tail(points, column, first, start, offset, allowed)
             paths.append(JointPath([*kept, bridge], tail, goal))
         self._paths = paths
 

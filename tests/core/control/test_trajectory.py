@@ -118,10 +118,11 @@ def test_a_segment_holds_its_ends_outside() -> None:
     assert segment.sample(3 * SECOND + 1) == (4.0, 0.0, 0.0)
 
 
-def test_a_segment_without_duration_holds_its_start_then_its_end() -> None:
+def test_a_segment_without_duration_holds_its_start() -> None:
+    """So in ROS a goal with one point at time 0 of a stamp in the future does not move."""
     segment = Segment(SECOND, State(1.0), SECOND, State(2.0))
     assert segment.sample(SECOND) == (1.0, 0.0, 0.0)
-    assert segment.sample(SECOND + 1) == (2.0, 0.0, 0.0)
+    assert segment.sample(SECOND + 1) == (1.0, 0.0, 0.0)
 
 
 def test_a_segment_that_ends_before_it_starts_is_refused() -> None:

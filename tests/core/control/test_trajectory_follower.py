@@ -196,6 +196,13 @@ class TestReplacement:
         assert arm.follower.position_errors == pytest.approx([math.tau - 6.0, -6.0])
         assert arm.follower.velocity_errors == [-0.25, 0.0]
 
+    def test_commands_are_not_stored_without_limit_while_the_loop_pauses(self) -> None:
+        arm = Arm()
+        for position in range(1000):
+            arm.send((0.1, [float(position)] * 2))
+        assert len(arm.follower._requests) == 100
+        assert arm.run(0.2) == [999.0, 999.0]
+
     def test_a_refused_trajectory_changes_nothing(self) -> None:
         arm = Arm()
         arm.send((1.0, [1.0, 1.0]))
@@ -412,6 +419,15 @@ class TestTolerances:
         arm.run(0.1)
         assert goal.outcome is not None
         assert goal.outcome.result[0] == ErrorCode.PATH_TOLERANCE_VIOLATED
+
+    def test_a_joint_that_moves_by_a_command_is_not_checked_by_a_partial_goal(self) -> None:
+        arm = Arm(tolerances=JointTolerances(path_position=0.2), allows_partial_goals=True)
+        arm.blocked = "a"
+        arm.follower.request_plan(arm.follower.plan(["a"], [Point(SECOND, [1.0])], 0), None)
+        arm.run(0.5)
+        goal = arm.send((0.1, [1.0]), names="b")
+        arm.run(0.6)
+        assert goal.outcome == SUCCEEDED
 
     def test_a_goal_overrides_tolerances(self) -> None:
         default = JointTolerances(0.1, 0.2, 0.3, 0.4, 5)
