@@ -45,7 +45,7 @@ check: lint
 	@$(BIN)/python -m pytest -q -n 2 --dist worksteal $(CHECKED)
 
 test: $(READY)
-	@$(BIN)/python -m pytest -n 3 --dist worksteal --ignore=tests/interop --ignore=tests/windows
+	@$(BIN)/python -m pytest -n 4 --dist worksteal --ignore=tests/interop --ignore=tests/windows
 
 interop: $(READY)
 	@sh tests/interop/install_ros.sh
@@ -118,6 +118,6 @@ $(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py min
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
 
 # Written again when a module that programs import changes what it offers.
-$(READY): $(STAMP) $(wildcard minirospy/ros/*.py minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
+$(READY): $(STAMP) $(wildcard minirospy/ros/*.py minirospy/ros/*.json minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
 	@$(BIN)/python -m minirospy.ros.overlay_modules
 	@$(PYTHON) -c "open('$(READY)', 'w').close()"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import re
 import sys
 from pathlib import Path
@@ -31,31 +32,15 @@ record = _load() if sys.platform == "linux" else None
 PAGES: tuple[str, ...] = record.PAGES if record else ()
 
 
-class Course:
-    """One student for all tests, because each page continues with the files that earlier pages left in the home folder."""
-
-    def __init__(self, home: Path, boards: Path) -> None:
-        assert record is not None
-        self._player = record.Player(
-            home, {"MINIROSPY_BOARD": home.name, "MINIROSPY_RUNTIME_DIR": str(boards)}
-        )
-        self._left = list(PAGES)
-
-    def play_up_to(self, page: str) -> None:
-        while page in self._left:
-            self._player.play(FOLDER / self._left.pop(0))
-
-
-@pytest.fixture(scope="module")
-def course(tmp_path_factory: pytest.TempPathFactory, _board_folder: Path) -> Course:
-    return Course(tmp_path_factory.mktemp("student"), _board_folder)
-
-
-# On a busy machine, the earlier pages may have to be played first.
-@pytest.mark.timeout(300)
-@pytest.mark.parametrize("page", PAGES)
-def test_page_shows_the_output_of_its_commands(course: Course, page: str) -> None:
-    course.play_up_to(page)
+# Each page continues with the files that earlier pages left in the home folder, so that two processes that share the
+# pages would both play the first ones.
+@pytest.mark.timeout(900)
+def test_pages_show_the_output_of_their_commands(tmp_path: Path) -> None:
+    assert record is not None
+    board = {name: os.environ[name] for name in ("MINIROSPY_BOARD", "MINIROSPY_RUNTIME_DIR")}
+    player = record.Player(tmp_path, board)
+    for page in PAGES:
+        player.play(FOLDER / page)
 
 
 def test_recorded_session_is_that_of_the_pages() -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -32,7 +33,7 @@ LAYERS = [
 UPWARDS = {("ros/rosbag/commands/rosbag_play.py", "web")}
 OPTIONAL_PACKAGES = [
     "ament_index_python", "angles", "camera_info_manager_py", "diagnostic_aggregator",
-    "diagnostic_updater", "dynamic_reconfigure", "foxglove_bridge", "image_geometry", "image_transport",
+    "diagnostic_updater", "foxglove_bridge", "image_geometry", "image_transport",
     "interactive_markers", "joint_state_publisher", "joint_state_publisher_gui", "kdl_parser_py",
     "laser_geometry", "map_server", "message_filters", "resource_retriever", "robot_pose_publisher",
     "ros_numpy", "rosauth", "rosbridge_server", "rosclean", "rosserial_python",
@@ -42,9 +43,19 @@ OPTIONAL_PACKAGES = [
     "urdfdom_py", "web_video_server", "xacro",
 ]  # fmt: skip
 """The ROS packages on which no other package depends."""
+CONTROL_PACKAGES = [
+    "ackermann_steering_controller", "control_toolbox", "controller_interface", "controller_manager",
+    "controller_manager_msgs", "diff_drive_controller", "effort_controllers", "force_torque_sensor_controller",
+    "forward_command_controller", "four_wheel_steering_controller", "gripper_action_controller",
+    "hardware_interface", "imu_sensor_controller", "joint_limits_interface", "joint_state_controller",
+    "joint_trajectory_controller", "minirospy_hardware", "position_controllers", "realtime_tools", "ros_control",
+    "ros_controllers", "transmission_interface", "velocity_controllers",
+]  # fmt: skip
+"""The packages of ros_control, which depend on each other."""
 LEAVES = {
     **{room: [room] for room in ("web", "fleet", "ros2")},
     "ROS packages": [f"ros/{package}" for package in OPTIONAL_PACKAGES],
+    "ros_control": ["core/control", *(f"ros/{package}" for package in CONTROL_PACKAGES)],
     "rosbag's migration": ["ros/rosbag/migration", "ros/rosbag/rosbag/migration.py"],
     "bags of version 1.2": ["core/bag/reader12.py"],
 }
@@ -55,6 +66,8 @@ SYSTEM_PACKAGES = {"catkin", "catkin_pkg", "python_orocos_kdl", "rospkg"}
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
     ("catkin", "rosunit"): "run_tests runs the tests of all kinds",
+    ("controller_manager_msgs", "rosparam"): "its Python module needs both, as the real one",
+    ("controller_manager_msgs", "rosservice"): "its Python module needs both, as the real one",
     ("diagnostic_aggregator", "rosparam"): "the real add_analyzers imports it, too",
     ("image_transport", "cv_bridge"): "has the codecs of compressed_image_transport, which names it",
     ("laser_geometry", "tf2_ros"): "for types; the real one names tf, which needs tf2_ros",
@@ -148,24 +161,43 @@ FILES = sorted(
 )
 
 
+class Import(NamedTuple):
+    """The modules or names that a statement imports, and where the statement is."""
+
+    names: tuple[str, ...]
+    is_for_types: bool
+    is_in_function: bool
+
+
+@functools.cache
+def import_statements(path: Path) -> tuple[Import, ...]:
+    """Return every import of a file, anywhere in the file."""
+    found: list[Import] = []
+    blocks: list[tuple[ast.AST, bool, bool]] = [(ast.parse(path.read_text(encoding="utf-8")), False, False)]
+    while blocks:
+        node, is_for_types, is_in_function = blocks.pop()
+        if isinstance(node, ast.Import):
+            found.append(Import(tuple(alias.name for alias in node.names), is_for_types, is_in_function))
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
+            names = tuple(f"{node.module}.{alias.name}" for alias in node.names)
+            found.append(Import(names, is_for_types, is_in_function))
+        elif isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            blocks += ((each, True, is_in_function) for each in node.body)
+            blocks += ((each, is_for_types, is_in_function) for each in node.orelse)
+        elif not isinstance(node, ast.expr):
+            # Imports are statements, and expressions cannot contain statements.
+            inside = is_in_function or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
+            blocks += ((each, is_for_types, inside) for each in ast.iter_child_nodes(node))
+    return tuple(found)
+
+
 @functools.cache
 def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
     """Return every module that a file imports, anywhere in the file; without ``for_types``, only those imported at run time."""
-    found: set[str] = set()
-    blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
-    while blocks:
-        node = blocks.pop()
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}:{node.lineno}: imports are absolute"
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-        elif isinstance(node, ast.If) and not for_types and ast.unparse(node.test) == "TYPE_CHECKING":
-            blocks += node.orelse
-        elif not isinstance(node, ast.expr):
-            # Imports are statements, and expressions cannot contain statements.
-            blocks += ast.iter_child_nodes(node)
-    return frozenset(found)
+    return frozenset(
+        name for each in import_statements(path) if for_types or not each.is_for_types for name in each.names
+    )
 
 
 def graph_of_imports(room: str, *, for_types: bool = False) -> dict[str, set[str]]:
@@ -192,36 +224,39 @@ def room_of(module: str) -> str:
     return parts[1] if parts[0] == "minirospy" and len(parts) > 1 else ""
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_go_downwards(path: Path) -> None:
-    room = path.relative_to(PACKAGE).with_suffix("").parts[0]
-    if room == "__init__":
-        return
-    for module in imports(path):
-        other = room_of(module)
-        is_known = (path.relative_to(PACKAGE).as_posix(), other) in UPWARDS
-        if other in DEPTH and other != room and not is_known:
-            assert DEPTH[other] > DEPTH[room], f"{room} imports {module}"
+def name_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if path.relative_to(PACKAGE).parts[0] in PURE or path in PURE_FILES],
-    ids=lambda path: path.name,
-)
-def test_pure_rooms_touch_no_outside(path: Path) -> None:
-    assert not {module.split(".")[0] for module in imports(path)} & IMPURE_MODULES
+@pytest.mark.parametrize("room", sorted(DEPTH))
+def test_imports_go_downwards(room: str) -> None:
+    upwards = []
+    for path in (each for each in FILES if each.relative_to(PACKAGE).with_suffix("").parts[0] == room):
+        for module in imports(path):
+            other = room_of(module)
+            is_known = (name_of(path), other) in UPWARDS
+            if other in DEPTH and other != room and not is_known and DEPTH[other] <= DEPTH[room]:
+                upwards.append(f"{name_of(path)} imports {module}")
+    assert upwards == []
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path for path in FILES if any(folder in path.parents for folder in BYTES_ONLY)],
-    ids=lambda path: path.name,
-)
-def test_runtime_and_wire_know_no_messages(path: Path) -> None:
+def imported_of(paths: list[Path], packages: set[str]) -> dict[str, set[str]]:
+    """Return the packages that each file imports of those in ``packages``."""
+    assert paths
+    found = {name_of(path): {module.split(".")[0] for module in imports(path)} & packages for path in paths}
+    return {name: modules for name, modules in found.items() if modules}
+
+
+def test_pure_rooms_touch_no_outside() -> None:
+    pure = [path for path in FILES if path.relative_to(PACKAGE).parts[0] in PURE or path in PURE_FILES]
+    assert imported_of(pure, IMPURE_MODULES) == {}
+
+
+def test_runtime_and_wire_know_no_messages() -> None:
     generated = {each.parent.parent.name for each in (PACKAGE / "overlay").glob("*/msg/__init__.py")}
     assert "rosgraph_msgs" in generated
-    assert not {module.split(".")[0] for module in imports(path)} & generated
+    paths = [path for path in FILES if any(folder in path.parents for folder in BYTES_ONLY)]
+    assert imported_of(paths, generated) == {}
 
 
 @pytest.mark.parametrize("room", sorted(DEPTH))
@@ -244,7 +279,7 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
 
 
 def test_few_modules_import_types_in_a_circle() -> None:
-    """A part and its owner name each other's types in three places only."""
+    """A part and its owner name each other's types in only three places."""
     found = [circle for room in DEPTH for circle in circles(graph_of_imports(room, for_types=True))]
     owners = {"minirospy.aio.node", "minirospy.client.session", "minirospy.runtime.rpc.server"}
     assert [circle for circle in found if not circle & owners] == []
@@ -312,22 +347,14 @@ def leaf_of_module(module: str) -> str:
     return next((leaf for path in paths for leaf in (leaf_of(path), leaf_of(f"{path}.py")) if leaf), "")
 
 
-@functools.cache
 def imported_on_import(path: Path) -> frozenset[str]:
     """Return the modules that are imported when a file is imported: not those in functions, or for types only."""
-    found: set[str] = set()
-    blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
-    while blocks:
-        node = blocks.pop()
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            found |= {f"{node.module}.{alias.name}" for alias in node.names}
-        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            blocks += node.orelse
-        elif not isinstance(node, (ast.expr, ast.FunctionDef, ast.AsyncFunctionDef)):
-            blocks += ast.iter_child_nodes(node)
-    return frozenset(found)
+    return frozenset(
+        name
+        for each in import_statements(path)
+        if not (each.is_for_types or each.is_in_function)
+        for name in each.names
+    )
 
 
 def test_nothing_outside_imports_a_leaf() -> None:
@@ -447,7 +474,7 @@ ROS_PROGRAMS = [
     "ros/tf2_ros/transformations_calls.py",
 ]  # fmt: skip
 """These use private names of ROS's own packages, as other people's programs do: their accesses have no limit."""
-MAX_PRIVATE_ACCESSES = 240  # of tests to members that begin with one underscore; to be lowered, never raised
+MAX_PRIVATE_ACCESSES = 214  # of tests to members that begin with one underscore; to be lowered, never raised
 
 
 def private_accesses(path: Path) -> list[str]:

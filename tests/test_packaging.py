@@ -16,6 +16,8 @@ from pathlib import Path
 from types import CodeType
 
 import pytest
+from build import ProjectBuilder
+from pyproject_hooks import quiet_subprocess_runner
 
 from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls, without_comments
 from minirospy.ros.overlay_modules import overlay_files
@@ -43,31 +45,26 @@ print(Packages().find_executable("rpi_feros", "led_actuator.py")[1])
 """
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build this checkout's wheel as pip does, from files under version control only."""
-    source = tmp_path_factory.mktemp("source") / "minirospy"
-    # Leave out the checkout's generated files, because the build itself must generate them.
-    left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
-    shutil.copytree(ROOT, source, ignore=left_out)
-    shutil.copy(ROOT / ".gitignore", source)
-    shutil.rmtree(source / "minirospy" / "overlay", ignore_errors=True)
-    target = tmp_path_factory.mktemp("wheel")
-    command = [
-        sys.executable,
-        "-m",
-        "build",
-        "--wheel",
-        "--no-isolation",
-        "--outdir",
-        str(target),
-        str(source),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+ADDRESS = "https://git.example.org/robots/ours"
 
-    assert done.returncode == 0, done.stdout + done.stderr
-    (found,) = target.glob("*.whl")
-    return found
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the unpacked sdist of this checkout, which has an address, and only files under version control."""
+    folder = tmp_path_factory.mktemp("source")
+    sdist = _build(folder, "--sdist", ROOT, {ADDRESS_VARIABLE: ADDRESS})
+    with tarfile.open(sdist) as archive:
+        unpack(archive, folder)
+    unpacked = folder / sdist.name.removesuffix(".tar.gz")
+    # The build of the wheel itself must generate this folder.
+    assert not (unpacked / "minirospy" / "overlay").exists()
+    return unpacked
+
+
+@pytest.fixture(scope="module")
+def wheel(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the wheel from the sdist, as pip does."""
+    return _build(tmp_path_factory.mktemp("wheel"), "--wheel", source, {ADDRESS_VARIABLE: ""})
 
 
 def test_every_extra_that_is_named_exists() -> None:
@@ -112,6 +109,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/share/msgs/std_msgs/msg/Bool.msg",
         "minirospy/share/rpi_feros/package.xml",
         "minirospy/share/launch/package.xml",
+        "minirospy/ros/passed_on.json",
         "minirospy/workspace/shell/ros.bash",
         "minirospy/workspace/shell/ros.bat",
         "minirospy/workspace/shell/ros.ps1",
@@ -207,32 +205,26 @@ def test_comments_in_texts_and_behind_code_stay() -> None:
     ]  # fmt: skip
 
 
-def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
-    """PyPI shows the README without the files next to it."""
-    with zipfile.ZipFile(wheel) as archive:
-        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
-        text = archive.read(name).decode()
+def test_description_has_no_link_into_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PyPI shows the README without the files next to it, here without an address for its links."""
+    monkeypatch.delenv(ADDRESS_VARIABLE, raising=False)
+    folder = ProjectBuilder(ROOT, runner=quiet_subprocess_runner).prepare("wheel", tmp_path)
+    assert folder
+    text = Path(folder, "METADATA").read_text(encoding="utf-8")
     assert "# minirospy" in text
     assert not re.findall(r"\]\((?!https?:|#)", text)
     assert "security (docs/security.md)" in text
 
 
 @pytest.mark.timeout(300)
-def test_one_address_is_in_sdist_and_wheel(tmp_path: Path) -> None:
+def test_one_address_is_in_sdist_and_wheel(source: Path, wheel: Path) -> None:
     """The address is set when the sdist is made, so that a wheel that others build from it has the same metadata."""
-    address = "https://git.example.org/robots/ours"
-    sdist = _build(tmp_path, "--sdist", ROOT, {ADDRESS_VARIABLE: address})
-    with tarfile.open(sdist) as archive:
-        unpack(archive, tmp_path)
-    source = tmp_path / sdist.name.removesuffix(".tar.gz")
-    wheel = _build(tmp_path / "wheel", "--wheel", source, {ADDRESS_VARIABLE: ""})
-
     with zipfile.ZipFile(wheel) as archive:
         (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
         text = archive.read(name).decode()
     assert text == (source / "PKG-INFO").read_text(encoding="utf-8")
-    assert faults_of_metadata(text, project_urls(address)) == []
-    assert f"[security]({address}/blob/HEAD/docs/security.md)" in text
+    assert faults_of_metadata(text, project_urls(ADDRESS)) == []
+    assert f"[security]({ADDRESS}/blob/HEAD/docs/security.md)" in text
 
 
 def _build(target: Path, kind: str, source: Path, environ: dict[str, str]) -> Path:
@@ -278,7 +270,7 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
 
 @pytest.mark.timeout(180)
 def test_folder_of_pip_target_offers_rospy(wheel: Path, tmp_path: Path) -> None:
-    """Python reads no `.pth` file there, but a program run by `minirospy python` can import rospy nevertheless."""
+    """Python reads no `.pth` file in such a folder, but a program run by `minirospy python` can import rospy nevertheless."""
     folder = tmp_path / "folder"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder)

@@ -85,14 +85,14 @@ WINDOWS = (
 
 def view_of_plugin(plugin: str) -> str:
     """Return the view for a name passed to `rqt --standalone`. Raise UsageError if there is none."""
-    # Imported here because every command imports this module.
+    # Imported here, because every command imports this module.
     from minirospy.base.errors import UsageError
     from minirospy.web.dashboard.views import VIEWS
 
     plugins = {each.command: each.view for each in WINDOWS if each.command.startswith("rqt_")}
     name = plugin.rpartition("/")[0] or plugin
     for known, view in plugins.items():
-        # rqt also accepts a part of the plugin's name.
+        # rqt also accepts part of a plugin's name.
         if name.lower().replace(".", "/").split("/")[0] == known:
             return view
     if name in VIEWS:

@@ -15,7 +15,7 @@ from minirospy.base.errors import NotFoundError, UsageError
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
 
-__all__ = ["Report", "Step", "field_type", "field_value", "parse_path"]
+__all__ = ["NotAnArrayError", "Report", "Step", "field_type", "field_value", "parse_path"]
 
 _STEP = re.compile(r"^(\w+)(?:\[(-?\d+|-?\d*(?::-?\d*){1,2})\])?$")
 
@@ -34,13 +34,24 @@ class Step(NamedTuple):
     element: int | slice | None
 
 
-def parse_path(path: str) -> tuple[Step, ...]:
-    """Parse a path; the empty path refers to the whole message. Raise UsageError if its syntax is invalid."""
-    return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
+class NotAnArrayError(NotFoundError):
+    """A field with an index or a slice is neither an array nor a string. ``type_name`` is the name of its value's class."""
+
+    def __init__(self, name: str, value: object) -> None:
+        super().__init__("array", name, hint=f"the field is a single {_type_of(value)}")
+        self.type_name = type(value).__name__
+
+
+def parse_path(path: str, *, zero_steps: bool = False) -> tuple[Step, ...]:
+    """Parse a path; the empty path refers to the whole message.
+
+    Raise UsageError if its syntax is invalid or, unless ``zero_steps``, if a slice has a step of 0.
+    """
+    return tuple(_parse_step(part, path, zero_steps) for part in path.split("/")) if path else ()
 
 
 Report = Callable[[NotFoundError | IndexError], object]
-"""A function that receives the error for each element of a slice that lacks the rest of the path."""
+"""A function that receives the error for each element of a slice that does not have the rest of the path."""
 
 
 def field_value(message: object, steps: tuple[Step, ...], report: Report | None = None) -> object:
@@ -58,7 +69,7 @@ def field_value(message: object, steps: tuple[Step, ...], report: Report | None 
         if index is None:
             continue
         if not isinstance(value, list | tuple | bytes | str):
-            raise NotFoundError("array", name, hint=f"the field is a single {_type_of(value)}")
+            raise NotAnArrayError(name, value)
         rest = steps[at + 1 :]
         if isinstance(index, slice) and rest and not isinstance(value, str | bytes):
             return [_element_value(element, rest, report) for element in value[index]]
@@ -114,7 +125,7 @@ def field_type(message_class: type[Message], path: str) -> str:
     return type_
 
 
-def _parse_step(part: str, path: str) -> Step:
+def _parse_step(part: str, path: str, zero_steps: bool) -> Step:
     match = _STEP.match(part)
     if not match:
         raise UsageError(
@@ -124,7 +135,7 @@ def _parse_step(part: str, path: str) -> Step:
     if index is None:
         return Step(name, None)
     numbers = [int(number) if number else None for number in index.split(":")]
-    if numbers[2:] == [0]:
+    if numbers[2:] == [0] and not zero_steps:
         raise UsageError(f"field path [{path}]: [{part}] has a step of 0")
     return Step(name, slice(*numbers) if ":" in index else numbers[0])
 

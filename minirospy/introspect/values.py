@@ -7,7 +7,6 @@ Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/YAML%20Overview.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from minirospy.base import yaml_text
 from minirospy.base.errors import ValueTextError
 from minirospy.base.yaml_text import one_line
+from minirospy.introspect.arithmetic import BRACKETS, degrees, radians
 
 if TYPE_CHECKING:
     import yaml
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_angles",
-    "arithmetic",
     "check_parameter",
     "format_pretty",
     "format_value",
@@ -39,7 +38,6 @@ _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "nul
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
-_MAX_ANGLE_LENGTH = 200
 _MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer that an error message shows
 
 
@@ -61,7 +59,7 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # An argument that is not UTF-8 is a usage error. The command reports it.
+            # An argument that is not UTF-8 is a usage error, which the command reports.
             raise error.__cause__ from None
         accepted = _accepted_by_ros(text, error)
         if len(accepted) != 1:
@@ -106,7 +104,7 @@ def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
     """Like :func:`parse_documents`, but yield each value as soon as its document is complete.
 
-    An example that needs this is `rostopic echo /a | rostopic pub /b TYPE`.
+    For example, `rostopic echo /a | rostopic pub /b TYPE` needs this.
     """
     text: list[str] = []
     for line in lines:
@@ -144,7 +142,7 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object, indent: str = "") -> str:
-    """Format a value for people, like `rosparam get -p`. Strings are unquoted, so the output may not be valid YAML.
+    """Format a value for people, like `rosparam get -p`. Strings are not quoted, so the output may not be valid YAML.
 
     ``indent`` is put before the entries of a dictionary.
     """
@@ -180,7 +178,7 @@ def check_parameter(value: object, name: str) -> None:
 
 
 def _is_digits(text: str) -> bool:
-    """Return whether a string is at most nine ASCII digits.
+    """Return whether a string consists of at most nine ASCII digits.
 
     Uses no regular expression, because compiling one slows the start.
     """
@@ -188,7 +186,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML parses a word as a string: it has only letters, digits, / and _, and no special meaning."""
+    """Return whether YAML parses a word as a string: it consists of letters, digits, / and _, and has no special meaning."""
     return (
         len(word) > 1
         and word.isascii()
@@ -227,61 +225,20 @@ def add_angles(loader_class: type[_Loader]) -> None:
     """Add angles to a YAML loader: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
     import yaml
 
-    in_brackets = re.compile(r"(deg|rad)\(([^()]*(?:\([^()]*\)[^()]*)*)\)\Z")
-
-    def construct(unit: float) -> Callable[[_Loader, yaml.ScalarNode], float]:
-        def angle(loader: _Loader, node: yaml.ScalarNode) -> float:
+    def constructor(
+        evaluate: Callable[[str], float | str],
+    ) -> Callable[[_Loader, yaml.ScalarNode], float | str]:
+        def construct(loader: _Loader, node: yaml.ScalarNode) -> float | str:
             text = loader.construct_scalar(node)
-            match = in_brackets.match(text)
             try:
-                return unit * arithmetic(match.group(2) if match else text)
+                return evaluate(text)
             except (ValueError, SyntaxError, ArithmeticError) as error:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"[{text}] is not an angle: {error}", node.start_mark
                 ) from error
 
-        return angle
+        return construct
 
-    for tag, name, unit in (("!degrees", "deg", math.pi / 180.0), ("!radians", "rad", 1.0)):
-        loader_class.add_constructor(tag, construct(unit))
-        loader_class.add_implicit_resolver(tag, re.compile(rf"^{name}\(.*\)$"), [name[0]])
-
-
-def arithmetic(text: str) -> float:
-    """Evaluate an arithmetic expression over numbers and ``pi``.
-
-    Raise ValueError, SyntaxError or ArithmeticError if it is invalid.
-    """
-    import ast
-    import operator
-
-    if len(text) > _MAX_ANGLE_LENGTH:
-        # Longer strings may exceed limits of Python's parser, which then raises other errors.
-        raise ValueError(f"more than {_MAX_ANGLE_LENGTH} characters")
-    binary = {
-        ast.Add: operator.add,
-        ast.Sub: operator.sub,
-        ast.Mult: operator.mul,
-        ast.Div: operator.truediv,
-        ast.FloorDiv: operator.floordiv,
-        ast.Mod: operator.mod,
-        # Of floats, so that 9**9**9 is an error, not an integer that fills the memory.
-        ast.Pow: math.pow,
-    }
-
-    def value(node: ast.expr) -> float:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return float(number)
-            case ast.Name(id="pi"):
-                return math.pi
-            case ast.UnaryOp(op=ast.USub(), operand=inner):
-                return -value(inner)
-            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                return value(inner)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in binary:
-                return float(binary[type(op)](value(left), value(right)))
-            case _:
-                raise ValueError("only numbers, pi, + - * / // % ** and brackets")
-
-    return value(ast.parse(text.strip(), mode="eval").body)
+    for tag, name, evaluate in (("!degrees", "deg", degrees), ("!radians", "rad", radians)):
+        loader_class.add_constructor(tag, constructor(evaluate))
+        loader_class.add_implicit_resolver(tag, re.compile(rf"^{name}{BRACKETS}$"), [name[0]])

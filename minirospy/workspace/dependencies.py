@@ -1,7 +1,8 @@
 """Dependencies between packages, as rospack reports them.
 
 A dependency is a name in ``run_depend``, ``exec_depend`` or ``depend`` that is a package; the other names in a manifest are
-rosdep keys. Source: http://docs.ros.org/api/rospack/html/commandline.html.
+rosdep keys. In rosbuild's manifest.xml, ``depend`` always names a package, and ``rosdep`` a key.
+Source: http://docs.ros.org/api/rospack/html/commandline.html.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ class CircularDependencyError(MinirospyError):
 class Dependencies:
     """The dependencies between packages. Each manifest is read once, on first use.
 
-    Metapackages are left out, as in rospack; ``with_metapackages`` includes them, as in rosstack. When all manifests are
-    searched, ``complain`` is called with the error for each manifest that cannot be read.
+    Metapackages are left out, as in rospack; ``with_metapackages`` includes them and leaves out packages for rosbuild, as in
+    rosstack. When all manifests are searched, ``complain`` is called with the error for each manifest that cannot be read.
     """
 
     def __init__(
@@ -52,8 +53,9 @@ class Dependencies:
         self._packages = packages
         self._variables = variables
         self._complain = complain or (lambda error: None)
-        self._left_out = (lambda folder: False) if with_metapackages else is_metapackage
+        self._left_out = _is_only_for_rosbuild if with_metapackages else is_metapackage
         self._manifests: dict[str, Manifest] = {}
+        self._missing: dict[tuple[str, str], None] = {}
 
     @property
     def roots(self) -> tuple[Path, ...]:
@@ -62,7 +64,10 @@ class Dependencies:
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Return a dict of all packages, sorted, to the folders that contain a package of that name. The first folder is used."""
+        """Return all packages, sorted, each with the folders that contain a package of that name.
+
+        The first folder is the one used.
+        """
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())
@@ -87,21 +92,35 @@ class Dependencies:
         Raise NotFoundError if it does not exist, ManifestError if it is invalid.
         """
         if name not in self._manifests:
-            # Imported here because `rospack find` does not need it.
+            # Imported here, because `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
 
             self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
         return self._manifests[name]
 
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """Return (package, dependency) for the packages that do not exist and that a manifest.xml read so far names."""
+        return list(self._missing)
+
     def direct(self, name: str) -> list[str]:
         """Return a package's direct dependencies, sorted by the kind of tag. Raise the same exceptions as :meth:`manifest`."""
+        wanted = self._wanted(name)
+        if self.manifest(name).is_rosbuild:
+            absent = (each for each in wanted if each != name and each not in self.copies)
+            self._missing.update(((name, each), None) for each in absent)
+        return self._known(name, wanted)
+
+    def _wanted(self, name: str) -> list[str]:
         self.folder(name)
         dependencies = self.manifest(name).dependencies
-        wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
-        return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
+        return list(dict.fromkeys(each.name for tag in _RUNNING for each in dependencies if each.tag == tag))
+
+    def _known(self, name: str, wanted: list[str]) -> list[str]:
+        return [each for each in wanted if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies in topological order: each follows those that it depends on.
+        """Return a package's direct and indirect dependencies in topological order: each follows its own dependencies.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """
@@ -155,14 +174,20 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Return all of a package's dependencies, of every kind, sorted. Raise the same exceptions as :meth:`manifest`."""
+        """Return all of a package's dependencies, of every kind, sorted; for rosbuild, only its rosdep keys.
+
+        Raise the same exceptions as :meth:`manifest`.
+        """
         self.folder(name)
-        return sorted(self.manifest(name).depends())
+        manifest = self.manifest(name)
+        if manifest.is_rosbuild:
+            return sorted({each.name for each in manifest.dependencies if each.tag == "rosdep"})
+        return sorted(manifest.depends())
 
     def _direct_or_none(self, name: str) -> list[str]:
         if name not in self._readable:
             return []
-        return self.direct(name)
+        return self._known(name, self._wanted(name))
 
     @cached_property
     def _readable(self) -> set[str]:
@@ -180,7 +205,7 @@ class Dependencies:
 def is_metapackage(folder: Path) -> bool:
     """Return whether the package in a folder is a metapackage."""
     try:
-        # Do not parse a file that does not contain this tag.
+        # Do not parse a file that does not contain this tag at all.
         if b"<metapackage" not in (folder / "package.xml").read_bytes():
             return False
         from minirospy.workspace.manifest import read_manifest
@@ -188,6 +213,10 @@ def is_metapackage(folder: Path) -> bool:
         return read_manifest(folder).is_metapackage
     except (OSError, ManifestError):
         return False
+
+
+def _is_only_for_rosbuild(folder: Path) -> bool:
+    return not (folder / "package.xml").is_file()
 
 
 def _walk(name: str, direct: Callable[[str], list[str]], above: tuple[str, ...]) -> Iterator[tuple[int, str]]:

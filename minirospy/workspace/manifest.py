@@ -1,4 +1,4 @@
-"""Parse a package.xml of format 1, 2 or 3 into a frozen :class:`Manifest`.
+"""Parse a package.xml of format 1, 2 or 3, or rosbuild's manifest.xml, into a frozen :class:`Manifest`.
 
 Parsing is lenient: errors that catkin reports but a reader can ignore (a missing maintainer, a tag of another format) are
 recorded in :attr:`Manifest.problems`, and a build prints them as warnings.
@@ -18,6 +18,7 @@ from xml.parsers import expat
 
 from minirospy.base.errors import ManifestError
 from minirospy.base.xml_text import MAX_LEVELS, XmlError, new_parser
+from minirospy.workspace.packages import ROSBUILD_MANIFEST
 
 __all__ = [
     "EMAIL",
@@ -95,7 +96,9 @@ class Problem(NamedTuple):
 
 
 class Manifest(NamedTuple):
-    """A package.xml. Conditions have been evaluated: elements whose condition is false are left out.
+    """A package.xml, or a manifest.xml for rosbuild, whose ``format`` is 0.
+
+    Conditions have been evaluated: elements whose condition is false are left out.
 
     ``dependencies`` are in file order; :meth:`depends` selects their names by kind.
     """
@@ -117,6 +120,11 @@ class Manifest(NamedTuple):
         """Return the names of all dependencies, or of those of the given kinds, without duplicates, in file order."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
+
+    @property
+    def is_rosbuild(self) -> bool:
+        """Return whether this is a manifest.xml."""
+        return self.path.name == ROSBUILD_MANIFEST
 
     @property
     def is_metapackage(self) -> bool:
@@ -141,10 +149,14 @@ def naming_warning(name: str) -> str | None:
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
     """Read the manifest from a file, or from a folder's package.xml. ``variables`` override VARIABLES in conditions.
 
+    A folder without a package.xml may have a manifest.xml, for rosbuild.
+
     Raise ManifestError if the file does not exist, is not a package's XML, has no name, or contains an invalid condition.
     """
     if path.is_dir():
-        path = path / "package.xml"
+        folder, path = path, path / "package.xml"
+        if not path.exists() and (folder / ROSBUILD_MANIFEST).is_file():
+            path = folder / ROSBUILD_MANIFEST
     try:
         text = path.read_bytes()
     except OSError as error:
@@ -157,6 +169,8 @@ def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] |
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
+    if path.name == ROSBUILD_MANIFEST:
+        return _rosbuild_manifest(root, path)
     return _Reader(root, path, {**VARIABLES, **(variables or {})}).manifest()
 
 
@@ -217,11 +231,50 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     except XmlError as error:
         raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
-        # If Python does not know the encoding, the error is a LookupError, which has no code.
+        # If Python does not know the encoding, the error is a LookupError without a code.
         code = getattr(error, "code", None)
         why = expat.ErrorString(code) if code is not None else str(error)
         raise ManifestError(str(path), parser.CurrentLineNumber, f"not XML: {why}") from error
     return top.children[0]
+
+
+def _rosbuild_manifest(root: _Element, path: Path) -> Manifest:
+    """Return the parts of a manifest.xml. Source: http://wiki.ros.org/Manifest."""
+    dependencies = []
+    for element in root.children:
+        attribute = {"depend": "package", "rosdep": "name"}.get(element.tag)
+        if attribute is None or "thirdparty" in element.attributes:
+            continue
+        if not element.attributes.get(attribute):
+            raise ManifestError(
+                str(path), element.line, f"<{element.tag}> is missing the attribute '{attribute}'"
+            )
+        kinds = _KINDS["depend"] if element.tag == "depend" else {Kind.BUILD}
+        name = element.attributes[attribute]
+        dependencies.append(Dependency(name, frozenset(kinds), element.tag, element.line))
+
+    def texts(tag: str) -> tuple[str, ...]:
+        return tuple(element.text for element in root.children if element.tag == tag)
+
+    return Manifest(
+        path=path,
+        format=0,
+        name=path.parent.name,
+        version=", ".join(texts("version")),
+        description=", ".join(texts("description")),
+        maintainers=(),
+        licenses=texts("license"),
+        authors=tuple(Person(text, "") for text in texts("author")),
+        urls=tuple(Url(text, "website") for text in texts("url")),
+        dependencies=tuple(dependencies),
+        exports=tuple(
+            Export(child.tag, child.attributes, child.text, child.line)
+            for element in root.children
+            if element.tag == "export"
+            for child in element.children
+        ),
+        problems=(),
+    )
 
 
 # --- tags
@@ -234,7 +287,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Formats 2 and 3 do not contain this tag, but packages use it there.
+    # Formats 2 and 3 do not have this tag, but packages use it there, too.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -259,7 +312,7 @@ _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
-"""Addresses that catkin accepts; catkin exits with an error for any other address."""
+"""Addresses that catkin accepts. catkin exits with an error for all others."""
 
 
 class _Reader:
@@ -389,7 +442,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
-# maximum nested brackets in a condition; the parser recurses three times per nesting level
+# maximum number of nested brackets in a condition; the parser recurses three times per level
 _MAX_BRACKETS = 50
 _COMPARE = {
     "==": str.__eq__,

@@ -18,6 +18,7 @@ from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.base.errors import MinirospyError, NotFoundError
 
 __all__ = [
+    "ROSBUILD_MANIFEST",
     "CrawlTime",
     "NotExecutableError",
     "Packages",
@@ -31,13 +32,15 @@ __all__ = [
 ]
 
 _MANIFEST = "package.xml"
-_IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs"}
+ROSBUILD_MANIFEST = "manifest.xml"  # of packages for rosbuild, the build system before catkin
+_IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"}
+_NO_SUBFOLDERS = "rospack_nosubdirs"
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
-_SHOWN = 12  # maximum number of programs listed in an error, which fill about one line
+_SHOWN = 12  # maximum number of programs to list in an error: about one line
 
 
 class NotExecutableError(MinirospyError):
@@ -52,10 +55,13 @@ class NotExecutableError(MinirospyError):
 
 
 class Packages:
-    """The packages that are visible in an environment. A package's name is taken from its package.xml."""
+    """The packages that are visible in an environment.
+
+    A package's name is taken from its package.xml. A package for rosbuild has the name of its folder.
+    """
 
     def __init__(self, environment: Environment | None = None) -> None:
-        # Packages do not depend on ROS_MASTER_URI or on the machine's name, so skip both lookups.
+        # Packages do not depend on ROS_MASTER_URI or the machine's name, so skip both look-ups.
         environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
@@ -71,7 +77,7 @@ class Packages:
     def find(self, name: str) -> Path:
         """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
         for root in self.roots:
-            # If a folder's name is the package's name, try that folder before searching.
+            # Before searching, try the folder that has the package's name.
             if package_name(root / name) == name:
                 return root / name
             for folder in self._crawled(root):
@@ -95,7 +101,7 @@ class Packages:
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return a dict from package to the folders that contain a package of that name. The first folder is used."""
+        """Return all packages, each with the folders that contain a package of that name. The first folder is the one used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -129,7 +135,7 @@ class Packages:
         candidates = [path for path in candidates if path.is_file()]
         runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
-            # Ignore the copies of scripts that a build writes to devel.
+            # Ignore the copies of scripts that a build puts into devel.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
             return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
@@ -156,7 +162,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if the file is in another package with the same name, hidden by the found package; otherwise ""."""
+        """Return a hint if another package with the same name, hidden by the one found, has the file; otherwise return ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -164,12 +170,12 @@ class Packages:
 
     def _crawled(self, root: Path) -> list[Path]:
         if root not in self._crawls:
-            self._crawls[root] = list(crawl(root))
+            self._crawls[root] = list(crawl(root, rosbuild=True))
         return self._crawls[root]
 
 
 class CrawlTime(NamedTuple):
-    """The search time for a folder and its subfolders, in seconds, and whether the folder contains a package."""
+    """The time to search a folder and its subfolders, in seconds, and whether the folder contains a package."""
 
     folder: Path
     seconds: float
@@ -177,15 +183,18 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """Measure the search time of a folder and of each subfolder, except for packages."""
+    """Measure the time to search a folder and each of its subfolders, except for packages."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
         if (folder / _MANIFEST).is_file():
             return True
         started = time.perf_counter()
+        entries = _entries(folder)
+        if any(entry.name == ROSBUILD_MANIFEST for entry in entries):
+            return True
         has_package = False
-        for below in _subfolders(folder):
+        for below in _subfolders(entries):
             has_package |= visit(below)
         found.append(CrawlTime(folder, time.perf_counter() - started, has_package))
         return has_package
@@ -204,23 +213,35 @@ def built_in_roots() -> tuple[Path, ...]:
     return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros")
 
 
-def crawl(root: Path) -> Iterator[Path]:
-    """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages."""
+def crawl(root: Path, *, rosbuild: bool = False) -> Iterator[Path]:
+    """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages.
+
+    ``rosbuild``: yield also packages for rosbuild, which have a manifest.xml and no package.xml; catkin ignores them.
+    """
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():
             yield root
         return
-    for folder in _subfolders(root):
-        yield from crawl(folder)
+    entries = _entries(root)
+    if rosbuild and any(entry.name == ROSBUILD_MANIFEST for entry in entries):
+        yield root
+        return
+    for folder in _subfolders(entries):
+        yield from crawl(folder, rosbuild=rosbuild)
 
 
-def _subfolders(folder: Path) -> list[Path]:
-    """Return the subfolders that may contain packages, sorted, or [] if a marker file marks the folder as ignored."""
+def _entries(folder: Path) -> list[os.DirEntry[str]]:
+    """Return a folder's entries, sorted, or [] if a marker file marks the folder as ignored."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
         return []
-    if any(entry.name in _IGNORE for entry in entries):
+    return [] if any(entry.name in _IGNORE for entry in entries) else entries
+
+
+def _subfolders(entries: list[os.DirEntry[str]]) -> list[Path]:
+    """Return the subfolders that may contain packages, or [] if a marker file says that they contain none."""
+    if any(entry.name == _NO_SUBFOLDERS for entry in entries):
         return []
     return [
         Path(entry.path)
@@ -230,16 +251,20 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to one of its parent folders, which would make the search infinite."""
+    """Return whether an entry is a link to one of its parent folders; following it would make the search infinite."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in a folder's package.xml (default: the folder's name), or None if there is no package.xml."""
+    """Return the name in a folder's package.xml (default: the folder's name), or None if the folder is not a package.
+
+    A folder with a manifest.xml is a package for rosbuild, which has the name of its folder.
+    """
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
-        return None
+        # Unlike Path.is_file(), this does not raise an error for a name that is too long.
+        return folder.name if os.path.isfile(folder / ROSBUILD_MANIFEST) else None
     match = _NAME.search(text)
     return match[1].decode("utf-8", "replace") if match else folder.name
 
@@ -265,7 +290,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # Programs of a package in /usr/share/PKG are in /usr/lib/PKG, regardless of the sourced workspace.
+        # The programs of a package in /usr/share/PKG are in /usr/lib/PKG, whichever workspace is sourced.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -287,7 +312,7 @@ def _is_program(path: Path) -> bool:
 
 
 def is_python(path: Path) -> bool:
-    """Return whether a file is a Python program, by its name or its first line."""
+    """Return whether a file is a Python program, judging by its name or its first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:

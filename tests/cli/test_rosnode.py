@@ -223,3 +223,14 @@ def test_one_unknown_node_among_several(robot: Any, command: Any) -> None:
 def test_ping_all_takes_nothing_else(robot: Any, command: Any) -> None:
     assert command("rosnode", "ping", "-a", "-c", "2").status == 2
     assert command("rosnode", "ping", "-a", "/robot").status == 2
+
+
+def test_machine_without_a_master(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{free_port()}")
+    unknown = command("rosnode", "machine", "nope.invalid")
+    assert (unknown.status, unknown.err) == (
+        1,
+        "ERROR: cannot resolve machine name [nope.invalid] to address\n",
+    )
+    known = command("rosnode", "machine", "localhost")
+    assert (known.status, known.err) == (1, "ERROR: Unable to communicate with master!\n")

@@ -193,3 +193,41 @@ def test_finding_imports_little(tree: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, env=os.environ, check=True
     )
     assert out.stdout == f"{tree}/folder_of_a\nset()\n"
+
+
+def test_packages_for_rosbuild(command: Any, tree: Path) -> None:
+    old = tree / "stack" / "old"
+    (old / "below").mkdir(parents=True)
+    (old / "below" / "manifest.xml").write_text("<package/>")
+    (old / "manifest.xml").write_text(
+        '<package><depend package="e"/><depend thirdparty="x"/><rosdep name="boost"/>'
+        '<export><cpp cflags="-I${prefix}"/></export></package>'
+    )
+    assert command("rospack", "find", "old") == (0, f"{old}\n", "")
+    assert command("rospack", "find", "below").status == 1
+    assert command("rospack", "depends", "old") == (0, "e\n", "")
+    assert command("rospack", "depends-manifests", "old").out == f"{tree}/folder_of_e/package.xml\n"
+    assert "old" in command("rospack", "depends-on1", "e").out.split()
+    assert command("rospack", "rosdep0", "old").out == "name: boost\n"
+    assert command("rospack", "export", "--lang=cpp", "--attrib=cflags", "old").out.startswith(f"-I{old} ")
+    assert f"old {old}\n" not in command("rosstack", "list").out
+    assert command("rosversion", "old").out == "Cannot locate [old]\n"
+
+
+def test_missing_dependency_of_a_package_for_rosbuild(command: Any, tree: Path) -> None:
+    (tree / "old").mkdir()
+    (tree / "old" / "manifest.xml").write_text(
+        '<package><depend package="absent"/><depend package="e"/></package>'
+    )
+    text = (
+        "[rospack] Error: package 'old' depends on non-existent package 'absent' and rosdep claims that it is not a "
+        "system dependency. Check the ROS_PACKAGE_PATH or try calling 'rosdep update'\n"
+    )
+    for verb in ("depends", "depends1"):
+        assert command("rospack", verb, "old") == (1, "e\n", text)
+    assert "old" in command("rospack", "depends-on1", "e").out.split()
+    assert command("rospack", "depends-on1", "e").status == 0
+    (tree / "old" / "manifest.xml").write_text("<package><depend/></package>")
+    done = command("rospack", "depends", "old")
+    assert (done.status, done.out) == (1, "")
+    assert done.err.endswith("manifest.xml:1: <depend> is missing the attribute 'package'\n")

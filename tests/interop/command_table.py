@@ -462,6 +462,8 @@ rostopic pub -1 --use-rostime /out std_msgs/String x
 rostopic pub -1 /out std_msgs/Bool nope ## a value that does not fit is refused: exit 1; real ROS sends nothing, exit 0
 rostopic pub -1 -r 5 /out std_msgs/Bool 1
 rostopic pub -r 0 /out std_msgs/Bool 1
+rostopic pub -r -5 /out std_msgs/Bool 1
+rostopic pub -r -1 /out std_msgs/Bool 1
 rostopic pub -f nope.yaml /out std_msgs/Bool
 rostopic pub -f nope.yaml /out std_msgs/Bool 1
 rostopic pub -1 /out std_msgs/Bool 'data: [1'
@@ -571,6 +573,8 @@ rosnode info /a
 rosnode ping /a
 rosnode cleanup
 rosnode machine
+rosnode machine nope
+rosnode machine localhost
 rosnode kill /a
 rosservice list
 rosservice call /a

@@ -310,3 +310,37 @@ def test_rosmsg_proto(line: str) -> None:
         ]
     )
     assert ours == run(["/usr/bin/rosmsg-proto", *line.split()])
+
+
+def test_packages_for_rosbuild(tree: Path) -> None:
+    """Real ROS reports the same missing dependency, before the output rather than after it."""
+    manifests = {
+        "rb": '<depend package="older"/><depend package="e"/><rosdep name="boost"/>'
+        '<export><cpp cflags="-I${prefix}"/></export>',
+        "older": '<rosdep name="tinyxml"/>',
+        "incomplete": '<depend package="absent"/><depend package="older"/>',
+    }
+    for name, body in manifests.items():
+        (tree / "stack" / name / "below").mkdir(parents=True)
+        (tree / "stack" / name / "manifest.xml").write_text(f"<package>{body}</package>")
+    (tree / "stack" / "rb" / "below" / "manifest.xml").write_text("<package/>")
+    for line in """
+        find rb
+        depends rb
+        depends1 rb
+        depends-indent rb
+        depends-manifests rb
+        depends-why --target=older rb
+        depends-on1 older
+        rosdep0 rb
+        rosdep older
+        export --lang=cpp --attrib=cflags rb
+        depends incomplete
+        depends1 incomplete
+    """.strip().splitlines():
+        (status, out, errors), found = real(line), ours(line)
+        assert sorted(out.splitlines()) == sorted(found[1].splitlines()), line
+        assert (status, errors) == (found[0], found[2]), line
+    assert ours("find below")[0] == real("find below")[0] == 1
+    here = tree / "stack" / "rb"
+    assert ours("find", here) == real("find", here)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import pytest
 import yaml
@@ -67,7 +68,9 @@ def test_angles() -> None:
     powers = ("rad(2**3)", "rad(2**-1)", "rad(-2**2)", "rad(7%4)", "rad(7//2)")
     assert [parse_value(text) for text in powers] == [8.0, 0.5, -4.0, 3.0, 3.0]
     with pytest.raises(ValueTextError, match="not an angle"):
-        parse_value("rad(__import__('os'))")
+        parse_value("!radians __import__('os')")
+    # ROS reads every text with brackets inside the brackets as a string.
+    assert parse_value("rad(__import__('os'))") == "rad(__import__('os'))"
 
 
 @pytest.mark.parametrize(
@@ -84,6 +87,35 @@ def test_a_colon_directly_before_a_bracket_is_accepted_as_in_ros(text: str, valu
     assert list(parse_documents(f"a: 1\n---\n{text}\n---\nb\n", "it")) == [{"a": 1}, value, "b"]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{data:[" + "[1], " * 300 + "]}",
+        "{a: &x {b:[1, 2]}, c: [*x, *x]}",
+        "{a:[" * 40 + "1" + "]}" * 40 + "\n" + "# [" * 200,
+    ],
+)
+def test_such_a_colon_is_accepted_with_many_brackets_or_aliases(text: str) -> None:
+    assert parse_value(text) == yaml.safe_load(text)
+    assert yaml_text.safe_load(text) == yaml.safe_load(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{a:[" * 150 + "1" + "]}" * 150,
+        "{a:[1], b: &b [1,1,1,1,1,1,1,1,1,1], "
+        + ", ".join(
+            f"{name}: &{name} [{', '.join([f'*{below}'] * 10)}]" for below, name in pairwise("bcdefgh")
+        )
+        + "}",
+    ],
+)
+def test_limits_hold_with_such_a_colon(text: str) -> None:
+    with pytest.raises(ValueTextError):
+        parse_value(text)
+
+
 def test_text_that_no_yaml_library_accepts_after_such_a_colon_is_refused() -> None:
     found = parse_documents("a: 1\n---\n{a:[1}\n", "it")
     assert next(found) == {"a": 1}
@@ -93,7 +125,7 @@ def test_text_that_no_yaml_library_accepts_after_such_a_colon_is_refused() -> No
         parse_value("{a:[1}")
 
 
-@pytest.mark.parametrize("text", ["rad(9**9**9)", "rad((-1)**0.5)", "deg(0**-1)", "rad(7%0)"])
+@pytest.mark.parametrize("text", ["rad(9**9**9)", "!radians (-1)**0.5", "deg(0**-1)", "rad(7%0)"])
 def test_an_angle_without_a_value_is_refused(text: str) -> None:
     with pytest.raises(ValueTextError, match="not an angle"):
         parse_value(text)

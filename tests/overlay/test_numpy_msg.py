@@ -157,21 +157,19 @@ def test_without_numpy_it_says_so() -> None:
 
 
 NODE = """
+import queue
 import numpy, rospy
 from rospy.numpy_msg import numpy_msg
 from rospy_tutorials.msg import Floats
 
 rospy.init_node("both")
-heard = []
-rospy.Subscriber("floats", numpy_msg(Floats), heard.append)
-rospy.Subscriber("floats", Floats, heard.append)
+heard = queue.Queue()
+rospy.Subscriber("floats", numpy_msg(Floats), heard.put)
+rospy.Subscriber("floats", Floats, heard.put)
 pub = rospy.Publisher("floats", numpy_msg(Floats), queue_size=10)
-while pub.get_num_connections() < 1:
-    rospy.sleep(0.01)
+pub.wait_for_subscribers()
 pub.publish(numpy.array([1.0, 2.1, 3.2], dtype=numpy.float32))
-while len(heard) < 2:
-    rospy.sleep(0.01)
-for message in sorted(heard, key=lambda each: type(each).__name__):
+for message in sorted([heard.get(), heard.get()], key=lambda each: type(each).__name__):
     print(type(message).__name__, type(message.data).__name__, [round(float(x), 1) for x in message.data])
 """
 

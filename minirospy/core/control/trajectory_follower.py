@@ -15,6 +15,7 @@ from minirospy.core.control.controller import ControllerError
 from minirospy.core.control.goal import MonitoredGoal, Outcome
 from minirospy.core.control.parameters import Parameters
 from minirospy.core.control.trajectory import (
+    MAX_MAGNITUDE,
     NEVER,
     UNCHECKED,
     ErrorCode,
@@ -315,7 +316,10 @@ class TrajectoryFollower:
                 continue
             allowed = UNCHECKED if goal is None else tolerances
             kept = path.until(bridge_start)
-            state = State(*kept[-1].sample(bridge_start))
+            sampled = kept[-1].sample(bridge_start)
+            state = State(*sampled)
+            if max(map(abs, sampled)) >= MAX_MAGNITUDE:
+                state = State(min(max(state.position, -MAX_MAGNITUDE), MAX_MAGNITUDE), None, None)
             target = points.points[first].positions[column]
             offset = wraparound_offset(state.position, target) if is_continuous else 0.0
             bridge = Segment(

@@ -172,7 +172,9 @@ class MobileBase(Controller):
         publishers = self._subscriber.get_num_connections()
         if not self._allow_multiple and publishers > 1:
             rospy.logerr_throttle(
-                1.0, f"Detected {publishers} publishers. Only 1 publisher is allowed. Going to brake."
+                1.0,
+                f"Detected {publishers} publishers. Only 1 publisher is allowed. Going to brake.",
+                logger_name=self._name,
             )
             self._command = _STOP
             return

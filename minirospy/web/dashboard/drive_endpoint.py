@@ -47,7 +47,7 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""A client that holds a control but sends nothing for this many seconds is considered lost; its topics are stopped."""
+"""Seconds without a command after which a client that holds a control is considered lost; its topics are then stopped."""
 
 _log = logging.getLogger(__name__)
 
@@ -115,7 +115,7 @@ Held = Velocity | Joystick | Target
 
 @dataclass(frozen=True)
 class Command:
-    """A client's command: a topic and the message to publish. The message is None if the client no longer drives the topic."""
+    """A client's command: a topic and the message to publish, or None if the client has released the topic."""
 
     topic: str
     held: Held | None
@@ -287,15 +287,15 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # The lock protects the following attributes, so that commands on the loop and the guard's zero velocity are
-        # published one after the other.
+        # The lock protects the attributes below.
+        # A command (sent on the loop) and the guard's zero velocity must not be published concurrently.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
         self._joining: asyncio.Task[None] | None = None
 
     def hold(self, held: Held) -> None:
-        """Publish a command, and a zero velocity if no further command arrives in time.
+        """Publish a command. Publish a zero velocity if no further command arrives in time.
 
         Raise BridgeError and publish nothing if a later stop cannot be guaranteed.
         """
@@ -303,7 +303,7 @@ class _Driven:
         if held.is_zero:
             self._guard.disarm(self._silent)
         else:
-            # Arm the guard before publishing, so that no command is sent that could not be stopped.
+            # Arm the guard before publishing, so that every published command is followed by a stop.
             self._guard.arm(self._silent, deadline)
         with self._lock:
             self._deadline = deadline
@@ -319,7 +319,7 @@ class _Driven:
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # The task that waits for subscribers publishes the zero velocity; keep the topic open until then.
+            # The task that waits for subscribers still has to publish the zero velocity; it closes the topic afterwards.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()

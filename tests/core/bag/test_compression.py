@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import lz4.frame
@@ -102,6 +103,7 @@ def test_missing_lz4_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         check_compression(LZ4)
 
 
+@cache
 def bomb(name: str, size: int) -> bytes:
     """Return compressed zeros, made in pieces."""
     if name == BZ2:

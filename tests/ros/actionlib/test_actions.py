@@ -137,7 +137,7 @@ print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state()
         assert said == "True 3\n"
 
     def test_statuses_of_many_goals_are_published_less_often(self) -> None:
-        """With few goals, each change publishes the list; with 600 goals, lists are at least 60 ms apart."""
+        """With few goals, each change publishes the list. With 600 goals, lists are at least 60 ms apart."""
         said = run("""
 from types import SimpleNamespace
 import minirospy.ros.actionlib.actionlib.server as module
@@ -260,7 +260,7 @@ print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), sec
     @pytest.mark.parametrize("how", ["kill", "terminate"])
     @pytest.mark.parametrize("goal", [3, 4])
     def test_goal_is_lost_when_its_server_dies(self, how: str, goal: int) -> None:
-        """A server that does not answer at all (goal 4) dies before it lists the goal."""
+        """A server that does not respond at all (goal 4) dies before it has listed the goal."""
         said = run(f"""
 import subprocess, sys
 from minirospy.ros.actionlib.actionlib import client as client_module
@@ -288,10 +288,9 @@ print(client.wait_for_result(), client.get_state() == GoalStatus.LOST, client.ge
 from minirospy.ros.actionlib.actionlib import client as client_module
 import socket
 client_module.SERVER_SECONDS = 0.2
-client.send_goal(TestGoal(3))
-while client.get_state() != GoalStatus.ACTIVE:
-    time.sleep(0.01)
-checked = threading.Event()
+active, checked = threading.Event(), threading.Event()
+client.send_goal(TestGoal(3), active_cb=active.set)
+active.wait()
 check = client.action_client._check_server
 client.action_client._check_server = lambda goals, last: (check(goals, last), checked.set())
 subscription = client.action_client.status_sub.impl.subscription
@@ -336,6 +335,28 @@ print(checked.wait(60), [handle.get_goal_status() for handle in handles])
         assert said.count("bad callback: <function changed at ") == 2
         assert "SystemExit\n" in said
         assert "ValueError: bad callback of a lost goal\n" in said
+
+    def test_a_callback_that_raises_does_not_keep_a_status_from_other_goals(self) -> None:
+        said = run("""
+from actionlib.action_client import GoalManager
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib.msg import TestAction, TestGoal
+def changed(handle):
+    print(handles.index(handle), handle.get_comm_state() == actionlib.CommState.ACTIVE)
+    if handle != handles[2]:
+        raise ValueError(handles.index(handle))
+manager = GoalManager(TestAction)
+manager.register_send_goal_fn(lambda goal: None)
+handles = [manager.init_goal(TestGoal(), changed) for _ in range(3)]
+goals = [handle.comm_state_machine.action_goal.goal_id for handle in handles]
+try:
+    manager.update_statuses(GoalStatusArray(status_list=[GoalStatus(each, GoalStatus.ACTIVE, "") for each in goals]))
+except ValueError as error:
+    print("raised", error)
+""")
+        assert said.startswith("0 True\n1 True\n2 True\nraised 0\n[ERROR]")
+        assert said.count("bad callback: <function changed at ") == 1
+        assert "\nValueError: 1\n" in said
 
     def test_a_callback_waits_for_the_end_of_another_goal(self) -> None:
         """As in actionlib, one goal's callback does not block those of other goals."""

@@ -33,8 +33,7 @@ print(one.wait_until_formed(30), other.wait_until_formed())
 print(sorted(said.get(timeout=30) for _ in range(2)), one.wait_until_broken(0.1))
 
 third = rospy.Publisher("bonds", Status, queue_size=1)
-while third.get_num_connections() < 1:
-    rospy.sleep(0.05)
+third.wait_for_subscribers()
 third.publish(Status(id="pair", instance_id="a third one", active=False))
 third.publish(Status(id="another pair", instance_id="a fourth one", active=False))
 print(one.is_broken(), repr(one) == f"[Bond pair, Instance {one.instance_id} (SM.Alive)]")
@@ -63,8 +62,7 @@ def watch(record):
     return True
 
 logging.getLogger("rosout").addFilter(watch)
-while third.get_num_connections() < 1:
-    rospy.sleep(0.05)
+third.wait_for_subscribers()
 while not held.wait_until_formed(0.2):
     third.publish(Status(id="held", instance_id="silent", active=True))
 disabled.wait(60)

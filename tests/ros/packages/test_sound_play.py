@@ -117,6 +117,34 @@ def test_players_get_file_and_volume() -> None:
     assert play_command("/a.wav", 1, lambda name: None) is None
 
 
+def test_a_device_of_alsa_is_given_to_aplay() -> None:
+    command = play_command("/a.wav", 0.5, lambda name: name, "plughw:1,0")
+    assert command is not None
+    assert list(command.words) == ["aplay", "-D", "plughw:1,0", "-q", "/a.wav"]
+    without_aplay = play_command("/a.wav", 0.5, lambda name: name if name == "ffplay" else None, "plughw:1,0")
+    assert without_aplay is not None
+    assert without_aplay.variables == {
+        "ALSA_CARD": "1",
+        "AUDIODEV": "plughw:1,0",
+        "SDL_AUDIODRIVER": "alsa",
+    }
+    spoken = say_command("a", "", 1, lambda name: name, "sysdefault:CARD=Device")
+    assert spoken is not None
+    assert spoken.variables["ALSA_CARD"] == "Device"
+
+
+def test_another_device_is_one_of_the_sound_server() -> None:
+    command = play_command("/a.wav", 0.5, lambda name: name, "alsa_output.usb")
+    assert command is not None
+    assert list(command.words) == ["paplay", "--device=alsa_output.usb", "--volume=32768", "/a.wav"]
+    assert command.variables == {"PULSE_SINK": "alsa_output.usb"}
+    for name in ("", "default"):
+        default = play_command("/a.wav", 0.5, lambda name: name, name)
+        assert default is not None
+        assert list(default.words) == ["paplay", "--volume=32768", "/a.wav"]
+        assert default.variables == {}
+
+
 def test_speakers_get_a_text_as_no_option() -> None:
     for name in SPEAKERS:
         command = say_command("-x; rm", "v", 0.5, lambda other, name=name: other if other == name else None)

@@ -128,7 +128,7 @@ def test_compressed_message_reaches_the_disk_without_another(
     talker: Talker, start: Start, tmp_path: Path
 ) -> None:
     chatter = talker.advertise("/chatter")
-    # One message fills the buffer, so if the recorder waited, nothing else would be recorded.
+    # One message fills the buffer; a recorder that waited would record nothing else.
     process = start("record", "-j", "-b", "1", "--chunksize", "0", "-O", "out", "/chatter")
     connected(chatter)
     for i in range(3):
@@ -326,7 +326,9 @@ def test_dropped_messages_are_counted(talker: Talker, start: Start, tmp_path: Pa
         "from minirospy.ros.rosbag.recording.disk import QueuedFile\n"
         "write = QueuedFile._write_all\n"
         "QueuedFile._write_all = lambda self, data: (sys.stdin.read(), write(self, data))\n"
+        "from minirospy.ros.rosbag.recording import recorder\n"
         "from minirospy.ros.rosbag.recording.recorder import Recorder\n"
+        "recorder._REPORT_SECONDS = 0.5\n"
         "receive, received = Recorder._receive, []\n"
         "def count(*args):\n"
         "    receive(*args)\n"

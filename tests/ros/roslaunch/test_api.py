@@ -116,7 +116,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
 
 
 def test_the_run_id_is_the_programs(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The run id also applies to a master that the launch starts."""
+    """The run id also applies to a master started by the launch."""
     uri = f"http://localhost:{free_port()}"
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
@@ -162,6 +162,26 @@ def test_a_listener_may_fail_and_may_stop_the_launch(
         launch.shutdown()
 
 
+def test_no_node_starts_after_a_shutdown_has_begun(master: str, package: Path) -> None:
+    launch = roslaunch.scriptapi.ROSLaunch()
+    launch.start()
+    try:
+        launch.launch(roslaunch.core.Node("pkg", "wait.py", "a"))
+        monitor = launch.parent.pm
+        monitor.shutdown()
+        with pytest.raises(
+            roslaunch.RLException, match=r"cannot add process \[b\] after process monitor has"
+        ):
+            launch.launch(roslaunch.core.Node("pkg", "wait.py", "b"))
+        wait_until(lambda: monitor.done)
+        with pytest.raises(
+            roslaunch.RLException, match=r"cannot add process \[c\] after process monitor has"
+        ):
+            launch.launch(roslaunch.core.Node("pkg", "wait.py", "c"))
+    finally:
+        launch.stop()
+
+
 def test_a_start_that_failed_may_be_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", "http://no-such-host.invalid:11399")
     launch = roslaunch.parent.ROSLaunchParent("run", [])
@@ -197,7 +217,7 @@ def test_nothing_is_left_of_a_program_that_forgets_its_launch(master: str, packa
         "process = launch.launch(roslaunch.core.Node('pkg', 'wait.py', 'a', output='screen'))\n"
         "print('pid', process.pid, flush=True)\n"
     )
-    # The output only reaches end of file when the node, which also has the pipe open, has exited.
+    # The output reaches end of file only when the node, which also has the pipe open, has exited.
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )

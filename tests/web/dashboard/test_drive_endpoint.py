@@ -1,4 +1,4 @@
-"""Driving through the server's endpoint: whatever failure a client has, the last message is zero."""
+"""Driving through the server's endpoint: however a client fails, the last message is zero velocity."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Session(JsonSession):
     subject: ClassVar[str] = "toys"
     owners_only: ClassVar[str] = "play"
     longest: ClassVar[int] = 1000
-    most_waiting: ClassVar[int] = 3
+    max_waiting: ClassVar[int] = 3
 
     def __init__(self, client: WebClient) -> None:
         self.left_by: list[str] = []
@@ -332,14 +332,19 @@ def test_work_that_goes_on_is_waited_for_and_its_fault_logged(caplog: pytest.Log
     async def work() -> None:
         endpoint, _ = opened(Client())
         done: list[int] = []
+        released = asyncio.Event()
 
         async def slow() -> None:
-            await asyncio.sleep(0.05)
+            await released.wait()
             done.append(1)
             raise ZeroDivisionError("by nothing")
 
         endpoint.spawn(slow())
-        await endpoint.close()
+        closing = asyncio.ensure_future(endpoint.close())
+        await asyncio.wait({closing}, timeout=0.01)
+        assert not closing.done()
+        released.set()
+        await closing
         assert done == [1]
 
     with caplog.at_level(logging.ERROR):

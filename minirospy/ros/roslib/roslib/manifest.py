@@ -14,7 +14,7 @@ from minirospy.base.xml_text import XmlError, check_xml
 from minirospy.ros.roslib.roslib.exceptions import ROSLibException
 from minirospy.ros.roslib.roslib.packages import InvalidROSPkgException, get_pkg_dir
 from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE
-from minirospy.ros.rospkg.rospkg.manifest import Export
+from minirospy.ros.rospkg.rospkg.manifest import Export, child_elements, element_text
 from minirospy.ros.rospkg.rospkg.manifest import RosDep as ROSDep
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class Manifest:
 
 
 def folders_with(file: str, path: str) -> Iterator[str]:
-    """Yield the folders below ``path`` that contain the manifest ``file``. Do not search below such folders."""
+    """Yield the folders below ``path`` that contain the manifest ``file``. Do not search inside these folders."""
     for folder, subfolders, files in os.walk(path, followlinks=True):
         if file in files:
             yield folder
@@ -110,7 +110,7 @@ def load_manifest(package: str) -> Manifest:
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException if its content is invalid."""
+    """Parse a manifest file. Raise ValueError if the file does not exist, ManifestException if its content is invalid."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):
@@ -120,7 +120,7 @@ def parse_file(file: str) -> Manifest:
 
 
 def parse(string: str, filename: str = "string") -> Manifest:
-    """Return the manifest in a string. Raise ManifestException if the manifest is invalid."""
+    """Parse a manifest from a string. Raise ManifestException if it is invalid."""
     from xml.dom.minidom import parseString
 
     try:
@@ -137,43 +137,33 @@ def parse(string: str, filename: str = "string") -> Manifest:
 def _manifest(root: Element) -> Manifest:
     manifest = Manifest()
     for tag in ("description", "license", "author", "url"):
-        found = _children(root, tag)
+        found = child_elements(root, tag)
         if len(found) > 1 and tag != "author":
             have = "have only one" if tag == "license" else "have a single"
             raise ManifestException(f"Invalid manifest file: must {have} '{tag}' element")
         texts = (
-            "".join(node.toxml() for node in each.childNodes) if tag == "description" else _text(each)
+            "".join(node.toxml() for node in each.childNodes) if tag == "description" else element_text(each)
             for each in found
         )
         setattr(manifest, tag, ", ".join(texts))
-    for each in _children(root, "description"):
+    for each in child_elements(root, "description"):
         manifest.brief = each.getAttribute("brief")
-    for each in _children(root, "review"):
+    for each in child_elements(root, "review"):
         manifest.status, manifest.notes = each.getAttribute("status"), each.getAttribute("notes")
-    if _children(root, "version"):
+    if child_elements(root, "version"):
         raise ManifestException("<version> tag is not valid in a package manifest.xml file")
 
-    for each in _children(root, "depend"):
+    for each in child_elements(root, "depend"):
         if not each.hasAttribute("thirdparty"):
             if not each.hasAttribute("package"):
                 raise ManifestException("Invalid manifest file: depends is missing 'package' attribute")
             manifest.depends.append(Depend(each.getAttribute("package")))
-    manifest.rosdeps = [ROSDep(each.getAttribute("name")) for each in _children(root, "rosdep")]
-    for each in _children(root, "versioncontrol")[:1]:
+    manifest.rosdeps = [ROSDep(each.getAttribute("name")) for each in child_elements(root, "rosdep")]
+    for each in child_elements(root, "versioncontrol")[:1]:
         manifest.versioncontrol = VersionControl(each.getAttribute("type"), each.getAttribute("url"))
     manifest.exports = [
-        Export(each.tagName, dict(each.attributes.items()), _text(each))
-        for tag in _children(root, "export")
-        for each in _children(tag)
+        Export(each.tagName, dict(each.attributes.items()), element_text(each))
+        for tag in child_elements(root, "export")
+        for each in child_elements(tag)
     ]
     return manifest
-
-
-def _children(parent: Element, tag: str = "") -> list[Element]:
-    return [
-        each for each in parent.childNodes if each.nodeType == each.ELEMENT_NODE and tag in ("", each.tagName)
-    ]
-
-
-def _text(element: Element) -> str:
-    return "".join(each.data for each in element.childNodes if each.nodeType == each.TEXT_NODE).strip()

@@ -19,6 +19,7 @@ from minirospy.introspect.nodes import (
     NodeDetail,
     find_node,
     forget_node,
+    is_known_host,
     is_timeout,
     is_unknown_host,
     kill_node,
@@ -88,7 +89,7 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error for a missing node name. The error lists the nodes if a master responds."""
+    """Return the error for a missing node name. It lists the nodes if a master responds."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
@@ -219,6 +220,9 @@ def _print_connections(graph: Graph, detail: NodeDetail) -> bool:
     return True
 
 
+_NO_ADDRESS = "ERROR: cannot resolve machine name [{name}] to address"
+
+
 def _machine_parser() -> Parser:
     parser = Parser(
         "rosnode machine",
@@ -232,7 +236,13 @@ def _machine_parser() -> Parser:
 
 def _machine(machine: str | None) -> None:
     with Graph.open("rosnode") as graph:
-        found = nodes_on(graph, machine) if machine else sorted({*node_hosts(graph).values()})
+        try:
+            found = nodes_on(graph, machine) if machine else sorted({*node_hosts(graph).values()})
+        except MasterUnreachableError as error:
+            # ROS looks up the machine's address before it calls the master.
+            if machine and not is_known_host(machine):
+                raise WordedError(error, RosText(_NO_ADDRESS.format(name=machine))) from error
+            raise
         print("\n".join(found))
 
 
@@ -284,7 +294,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return those of ``names`` that are nodes; print an error for each other name."""
+    """Return the ``names`` that are nodes; print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:
@@ -377,7 +387,7 @@ FAMILY = Family(
             "list nodes running on a particular machine or list machines",
             _machine_parser,
             _machine,
-            {"machine": RosText("ERROR: cannot resolve machine name [{name}] to address")},
+            {"machine": RosText(_NO_ADDRESS)},
         ),
         Verb("kill", "kill a running node", _kill_parser, _kill),
         Verb("cleanup", "purge registration information of unreachable nodes", _cleanup_parser, _cleanup),

@@ -27,6 +27,10 @@ __all__ = ["main", "rosstack"]
 
 _OPTIONS = {"target", "attrib", "top", "lang", "length"}
 _FLAGS = {"deps-only", "zombie-only"}
+_MISSING = (
+    "{} '{}' depends on non-existent package '{}' and rosdep claims that it is not a system dependency. "
+    "Check the ROS_PACKAGE_PATH or try calling 'rosdep update'"
+)
 _FOOTER = """\
   Extra options:
     -q     Quiets error reports.
@@ -96,19 +100,21 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
             print(_help(tool, line.package))
             return 0
         if not line.verb:
-            # Exit with 0, because rospack does not treat this as a failure.
+            # Exit with 0: rospack does not treat this as a failure.
             complain("Error", f"no command given.  Try '{tool.name} help'")
             return 0
         tree = Dependencies(
             Packages(), os.environ, lambda error: complain("Warning", error), tool.name == "rosstack"
         )
         _checked(line, tool).body(line, tree)
+        for package, name in tree.missing:
+            complain("Error", _MISSING.format(tool.thing, package, name))
     except NotFoundError as error:
         complain("Error", _not_found(tool, line.verb, error))
     except MinirospyError as error:
         complain("Error", error)
     else:
-        return 0
+        return 1 if tree.missing else 0
     return 1
 
 
@@ -228,12 +234,12 @@ def _depends_indent(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_manifests(line: _Line, tree: Dependencies) -> None:
-    print(" ".join(str(tree.folder(name) / "package.xml") for name in tree.all(_package(line))))
+    print(" ".join(str(tree.manifest(name).path) for name in tree.all(_package(line))))
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # Only check the package: rosbuild created these files when it generated messages, and catkin packages do not
-    # contain them.
+    # Only check the package.
+    # rosbuild created these files when it generated messages, and catkin packages do not contain them.
     tree.all(_package(line))
     print()
 
@@ -257,8 +263,7 @@ def _rosdep0(line: _Line, tree: Dependencies) -> None:
 
 
 def _vcs(line: _Line, tree: Dependencies) -> None:
-    # Only check that the package exists: <versioncontrol> is a tag in manifest.xml that does not exist in
-    # package.xml.
+    # Only check that the package exists: <versioncontrol> is a tag of manifest.xml that package.xml does not have.
     tree.folder(_package(line))
 
 

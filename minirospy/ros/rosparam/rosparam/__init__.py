@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import os
 import re
 import sys
@@ -20,10 +19,10 @@ from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFou
 from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.core.wire.xmlrpc_writer import is_numpy
 from minirospy.introspect import parameters
+from minirospy.introspect.arithmetic import degrees, radians
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import (
     add_angles,
-    arithmetic,
     format_pretty,
     format_value,
     parse_documents,
@@ -88,7 +87,7 @@ class RosParamIOException(RosParamException):
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
-    """Raised if the YAML is invalid. Programs catch either of the two base classes."""
+    """Raised if the YAML is invalid. Programs catch one or the other of the two base classes."""
 
 
 def get_param(param: str) -> Any:
@@ -123,7 +122,7 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """Replace Binary by bytes, and numpy numbers and arrays by Python numbers and lists, in a value."""
+    """In a value, replace Binary with bytes, and numpy's numbers and arrays with Python's numbers and lists."""
     if is_numpy(value):
         return _with_bytes(value.tolist())  # type: ignore[attr-defined]
     if isinstance(value, Binary):
@@ -156,7 +155,7 @@ def delete_param(param: str, verbose: bool = False) -> None:
 
 
 def print_params(params: object, ns: str) -> None:
-    """Print parameters, one ``name=value`` per line; print a single value alone."""
+    """Print parameters, one ``name=value`` per line; if there is only a value, print just that."""
     if isinstance(params, dict):
         for name, value in parameters.flatten(ns, params):
             print(f"{name}={value}")
@@ -239,7 +238,7 @@ def yamlmain(argv: Sequence[str] | None = None) -> None:
         sys.exit(status)
 
 
-# The following private functions of ROS's rosparam are called by programs.
+# Programs call the following private functions of ROS's rosparam.
 
 
 def _run_verb(name: str, argv: Sequence[str]) -> None:
@@ -296,7 +295,7 @@ def _pretty_print(value: dict[str, object], indent: str = "") -> None:
 
 
 def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[Values, list[str]]:
-    """Parse a command line of `rosparam set`, where values may be negative numbers; return the options and values."""
+    """Parse a command line of `rosparam set`, in which values may be negative numbers; return the options and values."""
     values: list[str] = []
     options: list[str] = []
     takes_value = False
@@ -320,24 +319,24 @@ pattern = re.compile(r"^rad\([^\)]*\)$")
 """The second of ROS's two patterns for angles. Programs use this name."""
 
 
-def construct_angle_degrees(loader: Any, node: Any) -> float:
+def construct_angle_degrees(loader: Any, node: Any) -> float | str:
     """Convert a YAML node such as `deg(90)` or `90` to radians. Raise RosParamException if it is not a number."""
     value = loader.construct_scalar(node)
     try:
-        return math.radians(arithmetic(value.strip()[4:-1] if value.startswith("deg(") else value))
+        return degrees(value)
     except (ValueError, SyntaxError, ArithmeticError):
         raise _YamlError(f"invalid degree value: {value}") from None
 
 
-def construct_angle_radians(loader: Any, node: Any) -> float:
+def construct_angle_radians(loader: Any, node: Any) -> float | str:
     """Evaluate a YAML node such as `rad(pi/2)`.
 
-    Raise RosParamException if the expression is invalid. Only arithmetic with `pi` is evaluated, whereas ROS runs the
-    expression as Python code.
+    Raise RosParamException if the expression is invalid. Only operators and functions of numbers are evaluated, whereas ROS
+    runs the expression as Python code.
     """
     value = loader.construct_scalar(node).strip()
     try:
-        return arithmetic(value[4:-1] if value.startswith("rad(") else value)
+        return radians(value)
     except (ValueError, SyntaxError, ArithmeticError):
         raise _YamlError(f"invalid radian expression: {value}") from None
 
@@ -358,7 +357,7 @@ def represent_foo(loader: Any, data: str) -> Any:
     return loader.represent_scalar("#", data)
 
 
-# As in ROS, importing rosparam lets PyYAML's own loaders read deg(90) and rad(pi/2), and return bytes as Binary.
+# As in ROS, importing rosparam makes PyYAML's own loaders read deg(90) and rad(pi/2), and return bytes as Binary.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
     _loader.add_constructor("!degrees", construct_angle_degrees)

@@ -6,9 +6,10 @@ packages from rosdep keys. This module instead treats any name that is not a kno
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Hashable, Sequence
-from functools import lru_cache
+from collections.abc import Hashable, Iterator, Sequence
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,8 +21,13 @@ from minirospy.workspace.packages import Packages, package_name
 
 if TYPE_CHECKING:
     from minirospy.workspace import manifest
-from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
-from minirospy.ros.rospkg.rospkg.manifest import InvalidManifest, Manifest, parse_manifest_file
+from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE, PACKAGE_FILE, STACK_FILE, ResourceNotFound
+from minirospy.ros.rospkg.rospkg.manifest import (
+    InvalidManifest,
+    Manifest,
+    catkin_manifest,
+    parse_manifest_file,
+)
 
 __all__ = [
     "ManifestManager",
@@ -40,10 +46,13 @@ _Manager = TypeVar("_Manager", bound="ManifestManager")
 class ManifestManager:
     """Finds packages or stacks below the given folders. Results are cached, so create a new object to see changes on disk."""
 
+    _manifest_name = MANIFEST_FILE
+
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
         self._tree = Dependencies(Packages.below(*map(Path, self._ros_paths)), os.environ)
         self._custom: dict[Hashable, object] = {}
+        self._manifests: dict[str, Manifest | None] = {}
 
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:
@@ -78,7 +87,7 @@ class ManifestManager:
 
         Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
         """
-        return Manifest(self._read(name), *self._split(name))
+        return self._rosbuild(name) or catkin_manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
         """Return a package's direct dependencies or, if ``implicit``, all of them.
@@ -99,8 +108,8 @@ class ManifestManager:
             try:
                 if name in self.get_depends(other, implicit):
                     found.append(other)
-            except InvalidManifest:
-                # Ignore an invalid manifest, so that it does not affect other packages.
+            except (InvalidManifest, ResourceNotFound):
+                # An invalid manifest, or a package that is missing, does not affect other packages.
                 continue
         return found
 
@@ -113,7 +122,7 @@ class ManifestManager:
         self._custom[key] = value
 
     def _load_manifest(self, name: str) -> Manifest:
-        # Programs call this method, although it is also private in rospkg.
+        # Programs call this method although it is private in rospkg, too.
         return self.get_manifest(name)
 
     def _folders(self) -> dict[str, Path]:
@@ -126,10 +135,20 @@ class ManifestManager:
         except ManifestError as error:
             raise InvalidManifest(str(error)) from error
 
+    def _rosbuild(self, name: str) -> Manifest | None:
+        """Return the manifest that rosbuild uses, or None if there is none."""
+        if name not in self._manifests:
+            folder = self.get_path(name)
+            exists = os.path.isfile(os.path.join(folder, self._manifest_name))
+            self._manifests[name] = parse_manifest_file(folder, self._manifest_name) if exists else None
+        return self._manifests[name]
+
     def _split(self, name: str) -> tuple[Names, Names]:
         """Return a manifest's dependencies as (packages, others)."""
         from minirospy.workspace.manifest import Kind
 
+        if rosbuild := self._rosbuild(name):
+            return [each.name for each in rosbuild.depends], [each.name for each in rosbuild.rosdeps]
         left_out = {Kind.DOC, Kind.BUILDTOOL_EXPORT}
         names = self._read(name).depends(*(kind for kind in Kind if kind not in left_out))
         known = self._tree.copies
@@ -150,39 +169,61 @@ class RosPack(ManifestManager):
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
         """Return a package's dependencies that are not packages; if ``implicit``, also those of the packages it depends on.
 
-        Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
+        If one of these cannot be read, return only the package's own. Raise ResourceNotFound if the package does not exist,
+        InvalidManifest if its manifest cannot be parsed.
         """
-        names = [package, *(self.get_depends(package) if implicit else [])]
+        self._split(package)
+        names = [package]
+        if implicit:
+            with contextlib.suppress(InvalidManifest, ResourceNotFound):
+                names += self.get_depends(package)
         return list(dict.fromkeys(key for name in names for key in self._split(name)[1]))
 
     def stack_of(self, package: str) -> str | None:
-        """Return None, because catkin has no stacks. Raise ResourceNotFound if the package does not exist."""
-        self.get_path(package)
-        return None
+        """Return the rosbuild stack whose folder contains a package, or None if there is none; catkin has no stacks.
+
+        Raise ResourceNotFound if the package does not exist.
+        """
+        folder = Path(self.get_path(package))
+        return next((each.name for each in (folder, *folder.parents) if (each / STACK_FILE).is_file()), None)
 
     def _folders(self) -> dict[str, Path]:
         return {name: folders[0] for name, folders in self._tree.copies.items()}
 
 
 class RosStack(ManifestManager):
-    """Finds metapackages."""
+    """Finds metapackages, and rosbuild's stacks."""
+
+    _manifest_name = STACK_FILE
 
     def packages_of(self, stack: str) -> Names:
-        """Return a metapackage's packages.
+        """Return a metapackage's packages, or the packages in a stack's folder.
 
         Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
         """
+        folder = self._folders().get(stack)
+        if folder and (folder / STACK_FILE).is_file():
+            return sorted(Packages.below(folder).copies())
         return self.get_depends(stack, implicit=False)
 
-    def get_stack_version(self, stack: str) -> str:
-        """Return a metapackage's version.
+    def get_stack_version(self, stack: str) -> str | None:
+        """Return a metapackage's version, or None for a stack, which has no version.
 
         Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
         """
-        return self._read(stack).version
+        return get_stack_version_by_dir(self.get_path(stack))
 
     def _folders(self) -> dict[str, Path]:
-        return self._tree.metapackages
+        return self._known_stacks
+
+    @cached_property
+    def _known_stacks(self) -> dict[str, Path]:
+        stacks = {
+            folder.name: folder
+            for root in self._ros_paths
+            for folder in _folders_with(STACK_FILE, Path(root))
+        }
+        return {**stacks, **self._tree.metapackages}
 
 
 @lru_cache(maxsize=64)
@@ -191,23 +232,50 @@ def _instance(cls: type[ManifestManager], ros_paths: tuple[str, ...]) -> Manifes
 
 
 def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[str]:
-    """Return the packages below a folder; store their folders in ``cache``."""
-    found = {name: str(folder) for name, folder in Packages.below(Path(path)).folders().items()}
+    """Return the packages below a folder, or the stacks if ``manifest_name`` is stack.xml; store their folders in ``cache``.
+
+    For package.xml, packages for rosbuild are left out.
+    """
+    if manifest_name == STACK_FILE:
+        found = {folder.name: str(folder) for folder in _folders_with(STACK_FILE, Path(path))}
+    else:
+        folders = Packages.below(Path(path)).folders()
+        found = {
+            name: str(folder)
+            for name, folder in folders.items()
+            if manifest_name != PACKAGE_FILE or (folder / PACKAGE_FILE).is_file()
+        }
     for name, folder in found.items():
         cache.setdefault(name, folder)
     return list(found)
 
 
+def _folders_with(name: str, root: Path) -> Iterator[Path]:
+    """Yield the folders at or below ``root`` that contain a file.
+
+    Skip hidden folders, and folders inside such a folder or a package.
+    """
+    for folder, below, files in os.walk(root):
+        if name in files:
+            yield Path(folder)
+        if {name, MANIFEST_FILE, PACKAGE_FILE, "CATKIN_IGNORE", "rospack_nosubdirs"} & set(files):
+            below.clear()
+        below[:] = sorted(each for each in below if not each.startswith("."))
+
+
 def get_package_name(path: str) -> str | None:
     """Return the package that contains a path, or None if no package contains it."""
     place = Path(path).absolute()
-    return next(filter(None, map(package_name, (place, *place.parents))), None)
+    for folder in (place, *place.parents):
+        if name := folder.name if (folder / MANIFEST_FILE).is_file() else package_name(folder):
+            return name
+    return None
 
 
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """Replace metapackages by their packages; return (packages, unknown names)."""
+    """Replace metapackages with their packages; return (packages, unknown names)."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():
@@ -219,6 +287,11 @@ def expand_to_packages(
     return list(dict.fromkeys(packages)), unknown
 
 
-def get_stack_version_by_dir(stack_dir: str) -> str:
-    """Return the version in a folder's package.xml. Raise InvalidManifest if the file cannot be parsed."""
+def get_stack_version_by_dir(stack_dir: str) -> str | None:
+    """Return the version in a folder's package.xml, or None for a rosbuild stack.
+
+    Raise InvalidManifest if it cannot be parsed.
+    """
+    if os.path.isfile(os.path.join(stack_dir, STACK_FILE)):
+        return None
     return parse_manifest_file(stack_dir).version

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFoundError, UsageError
 from minirospy.introspect import topics
-from minirospy.introspect.fields import Step, field_value, parse_path
+from minirospy.introspect.fields import NotAnArrayError, Step, field_value, parse_path
 from minirospy.introspect.graph import Graph
 from minirospy.ros.rosgraph.rosgraph import masterapi
 from minirospy.ros.rosgraph.rosgraph.names import make_global_ns, script_resolve_name
@@ -122,7 +122,7 @@ __all__ = [
 
 NAME = "rostopic"
 _Topic = tuple[str, str, list[str]]
-# (topic, type, nodes that publish or subscribe to the topic)
+# (topic, type, nodes), where the nodes publish or subscribe to the topic
 _TopicRow = tuple[str, str, list[str]]
 
 
@@ -187,19 +187,22 @@ def find_by_type(topic_type: str) -> list[str]:
 def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
     """Return a function that extracts the field at a path (``/pose/x``) from a message, or None for the whole message.
 
-    Also return None if a bracket in the path is invalid. An invalid bracket or a missing field is reported on stderr.
+    Also return None if a bracket in the path is invalid. An invalid bracket or a missing field is reported on stderr. The
+    function raises AttributeError if a field with a bracket is not an array, ValueError if a slice has a step of 0.
     """
     fields = [each for each in pattern.split("/") if each]
     try:
-        steps = parse_path("/".join(fields))
+        steps = parse_path("/".join(fields), zero_steps=True)
     except UsageError:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat the step as the name of a field that no message has.
+        # Treat the step as the name of a field, one that no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def report(error: NotFoundError | IndexError) -> None:
+        if isinstance(error, NotAnArrayError):
+            raise AttributeError(f"'{error.type_name}' object has no attribute '__getitem__'") from error
         why = f"no field named {error.name} in" if isinstance(error, NotFoundError) else f"{error.__cause__}:"
         print(why, pattern, file=sys.stderr)
 
@@ -291,7 +294,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
-# The following private functions of ROS's rostopic are called by programs.
+# Programs call the following private functions of ROS's rostopic.
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:

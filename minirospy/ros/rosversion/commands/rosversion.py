@@ -30,7 +30,7 @@ def _parser() -> Parser:
         "rosversion",
         "Print the version of a package, or the name of the ROS distribution.",
         "rosversion [-h] [-s] [-d] [-a] [package]",
-        # This text is ROS's own, although it confuses the two versions.
+        # This is ROS's own text, although it confuses the two versions.
         about="rosversion -d: Output the version of the given package\n"
         "rosversion package: Output the ROS distribution name",
         ros_argparse="rosversion",
@@ -59,14 +59,20 @@ def _rosversion(package: str | None, skip_newline: bool, distro: bool, all: bool
         text = distro_codename()
     elif all:
         folders = Packages().folders()
-        text = "\n".join(f"{name}: {read_manifest(folders[name]).version}" for name in sorted(folders))
+        manifests = {name: read_manifest(folders[name]) for name in sorted(folders)}
+        text = "\n".join(
+            f"{name}: {read.version}" for name, read in manifests.items() if not read.is_rosbuild
+        )
     else:
         try:
             folder = Packages().find(str(package))
+            manifest = read_manifest(folder)
+            if manifest.is_rosbuild:
+                raise NotFoundError("version", str(package), (), f"{manifest.path} has no version")
         except NotFoundError:
             print(f"Cannot locate [{package}]", flush=True)
             raise
-        text = read_manifest(folder).version
+        text = manifest.version
     sys.stdout.write(text if skip_newline else text + "\n")
 
 

@@ -1,10 +1,11 @@
 """soundplay_node.py: plays the sounds requested through the topic robotsound or the action sound_play.
 
-Parameters: ~default_voice, ~loop_rate (100 Hz, for the action's feedback). Source: http://wiki.ros.org/sound_play.
+Parameters: ~default_voice, ~device, ~loop_rate (100 Hz, for the action's feedback). Source: http://wiki.ros.org/sound_play.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -77,6 +78,7 @@ class PlayingSound:
                 try:
                     self._process = subprocess.Popen(
                         list(self._command.words),
+                        env={**os.environ, **self._command.variables},
                         stdin=subprocess.PIPE,
                         stdout=subprocess.DEVNULL,
                         stderr=subprocess.PIPE,
@@ -105,6 +107,7 @@ class SoundNode:
         """Create the node. ``folder`` is the folder for the package's sound files."""
         self._folder = folder
         self._default_voice = str(rospy.get_param("~default_voice", "") or "")
+        self._device = str(rospy.get_param("~device", "") or "")
         self._feedback_pause = 1.0 / max(1.0, float(rospy.get_param("~loop_rate", 100)))
         self._lock = threading.Lock()
         self._sounds: dict[Key, PlayingSound] = {}
@@ -145,11 +148,12 @@ class SoundNode:
     def _command(self, request: SoundRequest) -> Command:
         volume = max(0.0, min(1.0, float(request.volume)))
         if request.sound == SoundRequest.SAY:
-            command = say_command(request.arg, request.arg2 or self._default_voice, volume, shutil.which)
+            voice = request.arg2 or self._default_voice
+            command = say_command(request.arg, voice, volume, shutil.which, self._device)
             if command is None:
                 raise SoundError(_missing(SPEAKERS, "says texts"))
             return command
-        command = play_command(str(self._file(request)), volume, shutil.which)
+        command = play_command(str(self._file(request)), volume, shutil.which, self._device)
         if command is None:
             raise SoundError(_missing(PLAYERS, "plays sounds"))
         return command

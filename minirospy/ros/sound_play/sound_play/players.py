@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 __all__ = ["PLAYERS", "SPEAKERS", "Command", "installable", "play_command", "say_command"]
 
@@ -12,10 +13,11 @@ Which = Callable[[str], "str | None"]
 
 @dataclass(frozen=True)
 class Command:
-    """A program with its arguments and its input on stdin."""
+    """A program with its arguments, its input on stdin, and variables to add to its environment."""
 
     words: Sequence[str]
     text: str | None = None
+    variables: Mapping[str, str] = field(default_factory=dict)
 
 
 def _powershell(script: str) -> list[str]:
@@ -37,7 +39,7 @@ PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
         f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
     ),
 }
-"""Functions that take a file and a volume (0 to 1) and return the player's arguments, keyed by player, preferred ones first."""
+"""For each player, preferred ones first: a function from a file and a volume (0 to 1) to the player's arguments."""
 
 SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
     "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
@@ -53,13 +55,22 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Functions that return the command to speak a text, keyed by program, preferred ones first."""
+"""For each program, preferred ones first: a function that returns the command to speak a text."""
 
+_ON_DEVICE: dict[str, Callable[[str], list[str]]] = {
+    "paplay": lambda device: [f"--device={device}"],
+    "pw-play": lambda device: [f"--target={device}"],
+    "aplay": lambda device: ["-D", device],
+}
+"""Functions that return a player's option for an output device; other programs read the variables of _variables()."""
+
+_DEFAULTS = ("", "default")  # names of the machine's output device
+_ALSA = re.compile(r"(?:plug|dmix|sysdefault|front|surround\d+|iec958|hdmi)?(?:hw)?:(?:CARD=)?(\w+)")
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
 
 def _espeak(voice: str, volume: float) -> list[str]:
-    # Names such as voice_kal_diphone are voices of festival.
+    # Names like voice_kal_diphone are festival's voices.
     names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
     return ["--stdin", "-a", str(round(volume * 100)), *names]
 
@@ -73,20 +84,35 @@ def installable(programs: Iterable[str], platform: str) -> list[str]:
     return [name for name in programs if _ONLY_ON.get(name, platform) == platform]
 
 
-def play_command(file: str, volume: float, which: Which) -> Command | None:
-    """Return the command that plays a file, or None if there is no player."""
-    for name, arguments in PLAYERS.items():
+def play_command(file: str, volume: float, which: Which, device: str = "") -> Command | None:
+    """Return the command that plays a file, or None if there is no player.
+
+    ``device`` is the output device (default: the machine's): a name of ALSA, such as ``hw:1``, or of the sound server.
+    """
+    # Only aplay takes a name of ALSA.
+    names = sorted(PLAYERS, key=lambda name: name != "aplay") if _ALSA.match(device) else PLAYERS
+    for name in names:
         program = which(name)
         if program:
-            return Command([program, *arguments(file, volume)])
+            option = _ON_DEVICE[name](device) if device not in _DEFAULTS and name in _ON_DEVICE else []
+            return Command([program, *option, *PLAYERS[name](file, volume)], None, _variables(device))
     return None
 
 
-def say_command(text: str, voice: str, volume: float, which: Which) -> Command | None:
-    """Return the command that speaks ``text``, or None if there is no such program."""
+def say_command(text: str, voice: str, volume: float, which: Which, device: str = "") -> Command | None:
+    """Return the command that speaks ``text`` on a device, or None if there is no such program."""
     for name, make in SPEAKERS.items():
         program = which(name)
         if program:
             command = make(text, voice, volume)
-            return Command([program, *command.words], command.text)
+            return Command([program, *command.words], command.text, _variables(device))
     return None
+
+
+def _variables(device: str) -> dict[str, str]:
+    """Return the variables that name an output device to the libraries of programs without an option for it."""
+    if device in _DEFAULTS:
+        return {}
+    if alsa := _ALSA.match(device):
+        return {"ALSA_CARD": alsa[1], "AUDIODEV": device, "SDL_AUDIODRIVER": "alsa"}
+    return {"PULSE_SINK": device}

@@ -14,6 +14,8 @@ import pytest
 from tests.conftest import write_files
 from tests.ros.control.manager.conftest import Start, call
 
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a Ctrl-C for one process, a pseudo-terminal")
+
 DOCS = Path(__file__).parents[4] / "docs"
 PYTHON, XML = (
     re.findall(rf"```{kind}\n(.*?)```", (DOCS / "control.md").read_text(encoding="utf-8"), re.DOTALL)
@@ -74,7 +76,6 @@ class ServoOnALine:
                     os.write(self.line, b"%.4f\n" % position)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal")
 def test_driver_of_a_servo(start: Start) -> None:
     pytest.importorskip("serial")
     servo = ServoOnALine()

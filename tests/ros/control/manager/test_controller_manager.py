@@ -10,6 +10,8 @@ import pytest
 
 from tests.ros.control.manager.conftest import ROBOT, Start, call
 
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a Ctrl-C for one process")
+
 LOADS = """
 rospy.set_param("/one", {"type": "my_controllers/Hold", "joint": "a", "step": 0.001})
 rospy.set_param("/two", {"type": "my_controllers/Hold", "joint": "b"})
@@ -142,7 +144,6 @@ def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there")
 def test_end_stops_the_controllers_and_releases_the_joints(start: Start, number: signal.Signals) -> None:
     robot = start("-c", ROBOT)
     call(LOADS + 'cm.load_controller("one"), cm.load_controller("two"); cm.start_controllers(["one", "two"])')
@@ -295,7 +296,6 @@ def test_driver_that_hangs_does_not_keep_the_node(start: Start, workspace: Path)
     )
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
 def test_manager_starts_cleanly_after_a_kill_in_mid_motion(start: Start) -> None:
     for _ in range(3):
         robot = start("-c", ROBOT)
