@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 BIN = Path(sys.executable).parent
 WARM_UP = 3.0  # seconds of motion before the measurement
+COLUMNS = ("CPU, %", "cycle, us", "cycle p99, us", "jitter p99, us", "jitter max, us", "overruns", "states/s")
 
 
 class Case(NamedTuple):
@@ -121,16 +122,14 @@ def measure(case: Case, seconds: float, node: list[str]) -> dict[str, float]:
         rospy.set_param(f"/{name}", value)
     process = subprocess.Popen([*node, "__name:=loopback"])
     try:
-        received = {"joint states": 0, "states": 0}
+        received = 0  # states of controllers
         speeds: dict[str, float] = {}  # of the controllers, in the last state
         times: list[dict[str, str]] = []
 
-        def count(_: object) -> None:
-            received["joint states"] += 1
-
         def told(name: str):
             def counted(state: JointTrajectoryControllerState) -> None:
-                received["states"] += 1
+                nonlocal received
+                received += 1
                 speeds[name] = max(abs(each) for each in state.actual.velocities)
 
             return counted
@@ -140,7 +139,7 @@ def measure(case: Case, seconds: float, node: list[str]) -> dict[str, float]:
 
         controllers = shares(case)
         start_controllers(["joint_state_controller", *controllers])
-        rospy.Subscriber("/joint_states", JointState, count)
+        rospy.Subscriber("/joint_states", JointState, lambda _: None)
         rospy.Subscriber("/diagnostics", DiagnosticArray, diagnosed)
         publishers = {}
         for name in controllers:
@@ -153,7 +152,7 @@ def measure(case: Case, seconds: float, node: list[str]) -> dict[str, float]:
         watched = psutil.Process(process.pid)
         times.clear()
         before, started = watched.cpu_times(), time.monotonic()
-        known = dict(received)
+        known = received
         time.sleep(seconds)
         after, ended = watched.cpu_times(), time.monotonic()
         used = after.user + after.system - before.user - before.system
@@ -171,8 +170,7 @@ def measure(case: Case, seconds: float, node: list[str]) -> dict[str, float]:
             "jitter p99, us": middle("jitter p99 (us)"),
             "jitter max, us": max(float(each["jitter max (us)"]) for each in last),
             "overruns": float(last[-1]["overruns"]) - float(last[0]["overruns"]),
-            "states/s": (received["states"] - known["states"]) / (ended - started),
-            "joint states/s": (received["joint states"] - known["joint states"]) / (ended - started),
+            "states/s": (received - known) / (ended - started),
         }
     finally:
         process.terminate()
@@ -187,10 +185,8 @@ def run_case(name: str, seconds: float, profile: str) -> None:
     program = ["-m", "cProfile", "-o", profile] if profile else []
     case = CASES[name]
     found = measure(case, seconds, [sys.executable, *program, __file__, "--node"])
-    cells = "  ".join(
-        f"{key} {value:.0f}" if value >= 100 else f"{key} {value:.1f}" for key, value in found.items()
-    )
-    print(f"{case.name} (target {case.target:g} %)\n    {cells}", flush=True)
+    cells = (f"{found[key]:.0f}" if found[key] >= 100 else f"{found[key]:.1f}" for key in COLUMNS)
+    print(f"| {case.name} | {case.target:g} | {' | '.join(cells)} |", flush=True)
 
 
 def main() -> int:
@@ -210,7 +206,8 @@ def main() -> int:
     if options.worker:
         run_case(options.worker, options.seconds, options.profile)
         return 0
-    print(f"load {os.getloadavg()[0]:.1f}, Python {sys.version.split()[0]}")
+    print(f"load {os.getloadavg()[0]:.1f}, Python {sys.version.split()[0]}\n")
+    print(f"| | target, % | {' | '.join(COLUMNS)} |\n|{'---|' * (2 + len(COLUMNS))}", flush=True)
     for name in options.cases or CASES:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))

@@ -17,6 +17,8 @@ def test_plug_in_without_a_view_is_refused_with_those_that_have_one() -> None:
     assert view_of_plugin("rqt_topic") == view_of_plugin("rqt_topic.topic.Topic") == "topics"
     assert view_of_plugin("rqt_top") == view_of_plugin("rqt_top/Top") == "nodes"
     assert view_of_plugin("rqt_robot_steering") == "teleop"
+    assert view_of_plugin("rqt_controller_manager/ControllerManager") == "controllers"
+    assert view_of_plugin("rqt_joint_trajectory_controller/JointTrajectoryController") == "trajectory"
     assert view_of_plugin("rqt_robot_monitor") == view_of_plugin("rqt_runtime_monitor") == "diagnostics"
     with pytest.raises(
         UsageError, match=r"there is no view for the plug-in 'rqt_moveit': there are .*rqt_topic"

@@ -1,7 +1,13 @@
-"""Controllers and their joints in the dashboard, in Debian's chromium, with the services of a manager of the test's own."""
+"""Controllers and their joints in the dashboard, in Debian's chromium.
+
+Most tests have a manager of their own, which is only services; the last one moves the joints of the loopback.
+"""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -209,3 +215,45 @@ def test_robot_without_limits_is_named(serve: Callable[..., Served], browse: Cal
     served.run(served.node("robot").set_param("/robot_description", text))
     page.wait_text("p.error", "no limits of position and velocity for lift")
     assert page.evaluate("document.querySelector('.publish-switch input').disabled")
+
+
+@needs_chromium
+def test_joint_of_the_loopback_moves_and_stands_when_the_page_is_closed(
+    serve: Callable[..., Served], browse: Callable[..., Page], master: str
+) -> None:
+    served = serve()
+    robot = served.node("robot")
+
+    async def prepare() -> Any:
+        await robot.set_param("/robot_description", ROBOT)
+        await robot.set_param("/arm", {"type": TRAJECTORIES, "joints": list(JOINTS)})
+        return await robot.subscribe("/arm/state", JointTrajectoryControllerState)
+
+    subscription = served.run(prepare())
+
+    def until(is_right: Callable[[Any], bool]) -> Any:
+        while not is_right(message := served.run(subscription.next(PATIENCE)).actual):
+            pass
+        return message
+
+    environment = {**os.environ, "ROS_MASTER_URI": master}
+    program = "from minirospy.ros.minirospy_hardware.loopback import main; main()"
+    loopback = subprocess.Popen([sys.executable, "-c", program], env=environment)
+    try:
+        page = browse(address(served, "controllers"))
+        page.click("tr[data-controller='arm'] button", "Load and start")
+        page.wait_text(badge("arm"), "running")
+        page.evaluate("location.hash = '#/trajectory?speed=10'")
+        page.wait("return document.querySelector('.publish-switch input')?.disabled === false")
+        page.click(".publish-switch input")
+        page.type("[data-joint=shoulder] input[type=number]", "2")
+        page.evaluate("document.activeElement.blur()")
+        # At 10 % of 1 rad/s the motion takes 20 s.
+        until(lambda actual: actual.positions[1] > 0.05)
+        page.open("about:blank")
+        stands = until(lambda actual: actual.positions[1] > 0.05 and actual.velocities[1] == 0)
+        assert stands.positions[1] < 1.9
+        assert until(lambda _: True).positions == stands.positions
+    finally:
+        loopback.terminate()
+        loopback.wait(PATIENCE)

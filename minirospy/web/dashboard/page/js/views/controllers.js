@@ -6,7 +6,7 @@ import { fill, h, redraw, setText } from "../dom.js";
 import { errorText, t } from "../texts.js";
 
 const PERIOD_MS = 2000; // between two questions for the list, the second one after the answer to the first
-const COLUMNS = ["Controller", "State", "Type", "Claims", ""];
+const COLUMNS = ["Controller", "Type", "State", "Claims", ""]; // a phone does not show the second one
 const STARTABLE = [
   ["Start", ["start"]],
   ["Unload", ["unload"]],
@@ -252,8 +252,8 @@ export class Controllers {
       "tr",
       {},
       h("td", {}, h("strong", { class: "name" }, name)),
-      h("td", {}, h("span", { class: `badge ${state}` }, t(state))),
       h("td", { class: "muted" }, type),
+      h("td", {}, h("span", { class: `badge ${state}` }, t(state))),
       h(
         "td",
         {},
