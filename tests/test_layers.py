@@ -66,8 +66,6 @@ SYSTEM_PACKAGES = {"catkin", "catkin_pkg", "python_orocos_kdl", "rospkg"}
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
     ("catkin", "rosunit"): "run_tests runs the tests of all kinds",
-    ("controller_manager_msgs", "rosparam"): "its Python module needs both, as the real one",
-    ("controller_manager_msgs", "rosservice"): "its Python module needs both, as the real one",
     ("diagnostic_aggregator", "rosparam"): "the real add_analyzers imports it, too",
     ("image_transport", "cv_bridge"): "has the codecs of compressed_image_transport, which names it",
     ("laser_geometry", "tf2_ros"): "for types; the real one names tf, which needs tf2_ros",

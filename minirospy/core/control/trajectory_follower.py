@@ -187,6 +187,11 @@ class TrajectoryFollower:
         """Stop all joints and hold their position. The goal succeeds when they are stopped."""
         self._requests.append((None, goal))
 
+    @property
+    def waiting(self) -> int:
+        """Return the number of plans and holds that wait for the next update; the oldest ones are dropped."""
+        return len(self._requests)
+
     def sample(self, time: int) -> list[tuple[float, float, float]] | None:
         """Return the joints' desired positions, velocities and accelerations at a ROS time, or None before the start."""
         now, _, uptime = self._clock

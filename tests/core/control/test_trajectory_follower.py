@@ -200,7 +200,7 @@ class TestReplacement:
         arm = Arm()
         for position in range(1000):
             arm.send((0.1, [float(position)] * 2))
-        assert len(arm.follower._requests) == 100
+        assert arm.follower.waiting == 100
         assert arm.run(0.2) == [999.0, 999.0]
 
     def test_absurd_numbers_never_overflow(self) -> None:
