@@ -20,7 +20,10 @@ _MAX_CONFIG_BYTES = 1024 * 1024
 
 @dataclass(frozen=True)
 class Included:
-    """A model, light or actor that a file includes. ``name`` and ``is_static`` are the ``<include>``'s: empty or None if not given."""
+    """A model, light or actor that a file includes.
+
+    ``name`` and ``is_static`` are those of the ``<include>``: empty and None if it does not have them.
+    """
 
     element: Element
     entity: Element

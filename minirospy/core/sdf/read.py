@@ -10,13 +10,14 @@ from dataclasses import replace
 
 from minirospy.base.errors import SdfError
 from minirospy.core.sdf.includes import open_include, sdf_version
-from minirospy.core.sdf.model import Model
+from minirospy.core.sdf.model import Model, World
 from minirospy.core.sdf.read_model import read_included_model, read_model
+from minirospy.core.sdf.read_world import read_world
 from minirospy.core.sdf.source import Resolve, Shared, Source, no_files
 from minirospy.core.sdf.text import Element, parse_document
 from minirospy.core.sdf.urdf import read_urdf
 
-__all__ = ["Resolve", "new_source", "no_files", "parse_model", "parse_urdf"]
+__all__ = ["Resolve", "new_source", "no_files", "parse_model", "parse_urdf", "parse_world"]
 
 
 def parse_urdf(
@@ -46,6 +47,19 @@ def parse_model(
         if included is not None and included.entity.tag == "model":
             return read_included_model(replace(included, name=name or included.name), source)
     raise SdfError(file, root.line, "there is no <model>")
+
+
+def parse_world(text: str | bytes, resolve: Resolve = no_files, *, file: str = "world") -> World:
+    """Return the first world in SDF text, or a world of its models and lights if it has none.
+
+    Models that cannot be used are left out, and named in ``warnings``. Raise SdfError if the text is not SDF.
+    """
+    root = parse_document(text, file)
+    source = new_source(file, resolve)
+    if root.tag not in ("sdf", "gazebo", "world"):
+        raise source.error(root, f"the root is <{root.tag}>: <sdf> is expected")
+    world = root if root.tag == "world" else root.first("world")
+    return read_world(world or root, replace(source, version=sdf_version(root)))
 
 
 def new_source(file: str, resolve: Resolve) -> Source:

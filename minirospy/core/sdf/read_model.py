@@ -213,7 +213,7 @@ class _Reader:
         return self._reference(pose) or default, self.source.pose(pose)
 
     def _reference(self, pose: Element) -> str:
-        """Return the name of the frame in a pose's attributes. The attribute of SDF 1.5 and 1.6 has no effect if it is unknown."""
+        """Return the name of the frame in a pose's attributes. In SDF 1.5 and 1.6 an unknown one has no effect."""
         name = pose.attributes.get("relative_to", "").strip()
         if name:
             return MODEL if name == _WORLD else name

@@ -17,7 +17,10 @@ from minirospy.core.urdf.poses import quaternion_from_rpy
 __all__ = ["Resolve", "Shared", "Source", "no_files"]
 
 Resolve = Callable[[str], "str | None"]
-"""Return the path of the existing file or folder that a URI (``model://``, ``package://``, ``file://``) or a path names, or None."""
+"""Return the path of the existing file or folder that a URI or a path names, or None.
+
+URIs begin with ``model://``, ``package://`` or ``file://``.
+"""
 
 MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
 MAX_INCLUDES = 16  # files and models inside each other; deeper ones are a mistake or an attack
