@@ -1,4 +1,4 @@
-"""Write sdformat.json, the models to which sdformat converts robots.py's descriptions: `python make_recorded.py print_sdf`.
+"""Write sdformat.json, the models to which sdformat converts sdf_robots.py's descriptions: `python make_recorded.py print_sdf`.
 
 print_sdf is built from print_sdf.cc. The recorded ones are sdformat 12.3's (Debian 12).
 """
@@ -11,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from robots import CASES, RANDOM, random_robot, resolve, summary
+from sdf_robots import CASES, RANDOM, random_robot, resolve, summary
 
 from minirospy.core.sdf.read import parse_model
 

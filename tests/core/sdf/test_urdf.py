@@ -15,7 +15,7 @@ from minirospy.core.sdf.read import parse_model, parse_urdf
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
-from robots import (  # noqa: E402 (the folder is not a package)
+from sdf_robots import (  # noqa: E402 (the folder is not a package)
     BALL,
     BOX,
     CASES,
