@@ -22,6 +22,7 @@
     |   |   +-- BuildError              a workspace or package that cannot be built
     |   |   +-- LaunchError             a launch file that cannot be loaded
     |   |   +-- UrdfError               a robot description that cannot be read
+    |   |   +-- SdfError                a simulated world or model that cannot be read
     |   |   +-- RvizFileError           a .rviz file that cannot be read or written
     |   +-- BagError                    a bag that cannot be read or written
     |   |   +-- BagFormatError          bytes that violate the bag format
@@ -104,6 +105,7 @@ __all__ = [
     "RpcTimeout",
     "RpcUnreachable",
     "RvizFileError",
+    "SdfError",
     "SerializationError",
     "ServiceException",
     "SourceError",
@@ -319,6 +321,10 @@ class UrdfError(SourceError):
     def __init__(self, file: str, line: int, text: str, context: tuple[str, ...] = ()) -> None:
         super().__init__(file, line, ": ".join((text, *context[:1])))
         self.trail = (text, *context)
+
+
+class SdfError(SourceError):
+    """A simulated world or model (SDF) cannot be read."""
 
 
 class BagError(MinirospyError):

@@ -1,0 +1,236 @@
+"""The colours of Gazebo's materials, and materials from the scripts of models (Ogre's ``.material`` files)."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from minirospy.core.sdf.model import Color, Material
+from minirospy.core.sdf.source import Source
+from minirospy.core.sdf.text import Element
+
+__all__ = ["named_material", "read_material"]
+
+_MAX_SCRIPT_BYTES = 1024 * 1024
+_MAX_SCRIPTS = 100  # files in a model's folder of scripts
+_PICTURES = (".jpg", ".jpeg", ".png")
+
+_BLOCK = re.compile(r"^[ \t]*material\s+([^\s{:]+)\s*(?::[^\n{]*)?\s*\{", re.MULTILINE)
+_COLOR = re.compile(r"^\s*(ambient|diffuse|emissive)\s+([\d.eE+\- \t]+)", re.MULTILINE)
+_TEXTURE = re.compile(r"^\s*texture\s+(\S+)", re.MULTILINE)
+
+
+def _opaque(*red_green_blue: float) -> Color:
+    red, green, blue = red_green_blue
+    return red, green, blue, 1.0
+
+
+# Diffuse colours. Materials with a picture have the picture's average colour.
+_COLORS: dict[str, Color] = {
+    "Grey": _opaque(0.7, 0.7, 0.7),
+    "Gray": _opaque(0.7, 0.7, 0.7),
+    "DarkGrey": _opaque(0.175, 0.175, 0.175),
+    "DarkGray": _opaque(0.175, 0.175, 0.175),
+    "LightGrey": _opaque(0.8, 0.8, 0.8),
+    "White": _opaque(1.0, 1.0, 1.0),
+    "FlatBlack": _opaque(0.1, 0.1, 0.1),
+    "Black": _opaque(0.0, 0.0, 0.0),
+    "Red": _opaque(1.0, 0.0, 0.0),
+    "RedBright": _opaque(0.87, 0.26, 0.07),
+    "Green": _opaque(0.0, 1.0, 0.0),
+    "Blue": _opaque(0.0, 0.0, 1.0),
+    "SkyBlue": _opaque(0.13, 0.44, 0.7),
+    "Yellow": _opaque(1.0, 1.0, 0.0),
+    "ZincYellow": _opaque(0.9725, 0.9529, 0.2078),
+    "DarkYellow": _opaque(0.7, 0.7, 0.0),
+    "Purple": _opaque(1.0, 0.0, 1.0),
+    "Turquoise": _opaque(0.0, 1.0, 1.0),
+    "Orange": _opaque(1.0, 0.5088, 0.0468),
+    "Indigo": _opaque(0.33, 0.0, 0.5),
+    "Gold": _opaque(0.8, 0.64869, 0.120759),
+    "Pioneer2Body": _opaque(0.681193, 0.000923, 0.000923),
+    "PioneerBody": _opaque(0.8, 0.1, 0.1),
+    "Wood": _opaque(0.62, 0.44, 0.26),
+    "WoodFloor": _opaque(0.55, 0.36, 0.2),
+    "WoodPallet": _opaque(0.7, 0.55, 0.35),
+    "WoodTexture": _opaque(0.62, 0.44, 0.26),
+    "Bricks": _opaque(0.6, 0.32, 0.25),
+    "CeilingTiled": _opaque(0.85, 0.85, 0.82),
+    "PaintedWall": _opaque(0.85, 0.82, 0.75),
+    "WindowFrame": _opaque(0.75, 0.75, 0.75),
+    "BuildingFrame": _opaque(0.75, 0.75, 0.75),
+    "Road": _opaque(0.25, 0.25, 0.25),
+    "Residential": _opaque(0.3, 0.3, 0.3),
+    "Tertiary": _opaque(0.3, 0.3, 0.3),
+    "Motorway": _opaque(0.25, 0.25, 0.25),
+    "Primary": _opaque(0.25, 0.25, 0.25),
+    "Secondary": _opaque(0.25, 0.25, 0.25),
+    "Lane_1": _opaque(0.25, 0.25, 0.25),
+    "Lanes_2": _opaque(0.25, 0.25, 0.25),
+    "Lanes_4": _opaque(0.25, 0.25, 0.25),
+    "Lanes_6": _opaque(0.25, 0.25, 0.25),
+    "Runway": _opaque(0.25, 0.25, 0.25),
+    "Pedestrian": _opaque(0.55, 0.55, 0.53),
+    "Footway": _opaque(0.55, 0.55, 0.53),
+    "Steps": _opaque(0.55, 0.55, 0.53),
+    "Grass": _opaque(0.25, 0.45, 0.15),
+    "Trunk": _opaque(0.4, 0.28, 0.18),
+    "JointAnchor": _opaque(1.0, 1.0, 1.0),
+    "CoM": _opaque(0.9, 0.9, 0.3),
+    "RedTransparent": (1.0, 0.0, 0.0, 0.5),
+    "GreenTransparent": (0.0, 1.0, 0.0, 0.5),
+    "BlueTransparent": (0.0, 0.0, 1.0, 0.5),
+    "GreyTransparent": (0.5, 0.5, 0.5, 0.5),
+    "BlackTransparent": (0.0, 0.0, 0.0, 0.5),
+    "YellowTransparent": (1.0, 1.0, 0.0, 0.5),
+    "OrangeTransparent": (1.0, 0.44, 0.0, 0.4),
+    "DarkMagentaTransparent": (0.6, 0.0, 0.6, 0.5),
+    "BlueLaser": (0.0, 0.0, 1.0, 0.4),
+    "LightBlueLaser": (0.5, 0.5, 1.0, 0.4),
+    "RedTransparentOverlay": (1.0, 0.0, 0.0, 0.5),
+    "GreenTransparentOverlay": (0.0, 1.0, 0.0, 0.5),
+    "BlueTransparentOverlay": (0.0, 0.0, 1.0, 0.5),
+    "OrangeTransparentOverlay": (1.0, 0.5, 0.0, 0.5),
+    "DarkOrangeTransparentOverlay": (0.7, 0.35, 0.0, 0.5),
+}
+_GLOWING: dict[str, Color] = {
+    "WhiteGlow": _opaque(1.0, 1.0, 1.0),
+    "RedGlow": _opaque(1.0, 0.0, 0.0),
+    "GreenGlow": _opaque(0.0, 1.0, 0.0),
+    "BlueGlow": _opaque(0.0, 0.0, 1.0),
+    "YellowGlow": _opaque(1.0, 1.0, 0.0),
+    "PurpleGlow": _opaque(1.0, 0.0, 1.0),
+    "TurquoiseGlow": _opaque(0.0, 1.0, 1.0),
+    "TurquoiseGlowOutline": _opaque(0.0, 1.0, 1.0),
+    "LightOn": _opaque(0.0, 1.0, 0.0),
+    "LightOff": _opaque(1.0, 0.0, 0.0),
+}
+
+
+def named_material(name: str) -> Material | None:
+    """Return one of Gazebo's own materials, such as ``Gazebo/Grey``, or None if there is no such name."""
+    if name == "__default__":
+        return Material(None, name)
+    room, _, short = name.partition("/")
+    if room != "Gazebo":
+        return None
+    if short in _GLOWING:
+        return Material(_GLOWING[short], name, "", _GLOWING[short])
+    return Material(_COLORS[short], name) if short in _COLORS else None
+
+
+def read_material(element: Element, source: Source) -> Material:
+    """Read ``<material>``: the script's colours, then those of the element itself, which win."""
+    script = element.first("script")
+    name = ""
+    if script is not None:
+        # Before SDF 1.4 the element contains the name itself.
+        name = source.text(script, "name") or script.text.strip()
+    known = named_material(name) if name else Material()
+    if known is None and script is not None:
+        known = _script_material(name, script, source)
+    if known is None:
+        source.warn(script, f"the material '{name}' does not exist: the part is grey")
+        known = Material(None, name)
+
+    color = source.color(element, "diffuse", None) or source.color(element, "ambient", None)
+    emissive = source.color(element, "emissive", known.emissive)
+    if emissive is not None and not any(emissive[:3]):
+        emissive = None
+    return Material(color or known.color, name, _map(element, source) or known.texture, emissive)
+
+
+def _map(element: Element, source: Source) -> str:
+    """Return the path of the picture in ``<pbr><metal><albedo_map>``, or an empty string."""
+    pbr = element.first("pbr")
+    for workflow in pbr.children if pbr else ():
+        uri = source.text(workflow, "albedo_map")
+        if uri:
+            path = source.find(uri)
+            if path is None:
+                source.warn(workflow, f"the picture {uri} does not exist")
+            return path or ""
+    return ""
+
+
+def _script_material(name: str, script: Element, source: Source) -> Material | None:
+    """Return a material that is defined in the files or folders of ``<uri>``s, or None."""
+    paths = [path for uri in script.all("uri") if (path := source.find(uri.text))]
+    for path in paths:
+        for file in _scripts(path):
+            found = _find_block(_text(file), name)
+            if found is not None:
+                folders = [
+                    os.path.dirname(file),
+                    *paths,
+                    os.path.join(os.path.dirname(file), "..", "textures"),
+                ]
+                return _block_material(name, found, folders)
+    return None
+
+
+def _scripts(path: str) -> list[str]:
+    if not os.path.isdir(path):
+        return [path]
+    try:
+        names = sorted(name for name in os.listdir(path) if name.endswith(".material"))
+    except OSError:
+        return []
+    return [os.path.join(path, name) for name in names[:_MAX_SCRIPTS]]
+
+
+def _text(file: str) -> str:
+    try:
+        if os.path.getsize(file) > _MAX_SCRIPT_BYTES:
+            return ""
+        return Path(file).read_text("utf-8", "replace")
+    except OSError:
+        return ""
+
+
+def _find_block(text: str, name: str) -> str | None:
+    """Return the text between the braces of a material's definition, or None if it is not in the text."""
+    for match in _BLOCK.finditer(text):
+        if match.group(1) == name:
+            level = 1
+            for index in range(match.end(), len(text)):
+                level += {"{": 1, "}": -1}.get(text[index], 0)
+                if not level:
+                    return text[match.end() : index]
+            return text[match.end() :]
+    return None
+
+
+def _block_material(name: str, block: str, folders: list[str]) -> Material:
+    colors: dict[str, Color] = {}
+    for match in _COLOR.finditer(block):
+        numbers = _numbers(match.group(2))
+        if len(numbers) >= 3:
+            red, green, blue = numbers[:3]
+            colors.setdefault(match.group(1), (red, green, blue, numbers[3] if len(numbers) > 3 else 1.0))
+    texture = _TEXTURE.search(block)
+    picture = _picture(texture.group(1), folders) if texture else ""
+    white = _opaque(1.0, 1.0, 1.0) if picture else None
+    emissive = colors.get("emissive")
+    if emissive is not None and not any(emissive[:3]):
+        emissive = None
+    return Material(colors.get("diffuse") or colors.get("ambient") or white, name, picture, emissive)
+
+
+def _numbers(text: str) -> list[float]:
+    numbers = []
+    for part in text.split():
+        try:
+            numbers.append(min(max(float(part), 0.0), 1.0))
+        except ValueError:
+            break
+    return numbers
+
+
+def _picture(name: str, folders: list[str]) -> str:
+    for folder in folders:
+        path = os.path.join(folder, name)
+        if name.lower().endswith(_PICTURES) and os.path.isfile(path):
+            return os.path.normpath(path)
+    return ""

@@ -1,0 +1,234 @@
+"""A file that is being read: typed values of its elements, the files that its URIs name, and one line per part left out."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from minirospy.base.errors import SdfError
+from minirospy.core.sdf.model import Color, Pose, Vector
+from minirospy.core.sdf.poses import pose_from_rpy
+from minirospy.core.sdf.text import Element, parse_document
+from minirospy.core.urdf.poses import quaternion_from_rpy
+
+__all__ = ["MAX_PARTS", "Resolve", "Shared", "Source", "no_files"]
+
+Resolve = Callable[[str], "str | None"]
+"""Return the path of the existing file or folder that a URI or a path names, or None.
+
+URIs begin with ``model://``, ``package://`` or ``file://``.
+"""
+
+MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
+MAX_INCLUDES = 16  # files and models inside each other; deeper ones are a mistake or an attack
+MAX_PARTS = 100_000  # links, joints and models that one world or spawn request may have
+_UNLIMITED = 1e16  # sdformat writes infinite limits as this number
+_TRUE = ("1", "true", "yes")
+_FALSE = ("0", "false", "no", "")
+
+
+def no_files(uri: str) -> str | None:
+    """Return the path if ``uri`` is an absolute path that exists: a resolver without any search path."""
+    path = uri.removeprefix("file://")
+    return path if os.path.isabs(path) and os.path.exists(path) else None
+
+
+@dataclass
+class Shared:
+    """What all files of one reading share: documents and found paths by name, and the number of parts so far."""
+
+    documents: dict[str, Element] = field(default_factory=dict)
+    found: dict[str, str | None] = field(default_factory=dict)
+    max_parts: int = MAX_PARTS
+    parts: int = 0
+
+    @property
+    def is_full(self) -> bool:
+        return self.parts > self.max_parts
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file and its context.
+
+    file: its name in messages. folder: its folder, for relative URIs, or an empty string.
+    version: of its SDF. chain: the paths of the files that include it, itself last. depth: the models around its elements.
+    """
+
+    file: str
+    resolve: Resolve
+    warnings: list[str]
+    shared: Shared
+    folder: str = ""
+    version: tuple[int, int] = (1, 7)
+    chain: tuple[str, ...] = ()
+    depth: int = 0
+
+    def warn(self, element: Element | None, text: str) -> None:
+        """Add a line about a part that is left out or changed. Repeated lines are added once."""
+        line = f"{self.file}:{element.line}: {text}" if element and element.line else f"{self.file}: {text}"
+        if line not in self.warnings[-100:]:
+            self.warnings.append(line)
+
+    def error(self, element: Element, text: str) -> SdfError:
+        """Return the error for an element that cannot be read."""
+        return SdfError(self.file, element.line, text)
+
+    def count(self, element: Element, parts: int = 1) -> None:
+        """Count links, joints and models. Raise SdfError if there are too many."""
+        self.shared.parts += parts
+        if self.shared.is_full:
+            raise self.error(element, f"there are more than {self.shared.max_parts} links, joints and models")
+
+    # ---- other files
+
+    def find(self, uri: str) -> str | None:
+        """Return the path of the existing file or folder that a URI names, or None. Relative ones: below this file's folder."""
+        uri = uri.strip()
+        if not uri:
+            return None
+        if self.folder and "://" not in uri and not os.path.isabs(uri):
+            near = os.path.join(self.folder, uri)
+            if os.path.exists(near):
+                return near
+        if uri not in self.shared.found:
+            self.shared.found[uri] = self.resolve(uri)
+        return self.shared.found[uri]
+
+    def open(self, element: Element, path: str) -> tuple[Element, Source]:
+        """Return the root element of a file that this one includes, and its source.
+
+        Raise SdfError if it cannot be read, is not XML, or includes itself.
+        """
+        path = os.path.realpath(path)
+        if path in self.chain:
+            names = " -> ".join(
+                os.path.basename(os.path.dirname(each)) or each for each in (*self.chain, path)
+            )
+            raise self.error(element, f"{path} includes itself: {names}")
+        if len(self.chain) >= MAX_INCLUDES:
+            raise self.error(element, f"files include each other more than {MAX_INCLUDES} levels deep")
+        if path not in self.shared.documents:
+            self.shared.documents[path] = parse_document(_read(path), path)
+        inner = replace(self, file=path, folder=os.path.dirname(path), chain=(*self.chain, path))
+        return self.shared.documents[path], inner
+
+    def inside(self, element: Element) -> Source:
+        """Return the source of a model inside another one. Raise SdfError if there are too many levels."""
+        if self.depth >= MAX_INCLUDES:
+            raise self.error(element, f"models are nested more than {MAX_INCLUDES} levels deep")
+        return replace(self, depth=self.depth + 1)
+
+    # ---- values
+
+    def name(self, element: Element) -> str:
+        """Return the attribute ``name``. Raise SdfError if it is missing or empty."""
+        name = element.attributes.get("name", "").strip()
+        if not name:
+            raise self.error(element, f"<{element.tag}> has no name")
+        return name
+
+    def text(self, element: Element | None, tag: str, default: str = "") -> str:
+        """Return the text of the first child with this tag, or the default if there is none."""
+        child = element.first(tag) if element else None
+        return child.text.strip() if child is not None else default
+
+    def flag(self, element: Element | None, tag: str, default: bool) -> bool:
+        """Return a Boolean child's value."""
+        child = element.first(tag) if element else None
+        if child is None:
+            return default
+        text = child.text.strip().lower()
+        if text in _TRUE or text in _FALSE:
+            return text in _TRUE
+        raise self.error(child, f"<{tag}> is '{child.text.strip()}': write true or false")
+
+    def number(self, element: Element | None, tag: str, default: float) -> float:
+        """Return a child's number, which may be infinite. Raise SdfError if it is not a number."""
+        child = element.first(tag) if element else None
+        if child is None or not child.text.strip():
+            return default
+        return self.numbers(child, (1,))[0]
+
+    def limit(self, element: Element | None, tag: str, default: float) -> float:
+        """Return a child's number; a huge one is infinite."""
+        value = self.number(element, tag, default)
+        return math.copysign(math.inf, value) if abs(value) >= _UNLIMITED else value
+
+    def vector(self, element: Element | None, tag: str, default: Vector) -> Vector:
+        """Return a child's three numbers."""
+        child = element.first(tag) if element else None
+        if child is None or not child.text.strip():
+            return default
+        x, y, z = self.finite(child, (3,))
+        return x, y, z
+
+    def color(self, element: Element | None, tag: str, default: Color | None) -> Color | None:
+        """Return a child's colour; without an opacity it is opaque."""
+        child = element.first(tag) if element else None
+        if child is None or not child.text.strip():
+            return default
+        red, green, blue, *opacity = (min(max(value, 0.0), 1.0) for value in self.finite(child, (3, 4)))
+        return red, green, blue, opacity[0] if opacity else 1.0
+
+    def pose(self, element: Element) -> Pose:
+        """Return the pose in an element's text: ``x y z roll pitch yaw``, or with a quaternion (``rotation_format``)."""
+        if not element.text.strip():
+            return Pose()
+        if element.attributes.get("rotation_format") == "quat_xyzw":
+            x, y, z, qx, qy, qz, qw = self.finite(element, (7,))
+            length = math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+            if not length:
+                return Pose((x, y, z))
+            return Pose((x, y, z), (qx / length, qy / length, qz / length, qw / length))
+        x, y, z, roll, pitch, yaw = self.finite(element, (6,))
+        if element.attributes.get("degrees", "").strip().lower() in _TRUE:
+            return Pose(
+                (x, y, z), quaternion_from_rpy(math.radians(roll), math.radians(pitch), math.radians(yaw))
+            )
+        return pose_from_rpy((x, y, z), (roll, pitch, yaw))
+
+    def finite(self, element: Element, counts: tuple[int, ...]) -> list[float]:
+        """Return an element's numbers. Raise SdfError if one is infinite, or as :meth:`numbers` does."""
+        values = self.numbers(element, counts)
+        if not all(map(math.isfinite, values)):
+            raise self.error(element, f"<{element.tag}> has an infinite number: '{_short(element.text)}'")
+        return values
+
+    def numbers(self, element: Element, counts: tuple[int, ...]) -> list[float]:
+        """Return an element's numbers. Raise SdfError if one is not a number (or NaN), or if there are too few or too many."""
+        values = []
+        for part in element.text.split():
+            try:
+                value = float(part)
+            except ValueError:
+                raise self.error(
+                    element, f"<{element.tag}> is '{_short(element.text)}': '{_short(part)}' is not a number"
+                ) from None
+            if math.isnan(value):
+                raise self.error(element, f"<{element.tag}> is '{_short(element.text)}': NaN is not allowed")
+            values.append(value)
+        if len(values) not in counts:
+            expected = " or ".join(map(str, counts))
+            raise self.error(
+                element,
+                f"<{element.tag}> has {len(values)} numbers instead of {expected}: '{_short(element.text)}'",
+            )
+        return values
+
+
+def _read(path: str) -> bytes:
+    try:
+        if os.path.getsize(path) > MAX_FILE_BYTES:
+            raise SdfError(path, 0, f"the file is larger than {MAX_FILE_BYTES // 1024 // 1024} MB")
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise SdfError(path, 0, f"cannot be read: {error.strerror or error}") from None
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
