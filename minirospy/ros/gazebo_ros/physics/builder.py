@@ -6,7 +6,19 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from minirospy.core.sdf.model import IDENTITY, Axis, Joint, Link, Model, Physics, Pose, Quaternion, Vector
+from minirospy.core.sdf.model import (
+    IDENTITY,
+    Axis,
+    Collision,
+    Cylinder,
+    Joint,
+    Link,
+    Model,
+    Physics,
+    Pose,
+    Quaternion,
+    Vector,
+)
 from minirospy.core.sdf.pose_math import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
@@ -123,7 +135,7 @@ class Builder:
                 f"{scoped}::{collision.name}",
                 collision,
                 is_static=model.is_static or joint_is_rigid(tree, link.name),
-                pose=collision.pose,
+                is_wheel=joint is not None and _is_wheel(joint, collision),
             )
 
     def _add_joint(self, body: Any, scoped: str, joint: Joint) -> None:
@@ -237,6 +249,22 @@ def joint_is_rigid(tree: LinkTree, link: str) -> bool:
     while (joint := tree.joint_of.get(link)) is not None and joint.kind in FIXED_KINDS:
         link = joint.parent
     return link == WORLD
+
+
+def _is_wheel(joint: Joint, collision: Collision) -> bool:
+    """Return whether a collision is a short cylinder that a joint without limits turns about its own axis."""
+    shape = collision.geometry
+    if joint.kind not in ("continuous", "revolute") or not isinstance(shape, Cylinder):
+        return False
+    if (joint.kind == "revolute" and has_limits(joint.axis)) or shape.length > 2 * shape.radius:
+        return False
+    axis, along = _direction(joint, joint.axis), rotate(collision.pose.orientation, (0.0, 0.0, 1.0))
+    length = math.hypot(*axis)
+    cosine = sum(a * b for a, b in zip(axis, along, strict=True)) / length
+    offset = [a - b for a, b in zip(joint.pose.position, collision.pose.position, strict=True)]
+    shift = sum(a * b for a, b in zip(offset, along, strict=True))
+    distance = math.sqrt(max(sum(a * a for a in offset) - shift * shift, 0.0))
+    return abs(cosine) > 0.999 and distance < 0.01 * shape.radius
 
 
 def _direction(joint: Joint, axis: Axis) -> Vector:

@@ -18,6 +18,7 @@ from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
+from minirospy.ros.gazebo_ros.physics.shapes import PART
 from minirospy.ros.gazebo_ros.physics.states import Contact, LostModel, RayHits, Wrench
 
 __all__ = ["Simulation"]
@@ -234,7 +235,7 @@ class Simulation:
         for model in self._models.values():
             model.bind()
         model = self._engine.model
-        self._geom_names = [model.geom(index).name.partition("#")[0] for index in range(model.ngeom)]
+        self._geom_names = [model.geom(index).name.partition(PART)[0] for index in range(model.ngeom)]
         bodies = [model.body(index).name for index in range(model.nbody)]
         owners = {link.id: name for name, each in self._models.items() for link in each.links.values()}
         assert len(owners) == len(bodies) - 1
