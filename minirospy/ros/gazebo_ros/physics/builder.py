@@ -88,9 +88,9 @@ class Builder:
         except (ValueError, TypeError, OSError) as error:
             self.delete(built)
             raise SimulationError(f"model '{name}': {_first_line(error)}") from error
-        except SimulationError:
+        except SimulationError as error:
             self.delete(built)
-            raise
+            raise SimulationError(f"model '{name}': {error}") from error.__cause__
         return built
 
     def delete(self, built: BuiltModel) -> None:
@@ -105,6 +105,7 @@ class Builder:
         self, built: BuiltModel, tree: LinkTree, model: Model, name: str, pose: Pose, link: Link
     ) -> None:
         joint = tree.joint_of.get(link.name)
+        _check_numbers(link, joint)
         scoped = f"{name}::{link.name}"
         if joint is None or joint.parent == WORLD:
             body = self.spec.worldbody.add_body(name=scoped)
@@ -213,7 +214,7 @@ class Builder:
     def _add_equality(self, built: BuiltModel, kind: Any, first: str, second: str, data: list[float]) -> None:
         row = self.spec.add_equality(type=kind, objtype=self._mujoco.mjtObj.mjOBJ_BODY, name1=first)
         row.name2 = second
-        row.data = data
+        row.data[: len(data)] = data
         row.solref = [0.005, 1.0]
         built.others.append(row)
 
@@ -227,7 +228,8 @@ class Builder:
                 type=self._mujoco.mjtEq.mjEQ_JOINT, objtype=self._mujoco.mjtObj.mjOBJ_JOINT
             )
             row.name1, row.name2 = f"{name}::{joint.name}", f"{name}::{mimic.joint}"
-            row.data = [mimic.offset, mimic.multiplier] + [0.0] * 9
+            row.data[:2] = (mimic.offset, mimic.multiplier)
+            row.data[2:] = 0.0
             row.solref = [0.005, 1.0]
             built.others.append(row)
 
@@ -265,6 +267,21 @@ def _is_wheel(joint: Joint, collision: Collision) -> bool:
     shift = sum(a * b for a, b in zip(offset, along, strict=True))
     distance = math.sqrt(max(sum(a * a for a in offset) - shift * shift, 0.0))
     return abs(cosine) > 0.999 and distance < 0.01 * shape.radius
+
+
+def _check_numbers(link: Link, joint: Joint | None) -> None:
+    """Raise SimulationError if a pose or an inertia is not finite: MuJoCo accepts NaN."""
+    inertial = link.inertial
+    values = [*link.pose.position, *link.pose.orientation, inertial.mass, *inertial.inertia]
+    values += [*inertial.pose.position, *inertial.pose.orientation]
+    for collision in link.collisions:
+        values += [*collision.pose.position, *collision.pose.orientation]
+    if not all(map(math.isfinite, values)):
+        raise SimulationError(f"link '{link.name}' has a pose or inertia that is not finite")
+    if joint is not None and not all(
+        map(math.isfinite, (*joint.pose.position, *joint.axis.xyz, *joint.axis2.xyz))
+    ):
+        raise SimulationError(f"joint '{joint.name}' has a pose or axis that is not finite")
 
 
 def _direction(joint: Joint, axis: Axis) -> Vector:

@@ -127,7 +127,8 @@ class Simulation:
             speeds = dict.fromkeys(candidates, 0.0)
             for dof, name in enumerate(self._model_of_dof):
                 if name in speeds:
-                    speeds[name] = max(speeds[name], abs(float(velocities[dof])))
+                    speed = abs(float(velocities[dof]))
+                    speeds[name] = max(speeds[name], speed if math.isfinite(speed) else math.inf)
             if speeds:
                 source = max(speeds, key=lambda name: speeds[name])
                 lost = {name: why for name, why in lost.items() if name == source or name not in candidates}
