@@ -18,6 +18,7 @@ from minirospy.core.sdf.model import (
     Pose,
     Quaternion,
     Vector,
+    World,
 )
 from minirospy.core.sdf.pose_math import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
@@ -30,6 +31,8 @@ __all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits"]
 FIXED_KINDS = ("fixed",)
 MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
 MIN_RANGE = 1e-5  # MuJoCo refuses a range of length zero
+MAX_LIGHTS = 8  # of OpenGL
+VISUAL = "\tvisual"  # separates the names of visuals from those of collisions
 MOTOR_DAMPING = (
     0.9999  # MuJoCo's largest impedance: rows of joint friction and motors are as hard as it allows
 )
@@ -66,6 +69,7 @@ class Builder:
         option.impratio = 10.0  # friction creeps less
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.set_physics(physics)
+        self.has_visuals = False  # they cost time and memory, and only cameras need them
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity of the next compilation."""
@@ -92,6 +96,51 @@ class Builder:
             self.delete(built)
             raise SimulationError(f"model '{name}': {error}") from error.__cause__
         return built
+
+    def add_scene(self, world: World) -> None:
+        """Add the background and the lights of a world, and from now on the visuals of models."""
+        self.has_visuals = True
+        mujoco = self._mujoco
+        red, green, blue, _ = world.background
+        self.spec.add_texture(
+            name="background",
+            type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+            rgb1=[red, green, blue],
+            rgb2=[red, green, blue],
+            width=8,
+            height=48,
+        )
+        ambient = [min(value, 1.0) for value in world.ambient[:3]]
+        head = self.spec.visual.headlight
+        head.ambient = ambient
+        head.diffuse = [0.2, 0.2, 0.2] if world.lights else [0.6, 0.6, 0.6]
+        head.specular = [0.0, 0.0, 0.0]
+        for light in world.lights[:MAX_LIGHTS]:
+            row = self.spec.worldbody.add_light(
+                pos=light.pose.position, dir=rotate(light.pose.orientation, light.direction)
+            )
+            row.diffuse, row.specular = light.diffuse[:3], light.specular[:3]
+            row.castshadow = light.casts_shadows
+            is_directional = light.kind == "directional"
+            if hasattr(row, "directional"):
+                row.directional = is_directional
+            else:
+                kinds = mujoco.mjtLightType
+                names = {"directional": kinds.mjLIGHT_DIRECTIONAL, "spot": kinds.mjLIGHT_SPOT}
+                row.type = names.get(light.kind, kinds.mjLIGHT_POINT)
+
+    def add_visuals(self, built: BuiltModel, model: Model, name: str) -> list[str]:
+        """Add a model's visuals. Return a line for each one that cannot be read: the picture lacks it."""
+        warnings: list[str] = []
+        for link in model.links.values():
+            for visual in link.visuals:
+                scoped = f"{name}::{link.name}::{visual.name}{VISUAL}"
+                try:
+                    self.shapes.add_visual(built.bodies[link.name], scoped, visual)
+                except (SimulationError, ValueError, TypeError) as error:
+                    warnings.append(f"model '{name}': visual '{visual.name}': {_first_line(error)}")
+        return warnings
 
     def delete(self, built: BuiltModel) -> None:
         """Delete a model from the spec."""

@@ -108,11 +108,11 @@ class Shapes:
             if piece.group == GROUP_RAY_ONLY:
                 geom.contype = geom.conaffinity = 0
 
-    def add_visual(self, body: Any, name: str, visual: Visual, pose: Pose) -> None:
-        """Add a visual's geoms, which touch nothing; ``pose`` is that of the visual in the body."""
+    def add_visual(self, body: Any, name: str, visual: Visual) -> None:
+        """Add a visual's geoms, which touch nothing."""
         opacity = 1.0 - min(max(visual.transparency, 0.0), 1.0)
         for index, piece in enumerate(self._visible(visual.geometry)):
-            geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, pose)
+            geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, visual.pose)
             geom.group = GROUP_VISUAL
             geom.contype = geom.conaffinity = 0
             red, green, blue, alpha = visual.material.color or piece.color or _GREY
