@@ -79,7 +79,7 @@ class Renderer:
     def depth(self) -> NDArray[np.float32]:
         """Return the distances along the camera's axis (height, width) in metres; infinite where nothing is."""
         values = np.empty((self.height, self.width), np.float32)
-        self._draw()
+        self._draw(has_background=False)
         self._mujoco.mjr_readPixels(None, values, self._area, self._context)
         # The buffer has 1 at the near plane and 0 at the far one.
         near, far = self._near, self._far
@@ -114,9 +114,10 @@ class Renderer:
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._generation = engine.generation
 
-    def _draw(self) -> None:
+    def _draw(self, *, has_background: bool = True) -> None:
         if self._scene is None:
             raise SimulationError("a picture is drawn after it is captured")
+        self._scene.flags[self._mujoco.mjtRndFlag.mjRND_SKYBOX] = has_background
         self._gl.make_current()
         self._mujoco.mjr_render(self._area, self._scene, self._context)
 
