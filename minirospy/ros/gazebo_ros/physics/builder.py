@@ -184,7 +184,7 @@ class Builder:
                 body,
                 f"{scoped}::{collision.name}",
                 collision,
-                is_static=model.is_static or joint_is_rigid(tree, link.name),
+                is_static=model.is_static,
                 is_wheel=joint is not None and _is_wheel(joint, collision),
             )
 
@@ -293,13 +293,6 @@ def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
 def has_limits(axis: Axis) -> bool:
     """Return whether at least one limit is finite."""
     return max(axis.lower, axis.upper) < MAX_LIMIT or min(axis.lower, axis.upper) > -MAX_LIMIT
-
-
-def joint_is_rigid(tree: LinkTree, link: str) -> bool:
-    """Return whether fixed joints connect a link to the world."""
-    while (joint := tree.joint_of.get(link)) is not None and joint.kind in FIXED_KINDS:
-        link = joint.parent
-    return link == WORLD
 
 
 def _is_wheel(joint: Joint, collision: Collision) -> bool:
