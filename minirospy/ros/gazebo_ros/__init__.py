@@ -1,1 +1,4 @@
-"""The simulator under Gazebo's names: the node /gazebo, its programs, and a library of models and worlds."""
+"""The simulation: a node that answers under the names of Gazebo's, on MuJoCo.
+
+Source: http://wiki.ros.org/gazebo_ros.
+"""
