@@ -49,10 +49,8 @@ CPP = {
     "teb_local_planner": _NAVIGATION,
     "voxel_grid": _NAVIGATION,
     # Arms and controllers.
-    "controller_manager": "ros_control, in C++",
     "diff_drive_controller": "ros_control, in C++",
     "effort_controllers": "ros_control, in C++",
-    "hardware_interface": "ros_control, in C++",
     "joint_state_controller": "ros_control, in C++",
     "joint_trajectory_controller": "ros_control, in C++",
     "moveit_commander": "MoveIt, in C++",

@@ -16,6 +16,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.base.times import Duration, Time
 
 __all__ = [
+    "COMMAND_FIELDS",
     "COMMAND_INTERFACES",
     "Conflict",
     "ControllerInfo",
@@ -64,6 +65,13 @@ COMMAND_INTERFACES = frozenset(
     {Interface.POSITION, Interface.VELOCITY, Interface.EFFORT, Interface.POS_VEL, Interface.POS_VEL_ACC}
 )
 """Interfaces through which a controller commands joints. Only one running controller may claim a joint."""
+
+COMMAND_FIELDS = {
+    Interface.POSITION: "position_command",
+    Interface.VELOCITY: "velocity_command",
+    Interface.EFFORT: "effort_command",
+}
+"""The attribute of a joint that holds the command of an interface, for interfaces whose command is one number."""
 
 
 @dataclass(slots=True, eq=False)
@@ -177,6 +185,9 @@ class RobotHardware:
 
     def write(self, time: Time, period: Duration) -> None:
         """Send the commands of the joints whose ``active`` is not None to the motors."""
+
+    def close(self) -> None:
+        """Close the device, after a last ``write`` in which no joint is active; both are called even if the hardware failed."""
 
     def find_conflicts(self, controllers: Sequence[ControllerInfo]) -> list[Conflict]:
         """Return the joints that several of these controllers, which would run together, claim."""

@@ -27,6 +27,10 @@ class Parameters:
             value = value[part]
         return value
 
+    def has_number(self, key: str) -> bool:
+        """Return whether the value is an int or a float."""
+        return isinstance(self.get(key), (int, float)) and not isinstance(self.get(key), bool)
+
     def number(self, key: str, default: float) -> float:
         """Return an int or a float as a float, or the default. Not-a-number is returned: a caller that cannot use it checks."""
         value = self.get(key)
@@ -51,6 +55,13 @@ class Parameters:
     def text(self, key: str, default: str) -> str:
         """Return a str, or the default."""
         return self._typed(key, str, default)
+
+    def names(self, key: str) -> list[str] | None:
+        """Return a list of str, or None if the value is something else."""
+        value = self.get(key)
+        if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+            return None
+        return list(value)
 
     def below(self, key: str) -> Parameters:
         """Return the parameters of a namespace below this one; it has none if it is not set."""

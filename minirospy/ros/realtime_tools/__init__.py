@@ -1,1 +1,1 @@
-"""Publishers for loops that must not wait."""
+"""Publishers and action servers for loops that must not wait."""

@@ -1,4 +1,4 @@
-"""Publish from a control loop without waiting: ``from realtime_tools import RealtimePublisher``.
+"""Publish and serve actions from a control loop without waiting: ``from realtime_tools import RealtimePublisher``.
 
 ROS's package has only C++ headers. Source: http://wiki.ros.org/realtime_tools.
 """
@@ -8,13 +8,18 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from queue import SimpleQueue
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from minirospy import client as rospy
-from minirospy.core.idl.protocols import Message
+from minirospy.core.control.goal import CANCELLED, MonitoredGoal, Outcome
+from minirospy.core.graph.goals import GoalEvent
+from minirospy.core.idl.protocols import Action, Message
+from minirospy.ros.actionlib.actionlib.handle import ServerGoalHandle
+from minirospy.ros.actionlib.actionlib.server import ActionServer
 
-__all__ = ["RealtimePublisher"]
+__all__ = ["RealtimeActionServer", "RealtimePublisher", "Rejection"]
 
 _T = TypeVar("_T", bound=Message)
 
@@ -52,6 +57,140 @@ class RealtimePublisher(Generic[_T]):
             pass  # closed, or the node shuts down
 
 
+class Rejection(Exception):
+    """Raised by the ``accept`` of a RealtimeActionServer: the goal is rejected, with a result and a status text."""
+
+    def __init__(self, result: Message, text: str = "") -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class RealtimeActionServer:
+    """An action server for a control loop, with one active goal: a new one preempts it.
+
+    ``accept(message)`` checks a goal in a thread of the library, and hands it to the loop. It returns the goal, whose outcome
+    the loop decides, or raises Rejection. ``cancel()`` makes the loop stop, because a client has cancelled the active goal.
+    ``make_result(outcome)`` returns the message of the result. ``period``: ns of ROS time between two feedbacks. A goal's
+    success is reported at such a time, too; all other outcomes are reported immediately.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        action: type[Action],
+        accept: Callable[[Any], MonitoredGoal],
+        cancel: Callable[[], None],
+        make_result: Callable[[Outcome], Message],
+        period: int,
+    ) -> None:
+        self._accept = accept
+        self._cancel = cancel
+        self._make_result = make_result
+        self._period = period
+        self._active: _Active | None = None
+        self._is_running = False
+        self._server = ActionServer(name, action, self._receive, self._receive_cancel, auto_start=False)
+        self._server.start()
+
+    def start(self) -> None:
+        """Note that the loop runs. Call it in the loop's thread, like :meth:`report` and :meth:`stop`."""
+        self._is_running = True
+
+    def report(self, time: int) -> bool:
+        """Report the active goal's outcome if it is due; return whether feedback is due. ``time``: ns of ROS time."""
+        active = self._active
+        if active is None:
+            return False
+        outcome, period = active.goal.outcome, self._period
+        if active.due is None or active.due - time > period:
+            active.due = time + period  # the goal's first cycle, or ROS time went back
+        is_due = time >= active.due
+        if is_due:
+            active.due += period * (1 + (time - active.due) // period)
+        if outcome is None:
+            return is_due
+        if is_due or outcome.event is not GoalEvent.SUCCEED:
+            self._finish(active, _call_soon)
+        return False
+
+    def publish_feedback(self, feedback: Message) -> None:
+        """Send feedback on the active goal."""
+        if active := self._active:
+            _call_soon(lambda: active.handle.publish_feedback(feedback))
+
+    def preempt(self) -> None:
+        """Cancel the active goal, if there is one, from any thread but the loop's."""
+        if active := self._active:
+            self._finish(active, _call)
+
+    def stop(self) -> None:
+        """Cancel the active goal, if there is one, because the loop does not run any more."""
+        self._is_running = False
+        if active := self._active:
+            self._finish(active, _call_soon)
+
+    def close(self) -> None:
+        """Cancel the active goal, and close the action's topics."""
+        self._is_running = False
+        self.preempt()
+        self._server.stop()
+
+    def _receive(self, handle: ServerGoalHandle) -> None:
+        try:
+            goal = self._accept(handle.get_goal())
+        except Rejection as rejection:
+            handle.set_rejected(rejection.result, str(rejection))
+            return
+        self.preempt()
+        # The action server's lock is held until this returns, so that the outcome is reported after the acceptance.
+        self._active = _Active(handle, goal)
+        handle.set_accepted()
+        if not self._is_running:
+            self.preempt()  # the loop has stopped since
+
+    def _receive_cancel(self, handle: ServerGoalHandle) -> None:
+        active = self._active
+        if active is not None and active.handle == handle:
+            if active.goal.outcome is None:
+                self._cancel()
+            self._finish(active, _call)
+
+    def _finish(self, active: _Active, call: Callable[[Callable[[], None]], None]) -> None:
+        """Report the outcome of a goal that ends now. It is cancelled if it has none."""
+        if self._active is active:
+            self._active = None
+        active.goal.finish(CANCELLED)
+        outcome = active.goal.outcome
+        assert outcome is not None
+        # Only one of the threads that get here together reports it.
+        if active.report_once.acquire(blocking=False):
+            ends = {
+                GoalEvent.SUCCEED: active.handle.set_succeeded,
+                GoalEvent.ABORT: active.handle.set_aborted,
+                GoalEvent.CANCEL: active.handle.set_canceled,
+            }
+            call(lambda: ends[outcome.event](self._make_result(outcome)))
+
+
+@dataclass(eq=False)
+class _Active:
+    """The goal that a RealtimeActionServer follows."""
+
+    handle: ServerGoalHandle
+    goal: MonitoredGoal
+    due: int | None = None  # ns of ROS time of the next report; None until the first cycle
+    report_once: threading.Lock = field(default_factory=threading.Lock)  # never released
+
+
+def _call(function: Callable[[], None]) -> None:
+    function()
+
+
+def _call_soon(function: Callable[[], None]) -> None:
+    """Call a function in the common thread."""
+    _sender().put(function)
+
+
 _lock = threading.Lock()
 _queues: list[SimpleQueue[Callable[[], None]]] = []
 
@@ -69,4 +208,11 @@ def _sender() -> SimpleQueue[Callable[[], None]]:
 
 def _send(queue: SimpleQueue[Callable[[], None]]) -> None:
     while True:
-        queue.get()()
+        function = queue.get()
+        # One topic's fault must not end the thread that serves all.
+        try:
+            function()
+        except rospy.ROSException:
+            pass  # the node shuts down
+        except Exception as error:  # noqa: BLE001 - a message that cannot be serialized raises anything
+            rospy.logerr("a controller's message was not sent: %s", error)

@@ -1,0 +1,54 @@
+"""The rate at which a controller publishes, which is at most the rate of its loop."""
+
+from __future__ import annotations
+
+from minirospy.base.times import Time
+from minirospy.core.control.controller import ControllerError
+from minirospy.core.control.parameters import Parameters
+
+__all__ = ["PublishRate", "nanoseconds"]
+
+MAX_BEHIND = (
+    1_000_000_000  # ns: after a longer gap, publish from now on, instead of in each cycle until caught up
+)
+
+
+def nanoseconds(time: Time) -> int:
+    """Return a time as an int, which is faster to compute with, and exact."""
+    return time.secs * 1_000_000_000 + time.nsecs
+
+
+class PublishRate:
+    """Decides in which cycles a controller publishes. The rate holds in ROS time; 0 and less is never."""
+
+    def __init__(self, hertz: float) -> None:
+        self.set(hertz)
+        self._last: int | None = None  # ns: the time of the last message by the rate
+
+    @classmethod
+    def read(cls, parameters: Parameters) -> PublishRate:
+        """Return the rate of the parameter ``publish_rate``. Raise ControllerError if it is not set."""
+        if not parameters.has_number("publish_rate"):
+            raise ControllerError("Parameter 'publish_rate' not set")
+        return cls(parameters.finite("publish_rate", 0.0))
+
+    def set(self, hertz: float) -> None:
+        """Change the rate."""
+        self._period = round(1e9 / hertz) if hertz > 0.0 else None
+
+    def start(self, time: Time, *, is_due: bool = False) -> None:
+        """Start to count: the first message is due after a period or, if ``is_due``, in the next cycle."""
+        self._last = nanoseconds(time) - (self._period or 0) * is_due
+
+    def is_due(self, time: Time) -> bool:
+        """Return whether to publish in this cycle. If the time has gone backwards, count from it."""
+        if self._period is None:
+            return False
+        now = nanoseconds(time)
+        if self._last is None or now < self._last:
+            self._last = now
+        behind = now - self._last
+        if behind <= self._period:
+            return False
+        self._last = now if behind > self._period + MAX_BEHIND else self._last + self._period
+        return True

@@ -1,0 +1,57 @@
+"""Limits of a velocity, its acceleration and its jerk. Source: http://wiki.ros.org/diff_drive_controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from minirospy.core.control.parameters import Parameters
+
+__all__ = ["Range", "SpeedLimiter"]
+
+
+@dataclass(frozen=True)
+class Range:
+    """The least and the greatest value."""
+
+    low: float
+    high: float
+
+    def clamp(self, value: float, factor: float = 1.0) -> float:
+        """Return the nearest value in the range times ``factor``."""
+        return min(max(self.low * factor, value), self.high * factor)
+
+
+@dataclass(frozen=True)
+class SpeedLimiter:
+    """Limits in m or rad, s; None is unlimited."""
+
+    velocity: Range | None = None
+    acceleration: Range | None = None
+    jerk: Range | None = None
+
+    @classmethod
+    def read(cls, parameters: Parameters) -> SpeedLimiter:
+        """Return the limits of a namespace such as ``linear/x``. Raise ValueError if a limit is not finite."""
+
+        def read_range(name: str) -> Range | None:
+            high = parameters.finite(f"max_{name}", 0.0)
+            low = parameters.finite(f"min_{name}", -high)
+            return Range(low, high) if parameters.flag(f"has_{name}_limits", False) else None
+
+        return cls(read_range("velocity"), read_range("acceleration"), read_range("jerk"))
+
+    def limit(self, velocity: float, last: float, before_last: float, dt: float) -> float:
+        """Return the velocity that is nearest to the wanted one, ``dt`` seconds after the last one.
+
+        As in ROS, the jerk of one cycle is limited to twice its limit, and the limits of acceleration and velocity are
+        applied after it.
+        """
+        dt = max(dt, 0.0)
+        if self.jerk is not None:
+            change = last - before_last
+            velocity = last + change + self.jerk.clamp(velocity - last - change, 2.0 * dt * dt)
+        if self.acceleration is not None:
+            velocity = last + self.acceleration.clamp(velocity - last, dt)
+        if self.velocity is not None:
+            velocity = self.velocity.clamp(velocity)
+        return velocity

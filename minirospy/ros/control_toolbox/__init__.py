@@ -1,0 +1,1 @@
+"""PID controllers whose gains are parameters."""

@@ -1,0 +1,107 @@
+"""PID controllers whose gains are parameters: ``from control_toolbox import Pid``.
+
+ROS's package has this class in C++ only. Source: http://wiki.ros.org/control_toolbox.
+"""
+
+from __future__ import annotations
+
+import math
+
+from control_msgs.msg import PidState
+
+from minirospy import client as rospy
+from minirospy.core.control import pid
+from minirospy.core.control.parameters import Parameters
+from minirospy.core.control.pid import PidGains, PidTerms
+from minirospy.ros.control_toolbox.control_toolbox.cfg import ParametersConfig
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import Config
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
+from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
+
+__all__ = ["Pid", "PidGains"]
+
+
+class Pid(pid.Pid):
+    """A PID controller; :meth:`serve` lets dynamic_reconfigure change its gains, and publishes its terms."""
+
+    _server: Server | None = None
+    _state: RealtimePublisher[PidState] | None = None
+
+    @classmethod
+    def read(cls, parameters: Parameters) -> Pid:
+        """Return a controller with the gains of a namespace. It has no topics yet.
+
+        Raise ControllerError if ``p`` is missing, ValueError if a gain is not finite.
+        """
+        return cls(*PidGains.read(parameters))
+
+    def serve(self, parameters: Parameters) -> None:
+        """Offer dynamic_reconfigure in the namespace; publish its topic ``state`` if its parameter ``publish_state`` is true."""
+        if parameters.flag("publish_state", False):
+            self._state = RealtimePublisher(f"{parameters.namespace}/state", PidState)
+            self.on_computed = self._publish
+        self._server = Server(ParametersConfig, self._reconfigure, parameters.namespace)
+
+    def set_gains(self, gains: PidGains) -> None:
+        """Change the gains, also those that dynamic_reconfigure shows. It calls the master: do not call it in ``update``."""
+        self.gains = gains
+        if self._server is not None:
+            self._server.update_configuration(_config(gains))
+
+    def close(self) -> None:
+        """Close the topics and the service."""
+        if self._server is not None:
+            self._server.set_service.shutdown()
+            self._server.descr_topic.unregister()
+            self._server.update_topic.unregister()
+        if self._state is not None:
+            self._state.close()
+
+    def _reconfigure(self, config: Config, level: int) -> Config:
+        is_first = level == ~0  # the server has not yet read those gains that are not parameters
+        if is_first:
+            config.update(_config(self.gains))
+            return config
+
+        gains = PidGains(
+            config.p, config.i, config.d, config.i_clamp_max, config.i_clamp_min, config.antiwindup
+        )
+        if all(map(math.isfinite, gains)):
+            self.gains = gains
+        else:
+            rospy.logwarn(
+                "Gains must be finite numbers: the gains of %s stay.", self._server and self._server.ns
+            )
+            config.update(_config(self.gains))
+        return config
+
+    def _publish(self, terms: PidTerms) -> None:
+        assert self._state is not None
+        message = PidState(
+            timestep=rospy.Duration.from_sec(terms.dt),
+            error=self.error,
+            error_dot=self.error_rate,
+            p_error=self.error,
+            i_error=self.error_integral,
+            d_error=self.error_rate,
+            p_term=terms.p,
+            i_term=terms.i,
+            d_term=terms.d,
+            i_max=self.gains.i_max,
+            i_min=self.gains.i_min,
+            output=self.command,
+        )
+        message.header.stamp = rospy.Time.now()
+        self._state.publish(message)
+
+
+def _config(gains: PidGains) -> dict[str, float | bool]:
+    """Return the gains with the names that dynamic_reconfigure uses."""
+    return {
+        "p": gains.p,
+        "i": gains.i,
+        "d": gains.d,
+        "i_clamp_min": gains.i_min,
+        "i_clamp_max": gains.i_max,
+        "antiwindup": gains.antiwindup,
+    }

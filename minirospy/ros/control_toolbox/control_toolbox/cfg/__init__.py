@@ -1,0 +1,1 @@
+"""control_toolbox's configuration for dynamic_reconfigure."""

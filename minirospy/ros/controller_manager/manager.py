@@ -1,0 +1,305 @@
+"""The controller manager that a node owns: the services NS/controller_manager/..., and :meth:`ControllerManager.update`.
+
+Source: http://wiki.ros.org/controller_manager.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+import time as wall
+
+from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllersResponse,
+    ListControllerTypes,
+    ListControllerTypesResponse,
+    LoadController,
+    LoadControllerRequest,
+    ReloadControllerLibraries,
+    ReloadControllerLibrariesRequest,
+    SwitchController,
+    SwitchControllerRequest,
+    UnloadController,
+    UnloadControllerRequest,
+)
+
+from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
+from minirospy.base.errors import UrdfError
+from minirospy.base.log_levels import DEBUG, ERROR, FATAL, INFO, WARN
+from minirospy.base.times import Duration, Time
+from minirospy.core.control.controller import Controller, ControllerContext, ControllerError
+from minirospy.core.control.hardware import RobotHardware
+from minirospy.core.control.manager import BEST_EFFORT, ControllerTable
+from minirospy.core.control.parameters import Parameters
+from minirospy.core.urdf.model import Robot
+from minirospy.core.urdf.read import parse_robot
+from minirospy.ros.controller_manager.plugins import Plugin, PluginError, find_plugins, forget_modules
+
+__all__ = ["ControllerManager", "find_description", "log", "read_robot"]
+
+_LOG = {
+    DEBUG: rospy.logdebug,
+    INFO: rospy.loginfo,
+    WARN: rospy.logwarn,
+    ERROR: rospy.logerr,
+    FATAL: rospy.logfatal,
+}
+_EXTRA_SECONDS = (
+    1.0  # a switch with a timeout returns this long after it, although the loop stands still: as ROS
+)
+_BASE_CLASS = "controller_interface::ControllerBase"
+
+
+def log(level: int, line: str) -> None:
+    """Log a line at a level of rosgraph_msgs/Log."""
+    _LOG[level]("%s", line)
+
+
+class ControllerManager:
+    """Loads, starts and stops the controllers of one robot, on request through its services.
+
+    The node that owns it calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``;
+    :func:`controller_manager.run` is such a loop. All services wait for the loop: they return after its next update.
+    ``namespace``: of the services and of the controllers, by default the node's.
+    """
+
+    def __init__(self, hardware: RobotHardware, namespace: str = "") -> None:
+        """Offer the services. Raise ROSInitException before init_node."""
+        self.hardware = hardware
+        self.namespace = "/" + rospy.resolve_name(namespace or rospy.get_namespace()).strip("/")
+        self.table = ControllerTable(hardware, log)
+        self._plugins: dict[str, Plugin] | None = None
+        self._lock = threading.RLock()  # held by the service that runs
+        self._waiting: list[threading.Event] = []  # set by the next update
+        self._has_updated = False
+        self._is_closed = False
+
+        handlers = (
+            (ListControllers, "list_controllers", lambda _: self._list()),
+            (ListControllerTypes, "list_controller_types", lambda _: self._list_types()),
+            (LoadController, "load_controller", self._on_load),
+            (UnloadController, "unload_controller", self._on_unload),
+            (SwitchController, "switch_controller", self._on_switch),
+            (ReloadControllerLibraries, "reload_controller_libraries", self._on_reload),
+        )
+        self._services = [
+            rospy.Service(f"{self._below(self.namespace, 'controller_manager')}/{name}", kind, handler)
+            for kind, name, handler in handlers
+        ]
+
+    def update(self, time: Time, period: Duration, reset_controllers: bool = False) -> None:
+        """Update the running controllers, then start and stop those that a service asks for.
+
+        ``reset_controllers``: restart the running ones first, for example after a simulation was reset.
+        """
+        self.table.update(time, period, reset_controllers)
+        self._has_updated = True
+        while self._waiting:
+            self._waiting.pop().set()
+
+    def load(self, name: str) -> bool:
+        """Load the controller whose parameters are in NAMESPACE/name; return whether that succeeded. A failure is logged."""
+        with self._lock:
+            if self.table.find(name):
+                log(ERROR, f"A controller named '{name}' was already loaded inside the controller manager")
+                return False
+            if problem := _invalid_name(name):
+                log(
+                    ERROR,
+                    f"Exception thrown while constructing nodehandle for controller with name '{name}':\n{problem}",
+                )
+                return False
+            namespace = name.rstrip("/") if name.startswith("/") else self._below(self.namespace, name)
+            values = rospy.get_param(namespace, {})
+            parameters = Parameters(namespace, values if isinstance(values, dict) else {})
+            kind = parameters.get("type")
+            if not isinstance(kind, str):
+                log(
+                    ERROR,
+                    f"Could not load controller '{name}' because the type was not specified. Did you load the controller "
+                    f"configuration on the parameter server (namespace: '{namespace}')?",
+                )
+                return False
+            if not (found := self._find_class(name, kind)):
+                return False
+            robot = functools.cache(lambda: read_robot(self.namespace))
+            context = ControllerContext(namespace, self.namespace, name, parameters, robot)
+            return self.table.load(name, kind, found, context) is not None and self._wait_for_update()
+
+    def unload(self, name: str) -> bool:
+        """Unload a controller that does not run; return whether that succeeded. A failure is logged."""
+        with self._lock:
+            if not (found := self.table.unload(name)) or not self._wait_for_update():
+                return False
+            self.table.close(found)
+            return True
+
+    def switch(
+        self,
+        start: list[str],
+        stop: list[str],
+        strictness: int = BEST_EFFORT,
+        start_asap: bool = False,
+        timeout: float = 0.0,
+    ) -> bool:
+        """Start and stop controllers in one update, and wait for it; return whether that succeeded. A failure is logged.
+
+        Wait without limit if ``timeout`` is 0, else for ``timeout`` plus one second.
+        """
+        with self._lock:
+            plan = self.table.plan_switch(start, stop, strictness, start_asap, timeout, rospy.Time.now())
+            if plan is None or self._is_closed:
+                return False
+            done = SignalSafeEvent()
+            plan.on_done = done.set
+            self.table.begin(plan)
+            end = None if timeout == 0 else wall.monotonic() + timeout + _EXTRA_SECONDS
+            with rospy.interrupting(done.set):
+                is_done = done.wait(None if end is None else end - wall.monotonic())
+            if not is_done:
+                self.table.withdraw()
+            return is_done and not rospy.is_down() and not self._is_closed
+
+    def close(self, time: Time) -> None:
+        """Stop all controllers and close them. Call it in the loop's thread, or after the loop. Idempotent."""
+        self._is_closed = True
+        if pending := self.table.withdraw():
+            pending.on_done()
+        self.table.stop_all(time)
+        while self._waiting:
+            self._waiting.pop().set()
+        loaded, self.table.loaded = self.table.loaded, ()
+        for each in reversed(loaded):
+            self.table.close(each)
+
+    def _wait_for_update(self) -> bool:
+        """Wait until the loop has used the new table; return False if the node shuts down."""
+        if self._has_updated and not self._is_closed:
+            updated = SignalSafeEvent()
+            self._waiting.append(updated)
+            with rospy.interrupting(updated.set):
+                updated.wait()
+        return not rospy.is_down() and not self._is_closed
+
+    def _find_class(self, name: str, kind: str) -> type[Controller] | None:
+        """Return the class of a type. Log the reason and return None if that fails."""
+        if (plugin := self._types().get(kind)) is not None:
+            try:
+                return plugin.load()
+            except PluginError as error:
+                log(ERROR, f"Could not load class '{kind}': {error}")
+        log(ERROR, f"Could not load controller '{name}' because controller type '{kind}' does not exist.")
+        log(
+            ERROR, "Use 'rosservice call controller_manager/list_controller_types' to get the available types"
+        )
+        return None
+
+    def _types(self) -> dict[str, Plugin]:
+        if self._plugins is None:
+            self._plugins = find_plugins()
+        return self._plugins
+
+    def _list(self) -> ListControllersResponse:
+        with self._lock:
+            return ListControllersResponse(
+                [
+                    ControllerState(
+                        each.info.name,
+                        each.state.value,
+                        each.info.type,
+                        [
+                            HardwareInterfaceResources(claim.interface, list(claim.resources))
+                            for claim in each.info.claimed
+                        ],
+                    )
+                    for each in self.table.loaded
+                ]
+            )
+
+    def _list_types(self) -> ListControllerTypesResponse:
+        with self._lock:
+            types = sorted(self._types())
+            return ListControllerTypesResponse(types, [_BASE_CLASS] * len(types))
+
+    def _on_load(self, request: LoadControllerRequest) -> bool:
+        return self.load(request.name)
+
+    def _on_unload(self, request: UnloadControllerRequest) -> bool:
+        return self.unload(request.name)
+
+    def _on_switch(self, request: SwitchControllerRequest) -> bool:
+        return self.switch(
+            request.start_controllers,
+            request.stop_controllers,
+            request.strictness,
+            request.start_asap,
+            request.timeout,
+        )
+
+    def _on_reload(self, request: ReloadControllerLibrariesRequest) -> bool:
+        with self._lock:
+            cannot = "Controller manager: Cannot reload controller libraries because"
+            names = [each.info.name for each in self.table.loaded]
+            if names and not request.force_kill:
+                log(ERROR, f"{cannot} there are still {len(names)} controllers running")
+                return False
+            if names:
+                log(INFO, "Controller manager: Killing all running controllers")
+                if not self.switch([], names, BEST_EFFORT):
+                    log(ERROR, f"{cannot} failed to stop running controllers")
+                    return False
+                for name in names:
+                    if not self.unload(name):
+                        log(ERROR, f"{cannot} failed to unload controller '{name}'")
+                        return False
+            forget_modules((self._plugins or {}).values())
+            self._plugins = None
+            log(INFO, f"Controller manager: reloaded controller libraries for '{_BASE_CLASS}'")
+            return True
+
+    @staticmethod
+    def _below(namespace: str, name: str) -> str:
+        return f"{namespace.rstrip('/')}/{name.strip('/')}".rstrip("/") or "/"
+
+
+def find_description(namespace: str, name: str = "robot_description") -> str | None:
+    """Return the parameter ``name`` in a namespace, or in the closest one above it; None if there is none."""
+    while True:
+        namespace = namespace.rstrip("/")
+        text = rospy.get_param(f"{namespace}/{name}", None)
+        if isinstance(text, str):
+            return text
+        if not namespace:
+            return None
+        namespace = namespace.rpartition("/")[0]
+
+
+def read_robot(namespace: str, name: str = "robot_description") -> Robot:
+    """Return the robot of a parameter, searched upwards from a namespace. Raise ControllerError without a valid one."""
+    text = find_description(namespace, name)
+    if text is None:
+        raise ControllerError(f"Could not find parameter {name} on parameter server")
+    try:
+        return parse_robot(text, name)
+    except UrdfError as error:
+        raise ControllerError(str(error)) from error
+
+
+def _invalid_name(name: str) -> str:
+    """Return roscpp's error if a name is not valid in the graph, else an empty string."""
+    for number, character in enumerate(name):
+        is_letter = character.isascii() and (character.isalpha() or character == "/")
+        if number == 0 and not is_letter:
+            return (
+                f"Character [{character}] is not valid as the first character in Graph Resource Name [{name}].  "
+                "Valid characters are a-z, A-Z, / and in some cases ~."
+            )
+        if not (is_letter or character == "_" or (character.isascii() and character.isdigit())):
+            return (
+                f"Character [{character}] at element [{number}] is not valid in Graph Resource Name [{name}].  "
+                "Valid characters are a-z, A-Z, 0-9, / and _."
+            )
+    return ""

@@ -1,0 +1,1 @@
+"""The ROS package controller_manager_msgs."""

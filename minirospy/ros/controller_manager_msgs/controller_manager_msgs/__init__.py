@@ -1,0 +1,1 @@
+"""controller_manager_msgs: the package's Python modules, besides its messages."""

@@ -1,0 +1,55 @@
+"""Configurations that a module defines itself, instead of a .cfg file from which catkin_make generates the module."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import GroupTree, Value
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.parameter_generator_catkin import (
+    ParameterGenerator,
+)
+
+__all__ = ["Definition"]
+
+
+class Definition(ParameterGenerator):
+    """A configuration: call ``add`` as in a .cfg file, then copy the properties to the module."""
+
+    def __init__(self) -> None:
+        """Define a configuration without parameters. Unlike in a .cfg file, no folders are needed."""
+        self.group = self.Group(self, "Default", "", True, 0, 0)
+        self.constants = []
+
+    @property
+    def config_description(self) -> GroupTree:
+        """The tree of groups with their parameters."""
+        return self.group.to_dict()
+
+    @property
+    def defaults(self) -> Mapping[str, Value]:
+        """The parameters' default values."""
+        return self._values("default")
+
+    @property
+    def min(self) -> Mapping[str, Value]:
+        """The parameters' least values."""
+        return self._values("min")
+
+    @property
+    def max(self) -> Mapping[str, Value]:
+        """The parameters' greatest values."""
+        return self._values("max")
+
+    @property
+    def level(self) -> Mapping[str, int]:
+        """The bits that the server's callback gets if the parameters change."""
+        return self._values("level")
+
+    @property
+    def type(self) -> Mapping[str, str]:
+        """The parameters' types."""
+        return self._values("type")
+
+    def _values(self, key: Literal["default", "min", "max", "level", "type"]) -> dict[str, Any]:
+        return {each["name"]: each[key] for each in self.group.get_parameters()}

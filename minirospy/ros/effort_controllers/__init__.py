@@ -1,0 +1,1 @@
+"""ROS's package effort_controllers."""

@@ -1,0 +1,1 @@
+"""Controllers that pass commands on to joints."""

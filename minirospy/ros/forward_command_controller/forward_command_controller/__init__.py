@@ -1,0 +1,67 @@
+"""Base classes of controllers that pass commands on: ``from forward_command_controller import ForwardCommandController``.
+
+Source: http://wiki.ros.org/forward_command_controller.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from minirospy.base.times import Duration, Time
+from minirospy.core.control.controller import Controller, ControllerContext, Resources
+from minirospy.core.control.hardware import COMMAND_FIELDS, Interface, Joint
+from minirospy.ros.forward_command_controller.joints import CommandTopic, claim_group, claim_joint
+
+__all__ = ["ForwardCommandController", "ForwardJointGroupCommandController"]
+
+
+class ForwardCommandController(Controller):
+    """Passes the numbers of the topic ``command`` on to a joint. Its first command is the position at the start, or 0.
+
+    A subclass sets ``interfaces`` to the one that it commands.
+    """
+
+    is_group: ClassVar[bool] = False  # several joints, whose commands are in one message
+
+    _joints: list[Joint]
+    _command: CommandTopic | None = None
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Claim the joints, open the topic."""
+        (interface,) = self.interfaces
+        self._field = COMMAND_FIELDS[interface]
+        if self.is_group:
+            self._joints = claim_group(hardware, context, interface)
+        else:
+            self._joints = [claim_joint(hardware, context, interface)]
+        self._command = CommandTopic(context, len(self._joints), is_group=self.is_group)
+
+    def starting(self, time: Time) -> None:
+        """Hold the position, or command 0."""
+        assert self._command
+        if self.interfaces == (Interface.POSITION,):
+            self._command.values = [
+                each.position if math.isfinite(each.position) else each.position_command
+                for each in self._joints
+            ]
+        else:
+            self._command.values = [0.0] * len(self._joints)
+
+    def update(self, time: Time, period: Duration) -> None:
+        """Command the joints."""
+        assert self._command
+        field = self._field
+        for joint, value in zip(self._joints, self._command.values, strict=True):
+            setattr(joint, field, value)
+
+    def close(self) -> None:
+        """Close the topic."""
+        if self._command:
+            self._command.close()
+
+
+class ForwardJointGroupCommandController(ForwardCommandController):
+    """Passes the numbers of the topic ``command`` on to the joints of the parameter ``joints``."""
+
+    is_group = True

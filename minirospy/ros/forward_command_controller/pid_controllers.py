@@ -1,0 +1,185 @@
+"""Base classes of controllers that reach a position or a velocity by PID: a subclass sets ``interfaces``.
+
+Source: http://wiki.ros.org/effort_controllers, http://wiki.ros.org/velocity_controllers.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+
+from control_msgs.msg import JointControllerState
+
+from minirospy import client as rospy
+from minirospy.base.times import Duration, Time
+from minirospy.core.control.controller import Controller, ControllerContext, ControllerError, Resources
+from minirospy.core.control.hardware import COMMAND_FIELDS, Interface, Joint
+from minirospy.core.control.parameters import Parameters
+from minirospy.core.control.position_loop import PositionLoop
+from minirospy.core.urdf.model import Robot
+from minirospy.ros.control_toolbox.control_toolbox import Pid, PidGains
+from minirospy.ros.forward_command_controller.joints import CommandTopic, claim_group, claim_joint
+from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
+
+__all__ = ["PidJointGroupPositionController", "PidJointPositionController", "PidJointVelocityController"]
+
+_STATE_CYCLES = 10  # the state is published in each tenth cycle, as in ROS
+
+
+class _PidController(Controller):
+    """A controller whose output for each joint is that of a PID controller."""
+
+    _command: CommandTopic
+
+    def __init__(self) -> None:
+        self._opened = ExitStack()
+        self._cycle = 0
+
+    @property
+    def _interface(self) -> Interface:
+        (interface,) = self.interfaces
+        return interface
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Claim the joints, read the gains, open the topics."""
+        self._field = COMMAND_FIELDS[self._interface]
+
+    def close(self) -> None:
+        """Close the topics."""
+        self._opened.close()
+
+    def _open_pid(self, parameters: Parameters) -> Pid:
+        pid = Pid.read(parameters)
+        self._opened.callback(pid.close)
+        pid.serve(parameters)
+        return pid
+
+    def _open_command(self, context: ControllerContext, joints: int, *, is_group: bool = False) -> None:
+        self._command = CommandTopic(context, joints, is_group=is_group)
+        self._opened.callback(self._command.close)
+
+    def _open_state(self, context: ControllerContext) -> None:
+        self._state = RealtimePublisher(f"{context.namespace}/state", JointControllerState)
+        self._opened.callback(self._state.close)
+
+    def _publish_state(
+        self, message: JointControllerState, time: Time, period: Duration, gains: PidGains
+    ) -> None:
+        """Publish the state of a cycle, after setting the fields that are the same for all controllers."""
+        message.header.stamp = time
+        message.time_step = period.to_sec()
+        message.p, message.i, message.d, message.i_clamp, _, message.antiwindup = gains
+        self._state.publish(message)
+
+    def _is_state_due(self) -> bool:
+        self._cycle += 1
+        return self._cycle % _STATE_CYCLES == 1
+
+
+class PidJointPositionController(_PidController):
+    """Drives the joint of the parameter ``joint`` to the positions of the topic ``command``, first to its own position."""
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Claim the joint, read the gains in ``pid`` and the joint's limits, open the topics."""
+        super().init(hardware, context)
+        joint = claim_joint(hardware, context, self._interface)
+        pid = self._open_pid(context.parameters.below("pid"))
+        self._loop = _position_loop(joint, _read_robot(context), pid)
+        self._open_state(context)
+        self._open_command(context, 1)
+
+    def starting(self, time: Time) -> None:
+        """Hold the position."""
+        self._command.values = [self._loop.clamp(self._loop.joint.position)]
+        self._loop.pid.reset()
+
+    def update(self, time: Time, period: Duration) -> None:
+        """Command the joint; publish the state."""
+        loop = self._loop
+        target = loop.clamp(self._command.values[0])
+        error = loop.error(target)
+        command = loop.pid.compute(error, None, period.to_sec())
+        setattr(loop.joint, self._field, command)
+        if self._is_state_due():
+            state = JointControllerState(
+                set_point=target,
+                process_value=loop.joint.position,
+                process_value_dot=loop.joint.velocity,
+                error=error,
+                command=command,
+            )
+            self._publish_state(state, time, period, loop.pid.gains)
+
+
+class PidJointVelocityController(_PidController):
+    """Drives the joint of the parameter ``joint`` at the velocities of the topic ``command``, first at 0."""
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Claim the joint, read the gains in ``pid``, open the topics."""
+        super().init(hardware, context)
+        self._joint = claim_joint(hardware, context, self._interface)
+        self._pid = self._open_pid(context.parameters.below("pid"))
+        self._open_state(context)
+        self._open_command(context, 1)
+
+    def starting(self, time: Time) -> None:
+        """Stop the joint."""
+        self._command.values = [0.0]
+        self._pid.reset()
+
+    def update(self, time: Time, period: Duration) -> None:
+        """Command the joint; publish the state."""
+        target, actual = self._command.values[0], self._joint.velocity
+        error = target - actual
+        command = self._pid.compute(error, None, period.to_sec())
+        setattr(self._joint, self._field, command)
+        if self._is_state_due():
+            state = JointControllerState(set_point=target, process_value=actual, error=error, command=command)
+            self._publish_state(state, time, period, self._pid.gains)
+
+
+class PidJointGroupPositionController(_PidController):
+    """Drives the joints of the parameter ``joints`` to the positions of the topic ``command``; gains are in ``JOINT/pid``."""
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Claim the joints, read their gains and limits, open the topic."""
+        super().init(hardware, context)
+        joints = claim_group(hardware, context, self._interface)
+        robot = _read_robot(context)
+        self._loops = []
+        for joint in joints:
+            gains = f"{joint.name}/pid"
+            try:
+                pid = self._open_pid(context.parameters.below(gains))
+            except ControllerError as error:
+                rospy.logerr("%s", error)
+                raise ControllerError(f"Failed to load PID parameters from {gains}") from error
+            self._loops.append(_position_loop(joint, robot, pid))
+        self._open_command(context, len(joints), is_group=True)
+
+    def starting(self, time: Time) -> None:
+        """Hold the positions."""
+        self._command.values = [loop.clamp(loop.joint.position) for loop in self._loops]
+        for loop in self._loops:
+            loop.pid.reset()
+
+    def update(self, time: Time, period: Duration) -> None:
+        """Command the joints."""
+        dt = period.to_sec()
+        for loop, target in zip(self._loops, self._command.values, strict=True):
+            error = loop.error(loop.clamp(target))
+            setattr(loop.joint, self._field, loop.pid.compute(error, None, dt))
+
+
+def _read_robot(context: ControllerContext) -> Robot:
+    try:
+        return context.robot()
+    except ControllerError as error:
+        rospy.logerr("%s", error)
+        raise ControllerError("Failed to parse urdf file") from error
+
+
+def _position_loop(joint: Joint, robot: Robot, pid: Pid) -> PositionLoop:
+    described = robot.joints.get(joint.name)
+    if described is None:
+        raise ControllerError(f"Could not find joint '{joint.name}' in urdf")
+    return PositionLoop(joint, described, pid)

@@ -1,0 +1,1 @@
+"""Controllers of grippers with one joint."""

@@ -1,0 +1,170 @@
+"""Controllers of grippers with one joint: ``from gripper_action_controller import GripperActionController``.
+
+ROS's package has these classes in C++ only. Their decisions are in `minirospy/core/control/gripper.py`. Source:
+http://wiki.ros.org/gripper_action_controller.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack
+
+from control_msgs.msg import GripperCommandAction, GripperCommandGoal, GripperCommandResult
+
+from minirospy import client as rospy
+from minirospy.base.times import Duration, Time
+from minirospy.core.control.controller import Controller, ControllerContext, ControllerError, Resources
+from minirospy.core.control.goal import MonitoredGoal, Outcome
+from minirospy.core.control.gripper import Gripper, GripperCommand, GripperLimits
+from minirospy.core.control.hardware import Interface, Joint
+from minirospy.ros.control_toolbox.control_toolbox import Pid
+from minirospy.ros.realtime_tools.realtime_tools import RealtimeActionServer, Rejection
+
+__all__ = ["EffortGripperActionController", "GripperActionController", "PositionGripperActionController"]
+
+_SECOND = 1_000_000_000  # ns
+_NOT_RUNNING = "Can't accept new action goals. Controller is not running."
+
+
+class GripperActionController(Controller):
+    """Executes the action ``gripper_cmd``. A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`.
+
+    As in ROS it publishes no feedback.
+    """
+
+    joint: Joint
+    gripper: Gripper
+
+    def __init__(self) -> None:
+        self.opened = ExitStack()  # closes what ``init`` has opened, in reverse
+        self.is_running = False
+        self._effort = 0.0  # the last one that was commanded
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Read the parameters, claim the joint, and open the action."""
+        parameters = context.parameters
+        monitor_rate = parameters.finite("action_monitor_rate", 20.0)
+        if monitor_rate <= 0.0:
+            raise ControllerError(f"action_monitor_rate must be above 0 (namespace: {context.namespace}).")
+        name = parameters.text("joint", "")
+        if not name:
+            raise ControllerError("Could not find joint name on param server")
+        if name not in context.robot().joints:
+            raise ControllerError(f"Could not find joint '{name}' in URDF model.")
+        if name not in hardware.names(self.interfaces[0]):
+            raise ControllerError(f"Could not find joint '{name}' in '{self.interfaces[0].value}'.")
+        self.joint = hardware.joint(name, self.interfaces[0])
+
+        usual = GripperLimits()
+        self.gripper = Gripper(
+            GripperLimits(
+                abs(parameters.finite("goal_tolerance", usual.goal_tolerance)),
+                abs(parameters.finite("max_effort", usual.max_effort)),
+                parameters.finite("stall_velocity_threshold", usual.stall_velocity),
+                round(parameters.finite("stall_timeout", 1.0) * _SECOND),
+            )
+        )
+        self.read_gains(context)
+        self._action = RealtimeActionServer(
+            f"{context.namespace}/gripper_cmd",
+            GripperCommandAction,
+            self._accept,
+            self._hold,
+            _result,
+            round(_SECOND / monitor_rate),
+        )
+        self.opened.callback(self._action.close)
+
+    def read_gains(self, context: ControllerContext) -> None:
+        """Read the parameters that only this hardware interface needs."""
+
+    def starting(self, time: Time) -> None:
+        """Hold the present position."""
+        self._hold()
+        self.is_running = True
+        self._action.start()
+
+    def update(self, time: Time, period: Duration) -> None:
+        """Send the command of this cycle, and a goal's result when it is due."""
+        joint, now = self.joint, time.to_nsec()
+        command = self.gripper.check(now, joint.position, joint.velocity, self._effort)
+        self._effort = self.send(command, period.to_nsec() / _SECOND)
+        self._action.report(now)
+
+    def send(self, command: GripperCommand, dt: float) -> float:
+        """Set the joint's command; return the effort that a goal's result shows. ``dt``: s since the last cycle."""
+        raise NotImplementedError
+
+    def stopping(self, time: Time) -> None:
+        """Cancel the goal."""
+        self.is_running = False
+        self._action.stop()
+
+    def aborting(self, time: Time) -> None:
+        """Cancel the goal."""
+        self.stopping(time)
+
+    def close(self) -> None:
+        """Close the action."""
+        self.opened.close()
+
+    def _hold(self) -> None:
+        position = self.joint.position
+        self.gripper.hold(position if math.isfinite(position) else self.joint.position_command)
+
+    def _accept(self, message: GripperCommandGoal) -> MonitoredGoal:
+        if not self.is_running:
+            rospy.logerr(_NOT_RUNNING)
+            raise Rejection(GripperCommandResult())
+        position, max_effort = message.command.position, message.command.max_effort
+        if not (math.isfinite(position) and math.isfinite(max_effort)):
+            text = f"The goal's position is {position}, its max_effort {max_effort}; both must be finite numbers."
+            rospy.logerr(text)
+            raise Rejection(GripperCommandResult(), text)
+        goal = MonitoredGoal()
+        self.gripper.command = GripperCommand(position, max_effort, goal)
+        return goal
+
+
+class PositionGripperActionController(GripperActionController):
+    """position_controllers/GripperActionController: the command is the goal's position; its effort is only reported."""
+
+    interfaces = (Interface.POSITION,)
+
+    def send(self, command: GripperCommand, dt: float) -> float:
+        """Command the position."""
+        self.joint.position_command = command.position
+        return command.max_effort
+
+
+class EffortGripperActionController(GripperActionController):
+    """effort_controllers/GripperActionController: the command comes from a PID with ``gains/JOINT``.
+
+    As in ROS, a goal whose max_effort is 0 allows no effort at all.
+    """
+
+    interfaces = (Interface.EFFORT,)
+
+    def read_gains(self, context: ControllerContext) -> None:
+        """Read the gains, and let dynamic_reconfigure change them."""
+        gains = context.parameters.below(f"gains/{self.joint.name}")
+        self._pid = Pid.read(gains)
+        self.opened.callback(self._pid.close)
+        self._pid.serve(gains)
+
+    def starting(self, time: Time) -> None:
+        """Hold the present position, without effort until the first update."""
+        self._pid.reset()
+        self.joint.effort_command = 0.0
+        super().starting(time)
+
+    def send(self, command: GripperCommand, dt: float) -> float:
+        """Command the effort."""
+        joint, limit = self.joint, abs(command.max_effort)
+        effort = self._pid.compute(command.position - joint.position, -joint.velocity, dt)
+        joint.effort_command = min(max(effort, -limit), limit)
+        return joint.effort_command
+
+
+def _result(outcome: Outcome) -> GripperCommandResult:
+    return GripperCommandResult(*outcome.result)

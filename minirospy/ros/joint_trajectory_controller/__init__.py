@@ -1,0 +1,1 @@
+"""Controllers that execute trajectories of joints."""

@@ -1,0 +1,1 @@
+"""Hardware for the controller manager: a loopback, which needs no robot."""

@@ -1,0 +1,1 @@
+"""ROS's package position_controllers."""

@@ -1,0 +1,239 @@
+"""The manager's services, its loop, and what becomes of controllers and hardware that fail."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.ros.control.manager.conftest import ROBOT, Start, call
+
+LOADS = """
+rospy.set_param("/one", {"type": "my_controllers/Hold", "joint": "a", "step": 0.001})
+rospy.set_param("/two", {"type": "my_controllers/Hold", "joint": "b"})
+rospy.set_param("/again", {"type": "my_controllers/Hold", "joint": "a"})
+rospy.set_param("/faulty", {"type": "my_controllers/Faulty", "joint": "b"})
+"""
+
+
+def lines_of(errors: str) -> list[str]:
+    """Return the log's lines without times, and without the overruns of a busy machine."""
+    return [line.partition("]: ")[2] for line in errors.splitlines() if "control loop: " not in line]
+
+
+def test_controllers_are_loaded_switched_and_unloaded(start: Start) -> None:
+    robot = start("-c", ROBOT)
+    printed = call(
+        LOADS
+        + """
+cm.list_controllers()
+cm.load_controller("one"), cm.load_controller("two"), cm.load_controller("again")
+cm.load_controller("one"), cm.load_controller("nothing"), cm.load_controller("a b")
+cm.start_controllers(["one", "again"])
+cm.start_controllers(["one", "two"])
+cm.unload_controller("one")
+cm.start_stop_controllers(["again"], ["one"])
+cm.list_controllers()
+cm.unload_controller("one")
+cm.list_controllers()
+cm.reload_libraries(False)
+cm.reload_libraries(True)
+cm.list_controllers()
+"""
+    )
+    kind = "hardware_interface::PositionJointInterface"
+    assert printed.splitlines() == [
+        "No controllers are loaded in mechanism control",
+        "Loaded 'one'",
+        "Loaded 'two'",
+        "Loaded 'again'",
+        "Error when loading 'one'",
+        "Error when loading 'nothing'",
+        "Error when loading 'a b'",
+        "Error when starting ['one', 'again'] and stopping []",
+        "Started ['one', 'two'] successfully",
+        "Error when unloading 'one'",
+        "Started ['again'] successfully",
+        "Stopped ['one'] successfully",
+        f"'one' - '{kind}' ( stopped )",
+        f"'two' - '{kind}' ( running )",
+        f"'again' - '{kind}' ( running )",
+        "Unloaded 'one' successfully",
+        f"'two' - '{kind}' ( running )",
+        f"'again' - '{kind}' ( running )",
+        "Restore: False",
+        "Failed to reload libraries. Do you still have controllers loaded?",
+        "Restore: False",
+        "Successfully reloaded libraries",
+        "No controllers are loaded in mechanism control",
+    ]
+    robot.process.send_signal(signal.SIGINT)
+    status, _, errors = robot.end()
+    assert status == 0
+    logged = lines_of(errors)
+    assert logged == [
+        "A controller named 'one' was already loaded inside the controller manager",
+        "Could not load controller 'nothing' because the type was not specified. Did you load the controller "
+        "configuration on the parameter server (namespace: '/nothing')?",
+        "Exception thrown while constructing nodehandle for controller with name 'a b':",
+        "",
+        "Resource conflict on [a].  Controllers = [one, again, ]",
+        "Could not switch controllers, due to resource conflict",
+        "Could not unload controller with name 'one' because it is still running",
+        "Controller manager: Cannot reload controller libraries because there are still 2 controllers running",
+    ]
+
+
+def test_classes_that_cannot_be_loaded_have_one_clear_line(start: Start) -> None:
+    robot = start("-c", ROBOT)
+    kinds = ["Broken", "Cpp", "Other", "Absent"]
+    call(
+        "".join(f"rospy.set_param('/{kind}', {{'type': 'my_controllers/{kind}'}})\n" for kind in kinds)
+        + f"for name in {kinds}: cm.load_controller(name)"
+    )
+    robot.process.send_signal(signal.SIGINT)
+    logged = lines_of(robot.end()[2])
+    assert len(logged) == 3 + 2 * len(kinds)
+    assert logged[0].startswith(
+        "Could not load class 'my_controllers/Broken': cannot import my_controllers.broken.Broken ("
+    )
+    assert "ModuleNotFoundError: No module named 'nothing_of_that_name' (" in logged[0]
+    assert "broken.py:1)" in logged[0]
+    assert logged[1:3] == [
+        "Could not load controller 'Broken' because controller type 'my_controllers/Broken' does not exist.",
+        "Use 'rosservice call controller_manager/list_controller_types' to get the available types",
+    ]
+    assert "my_controllers::Cpp is written in C++ (" in logged[3]
+    assert logged[6].endswith("is not a subclass of controller_interface.Controller")
+    assert (
+        logged[9]
+        == "Could not load controller 'Absent' because controller type 'my_controllers/Absent' does not exist."
+    )
+
+
+def test_controller_that_raises_is_stopped_and_the_loop_goes_on(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT)
+    call(
+        LOADS
+        + 'cm.load_controller("one"), cm.load_controller("faulty")\ncm.start_controllers(["one", "faulty"])'
+    )
+    robot.read_until("faulty stops")
+    for _ in range(3):
+        robot.read_until("a 0.")
+    assert "( stopped )" in call("cm.list_controllers()").splitlines()[1]
+    robot.process.send_signal(signal.SIGINT)
+    _, _, errors = robot.end()
+    (line,) = lines_of(errors)
+    place = f"({workspace / 'src' / 'my_controllers' / 'hold.py'}:29)"
+    assert line.endswith(f"Controller 'faulty' is stopped: update raised RuntimeError: no oil {place}")
+
+
+def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT)
+    loads = LOADS + 'cm.load_controller("one"), cm.start_controller("one")'
+    call(loads)
+    robot.read_until("one starts")
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    file.write_text(file.read_text().replace('"starts"', '"begins"') + "# of another size\n")
+    call("cm.reload_libraries(True)\n" + loads)
+    robot.read_until("one begins")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there")
+def test_end_stops_the_controllers_and_releases_the_joints(start: Start, number: signal.Signals) -> None:
+    robot = start("-c", ROBOT)
+    call(LOADS + 'cm.load_controller("one"), cm.load_controller("two"); cm.start_controllers(["one", "two"])')
+    robot.read_until("b 0.000")
+    robot.process.send_signal(number)
+    status, output, errors = robot.end()
+    assert status == 0
+    assert lines_of(errors) == []
+    last = [line for line in output.splitlines() if not line.startswith(("a 0", "b 0"))]
+    assert last == [
+        "two stops",
+        "one stops",
+        "two closes",
+        "one closes",
+        "closed, active: [None, None]",
+        "status 0",
+    ]
+
+
+def test_hardware_that_fails_ends_the_node_with_status_1(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT)
+    call(LOADS + 'cm.load_controller("one"); cm.start_controllers(["one"])')
+    robot.read_until("a 0.")
+    (workspace.parent / "fails").touch()
+    status, output, errors = robot.end()
+    assert status == 1
+    last = [line for line in output.splitlines() if not line.startswith("a 0")]
+    assert last == ["one stops", "one closes", "closed, active: [None, None]", "status 1"]
+    (line,) = lines_of(errors)
+    assert "the hardware failed, so the robot is stopped: OSError: the cable is loose (<string>:" in line
+
+
+CLOCK = """
+import itertools, threading, time
+import rospy
+from controller_manager import controller_manager_interface as cm
+from rosgraph_msgs.msg import Clock
+
+rospy.init_node("clock", disable_signals=True)
+publisher = rospy.Publisher("/clock", Clock, queue_size=10)
+publisher.wait_for_subscribers(2)  # the robot's, and this node's own
+thread = threading.Thread(target=lambda: cm.load_controller("one") and cm.start_controller("one"))
+thread.start()
+before = itertools.takewhile(lambda _: thread.is_alive(), itertools.count(1000))
+now = itertools.chain(before, range(5000, 5020), itertools.count(100))
+for hundredths in now:
+    publisher.publish(Clock(rospy.Time(hundredths // 100, hundredths % 100 * 10_000_000)))
+    time.sleep(0.002)
+"""
+
+
+def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: Start) -> None:
+    call(LOADS + "rospy.set_param('/use_sim_time', True)")
+    robot = start("-c", ROBOT)
+    start("-c", CLOCK)
+    assert 10_000_000_000 <= int(robot.read_until("one starts").split()[-1]) < 60_000_000_000
+    period = int(robot.read_until("a 0.").split()[-1])
+    assert period > 0
+    assert period % 10_000_000 == 0
+    robot.read_until("one stops")
+    assert 1_000_000_000 <= int(robot.read_until("one starts").split()[-1]) < 10_000_000_000
+    assert robot.read_until("a 0.").split()[-1] == "0"
+    robot.process.send_signal(signal.SIGINT)
+    status, _, errors = robot.end()
+    assert status == 0
+    assert "time jumped back by 49." in errors
+
+
+def test_diagnostics_have_the_loops_times(start: Start) -> None:
+    start("-c", ROBOT)
+    status = call(
+        "from diagnostic_msgs.msg import DiagnosticArray\n"
+        "rospy.init_node('reader')\n"
+        "message = rospy.wait_for_message('/diagnostics', DiagnosticArray)\n"
+        "print(message.status[0].name, [pair.key for pair in message.status[0].values])"
+    )
+    keys = ["jitter mean", "jitter p99", "jitter max", "cycle mean", "cycle p99", "cycle max"]
+    assert (
+        status
+        == f"robot: control loop {['rate (Hz)', 'cycles', 'overruns', *(f'{key} (us)' for key in keys)]}\n"
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
+def test_manager_starts_cleanly_after_a_kill_in_mid_motion(start: Start) -> None:
+    for _ in range(3):
+        robot = start("-c", ROBOT)
+        printed = call(
+            LOADS + 'cm.load_controller("one"); cm.start_controllers(["one"]); cm.list_controllers()'
+        )
+        assert printed.splitlines()[-1] == "'one' - 'hardware_interface::PositionJointInterface' ( running )"
+        robot.read_until("a 0.003")
+        robot.process.kill()
+        robot.process.wait()
