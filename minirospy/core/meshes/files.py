@@ -1,0 +1,83 @@
+"""Read mesh files from disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from minirospy.core.meshes.collada import parse_dae
+from minirospy.core.meshes.errors import MeshError
+from minirospy.core.meshes.mesh import Mesh
+from minirospy.core.meshes.obj import parse_obj
+from minirospy.core.meshes.stl import parse_stl
+from minirospy.core.sdf.model import Vector
+
+__all__ = ["MAX_BYTES", "read_mesh"]
+
+MAX_BYTES = 200_000_000  # a larger file needs gigabytes of memory
+MAX_LIBRARY_BYTES = 1_000_000  # of an MTL file
+
+
+def read_mesh(
+    path: str, submesh: str = "", scale: Vector = (1.0, 1.0, 1.0), *, is_centered: bool = False
+) -> list[Mesh]:
+    """Return the meshes of a file: each node or object, or only the one named ``submesh``, about its centre if asked.
+
+    Raise MeshError with the file's name if it cannot be read.
+    """
+    try:
+        meshes = list(_read(path, Path(path).stat().st_mtime_ns))
+        if submesh:
+            names = sorted({mesh.name for mesh in meshes})
+            meshes = [mesh for mesh in meshes if mesh.name == submesh]
+            if not meshes:
+                raise MeshError(f"there is no sub-mesh '{submesh}'; there are: {', '.join(names)[:200]}")
+    except MeshError as error:
+        raise MeshError(error.why, path) from None
+    except OSError as error:
+        raise MeshError(error.strerror or str(error), path) from None
+
+    if is_centered:
+        points = np.concatenate([mesh.vertices[mesh.triangles].reshape(-1, 3) for mesh in meshes])
+        center = (points.min(axis=0) + points.max(axis=0)) / 2
+        meshes = [replace(mesh, vertices=mesh.vertices - center) for mesh in meshes]
+    return [mesh.scaled(scale) for mesh in meshes]
+
+
+@lru_cache(maxsize=64)
+def _read(path: str, changed: int) -> tuple[Mesh, ...]:
+    file = Path(path)
+    parse = _PARSERS.get(file.suffix.lower())
+    if parse is None:
+        raise MeshError(f"the format '{file.suffix}' is not supported: convert it to .stl, .obj or .dae")
+    if file.stat().st_size > MAX_BYTES:
+        raise MeshError(f"the file is larger than {MAX_BYTES // 1_000_000} MB")
+    return tuple(parse(file.read_bytes(), file))
+
+
+def _stl(data: bytes, _: Path) -> list[Mesh]:
+    return [parse_stl(data)]
+
+
+def _obj(data: bytes, file: Path) -> list[Mesh]:
+    def library(name: str) -> str:
+        path = file.parent / name
+        try:
+            if path.stat().st_size <= MAX_LIBRARY_BYTES:
+                return path.read_text(encoding="utf-8", errors="replace")
+        except (OSError, ValueError):
+            pass
+        return ""
+
+    return parse_obj(data.decode("utf-8", errors="replace"), library)
+
+
+def _dae(data: bytes, _: Path) -> list[Mesh]:
+    return parse_dae(data)
+
+
+_PARSERS: dict[str, Callable[[bytes, Path], list[Mesh]]] = {".stl": _stl, ".obj": _obj, ".dae": _dae}

@@ -1,0 +1,97 @@
+"""Parse Wavefront OBJ files and their MTL files. Source: http://paulbourke.net/dataformats/obj, .../mtl."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+
+from minirospy.core.meshes.errors import MeshError
+from minirospy.core.meshes.mesh import MAX_TRIANGLES, Mesh, MeshMaterial
+
+__all__ = ["parse_mtl", "parse_obj"]
+
+
+def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> list[Mesh]:
+    """Return the mesh of each object (``o``). ``library`` returns the text of an MTL file, or an empty string.
+
+    Polygons become fans of triangles. Raise MeshError with the line if a vertex or face is invalid.
+    """
+    vertices: list[tuple[float, float, float]] = []
+    known: dict[str, MeshMaterial] = {}
+    used: dict[str, int] = {}
+    material, name, count = "", "", 0
+    objects: dict[str, tuple[list[tuple[int, int, int]], list[int]]] = {}
+    for number, line in enumerate(text.replace("\\\n", " ").splitlines(), 1):
+        words = line.partition("#")[0].split()
+        if not words:
+            continue
+        keyword, values = words[0], words[1:]
+        try:
+            if keyword == "v":
+                vertices.append((float(values[0]), float(values[1]), float(values[2])))
+            elif keyword == "f":
+                corners = [_index(word, len(vertices)) for word in values]
+                if len(corners) < 3:
+                    raise ValueError
+                triangles, materials = objects.setdefault(name, ([], []))
+                index = used.setdefault(material, len(used))
+                for second, third in itertools.pairwise(corners):
+                    triangles.append((corners[0], second, third))
+                    materials.append(index)
+                count += len(corners) - 2
+            elif keyword == "o":
+                name = " ".join(values)
+            elif keyword == "usemtl":
+                material = " ".join(values)
+            elif keyword == "mtllib":
+                known |= parse_mtl(library(" ".join(values)))
+        except (ValueError, IndexError):
+            raise MeshError(f"line {number} of this OBJ file is invalid: {line.strip()[:60]!r}") from None
+        if count > MAX_TRIANGLES:
+            raise MeshError(f"there are more than {MAX_TRIANGLES} triangles")
+
+    if not objects:
+        raise MeshError("this OBJ file has no faces")
+    materials_used = tuple(known.get(each, MeshMaterial(each)) for each in used)
+    points = np.array(vertices, np.float64).reshape(-1, 3)
+    return [
+        Mesh.checked(points, np.array(faces, np.int32), key, materials_used, np.array(materials, np.int32))
+        for key, (faces, materials) in objects.items()
+    ]
+
+
+def _index(word: str, count: int) -> int:
+    """Return the index of a corner such as ``3/1/2`` or ``-1``, from 0. Raise ValueError if it does not exist."""
+    index = int(word.partition("/")[0])
+    index = index - 1 if index > 0 else count + index
+    if not 0 <= index < count:
+        raise ValueError
+    return index
+
+
+def parse_mtl(text: str) -> dict[str, MeshMaterial]:
+    """Return an MTL file's materials by name. Lines that are invalid are ignored."""
+    result: dict[str, MeshMaterial] = {}
+    name, color, alpha, texture = "", (0.8, 0.8, 0.8), 1.0, ""
+    for line in [*text.splitlines(), "newmtl"]:
+        keyword, _, rest = line.strip().partition(" ")
+        rest = rest.strip()
+        try:
+            if keyword == "newmtl":
+                if name:
+                    result[name] = MeshMaterial(name, (*color, alpha), texture)
+                name, color, alpha, texture = rest, (0.8, 0.8, 0.8), 1.0, ""
+            elif keyword == "Kd":
+                red, green, blue = (float(value) for value in rest.split()[:3])
+                color = (red, green, blue)
+            elif keyword == "d":
+                alpha = float(rest.split()[-1])
+            elif keyword == "Tr":
+                alpha = 1.0 - float(rest.split()[-1])
+            elif keyword == "map_Kd":
+                texture = rest.split()[-1]
+        except (ValueError, IndexError):
+            continue
+    return result

@@ -1,0 +1,271 @@
+"""Convex parts of a mesh for collisions.
+
+A physics engine collides convex bodies. A convex part of a mesh, closed and oriented outwards, is used as it is. If other
+parts belong to a body that never moves, each flat patch of their surface becomes a thin prism, so that a robot can stand in
+a room that is one mesh. If the body moves, the convex hull of each part is used.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from minirospy.core.meshes.mesh import Mesh
+
+__all__ = ["Parts", "collision_parts", "connected_parts", "is_convex"]
+
+MAX_HULLS = 32  # of a moving mesh; one with more parts collides as the hull of all
+MAX_PRISMS = 5000  # of a static mesh; a finer one is simplified first
+THICKNESS = 0.02  # m, of a prism, below the surface
+FLAT = 1e-6  # of the mesh's size: what is thinner has no hull
+TOLERANCE = 1e-4  # of the part's size, for vertices in front of a face of a convex part
+
+Points = NDArray[np.float64]
+Triangles = NDArray[np.int32]
+
+
+class Parts(NamedTuple):
+    """Meshes whose convex hulls collide; ``are_exact``: together they are the mesh itself."""
+
+    meshes: list[Mesh]
+    are_exact: bool
+
+
+def collision_parts(mesh: Mesh, *, is_static: bool) -> Parts:
+    """Return the convex parts."""
+    mesh = _welded(mesh)
+    parts = connected_parts(mesh)
+    if not is_static:
+        if len(parts) > MAX_HULLS:
+            return Parts([_thickened(mesh)], False)
+        return Parts([_thickened(part) for part in parts], all(map(is_convex, parts)))
+
+    convex: list[Mesh] = []
+    others: list[Mesh] = []
+    for part in parts:
+        (convex if is_convex(part) else others).append(part)
+    if len(convex) > MAX_PRISMS:
+        others, convex = parts, []
+    if not others:
+        return Parts(convex, True)
+    return Parts(convex + _prisms(Mesh.join(others)), False)
+
+
+def connected_parts(mesh: Mesh) -> list[Mesh]:
+    """Return the parts that share no vertex, in the order of their first triangles."""
+    labels = _labels(len(mesh.vertices), mesh.triangles)
+    of_triangle = labels[mesh.triangles[:, 0]]
+    order = np.argsort(of_triangle, kind="stable")
+    _, starts = np.unique(of_triangle[order], return_index=True)
+    return [
+        _compact(mesh.vertices, mesh.triangles[np.sort(rows)])
+        for rows in sorted(np.split(order, starts[1:]), key=lambda rows: int(rows.min()))
+    ]
+
+
+def is_convex(part: Mesh) -> bool:
+    """Return whether a connected mesh is closed, oriented outwards, and has no vertex in front of a face."""
+    triangles, vertices = part.triangles, part.vertices
+    if len(triangles) < 4 or len(triangles) > 20_000:
+        return False
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
+        np.int64
+    )
+    forward = edges[:, 0] * len(vertices) + edges[:, 1]
+    backward = edges[:, 1] * len(vertices) + edges[:, 0]
+    if len(np.unique(forward)) != len(forward) or not np.array_equal(np.sort(forward), np.sort(backward)):
+        return False
+
+    size = float(np.ptp(vertices, axis=0).max())
+    normals = _normals(part)
+    offsets = np.einsum("ij,ij->i", normals, vertices[triangles[:, 0]])
+    for start in range(0, len(normals), 512):  # in blocks, because of the memory
+        rows = slice(start, start + 512)
+        heights = normals[rows] @ vertices.T - offsets[rows, None]
+        if heights.max() > TOLERANCE * size:
+            return False
+    # A flat part passes, too, but has no volume.
+    return bool(np.linalg.matrix_rank(vertices - vertices[0], tol=FLAT * max(size, 1e-12)) == 3)
+
+
+def _welded(mesh: Mesh) -> Mesh:
+    """Merge equal vertices, and drop triangles without area."""
+    points = mesh.vertices[mesh.triangles].reshape(-1, 3)
+    size = max(float(np.ptp(points, axis=0).max()), 1e-12)
+    grid = np.round((points - points.min(axis=0)) / (size * 1e-7)).astype(np.int64)
+    _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    triangles = index.reshape(-1, 3).astype(np.int32)
+    vertices = points[first]
+    corners = vertices[triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    keep = areas > 1e-12 * size * size
+    return Mesh(vertices, triangles[keep] if keep.any() else triangles)
+
+
+def _labels(count: int, triangles: Triangles) -> NDArray[np.int64]:
+    """Return for each vertex the smallest index of a vertex that is connected with it."""
+    labels = np.arange(count)
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]]).astype(np.int64)
+    while True:
+        left, right = labels[pairs[:, 0]], labels[pairs[:, 1]]
+        lower = np.minimum(left, right)
+        if np.array_equal(left, right):
+            return labels
+        # Hook each root to a smaller one, then shorten all paths.
+        np.minimum.at(labels, left, lower)
+        np.minimum.at(labels, right, lower)
+        while True:
+            shorter = labels[labels]
+            if np.array_equal(shorter, labels):
+                break
+            labels = shorter
+
+
+def _compact(vertices: Points, triangles: Triangles) -> Mesh:
+    used, index = np.unique(triangles, return_inverse=True)
+    return Mesh(vertices[used], index.reshape(-1, 3).astype(np.int32))
+
+
+def _normals(mesh: Mesh) -> Points:
+    corners = mesh.vertices[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths: Points = np.linalg.norm(normals, axis=1, keepdims=True)
+    result: Points = normals / np.maximum(lengths, 1e-300)
+    return result
+
+
+def _thickened(part: Mesh) -> Mesh:
+    """Give a flat part a thickness, because it has no hull otherwise."""
+    centered = part.vertices - part.vertices.mean(axis=0)
+    size = max(float(np.ptp(centered, axis=0).max()), 1e-9)
+    _, widths, axes = np.linalg.svd(centered, full_matrices=True)
+    scale = np.sqrt(len(centered))
+    vertices = part.vertices
+    for index in range(3):
+        width = widths[index] / scale if index < len(widths) else 0.0
+        if width < 1e-4 * size:
+            half = axes[index] * max(size * 1e-3, 5e-4)
+            vertices = np.concatenate([vertices - half, vertices + half])
+    if len(vertices) == len(part.vertices):
+        return part
+    return Mesh(vertices, part.triangles)
+
+
+def _prisms(mesh: Mesh) -> list[Mesh]:
+    """Return a prism below each flat convex patch of the surface."""
+    mesh = _simplified(mesh)
+    normals = _normals(mesh)
+    patches: list[tuple[Points, Points]] = []
+    for rows in _coplanar(mesh, normals):
+        outline = _convex_outline(mesh, rows, normals[rows[0]])
+        if outline is not None:
+            patches.append((outline, normals[rows[0]]))
+        else:
+            patches.extend((mesh.vertices[mesh.triangles[row]], normals[row]) for row in rows)
+    depths = _depths(mesh, patches)
+    return [
+        Mesh(np.concatenate([outline, outline - depth * normal]), np.zeros((0, 3), np.int32))
+        for (outline, normal), depth in zip(patches, depths, strict=True)
+    ]
+
+
+def _simplified(mesh: Mesh) -> Mesh:
+    """Merge vertices that are near each other until there are at most MAX_PRISMS triangles."""
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    cell = size / 2000
+    result = mesh
+    while len(result.triangles) > 2 * MAX_PRISMS:
+        grid = np.round(mesh.vertices / cell).astype(np.int64)
+        _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+        triangles = index.ravel()[mesh.triangles]
+        a, b, c = triangles.T
+        triangles = triangles[(a != b) & (b != c) & (c != a)]
+        if not len(triangles):
+            break
+        _, rows = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+        result = _compact(mesh.vertices[first], triangles[np.sort(rows)].astype(np.int32))
+        cell *= 1.5
+    return result
+
+
+def _coplanar(mesh: Mesh, normals: Points) -> list[NDArray[np.int64]]:
+    """Return groups of triangles that are connected by edges and lie in one plane."""
+    count = len(mesh.triangles)
+    triangles = mesh.triangles.astype(np.int64)
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
+    owners = np.tile(np.arange(count), 3)
+    keys = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
+    order = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    left, right = owners[order][same], owners[order][same + 1]
+    flat = np.einsum("ij,ij->i", normals[left], normals[right]) > 1 - 1e-8
+    left, right = left[flat], right[flat]
+    labels = _labels(count, np.stack([left, right, right], axis=1).astype(np.int32))
+    order = np.argsort(labels, kind="stable")
+    _, starts = np.unique(labels[order], return_index=True)
+    return list(np.split(order, starts[1:]))
+
+
+def _convex_outline(mesh: Mesh, rows: NDArray[np.int64], normal: Points) -> Points | None:
+    """Return the corners of a patch, or None if it is not convex."""
+    points = mesh.vertices[np.unique(mesh.triangles[rows])]
+    first = np.cross(normal, (1.0, 0, 0) if abs(normal[0]) < 0.9 else (0, 1.0, 0))
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    flat = np.stack([points @ first, points @ second], axis=1)
+    hull = _hull(flat)
+    corners = mesh.vertices[mesh.triangles[rows]]
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    ).sum()
+    x, y = flat[hull].T
+    whole = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return points[hull] if abs(whole - area) <= 1e-4 * whole else None
+
+
+def _hull(points: Points) -> list[int]:
+    """Return the indices of the corners of a plane hull (Andrew's monotone chain)."""
+    order = np.lexsort((points[:, 1], points[:, 0])).tolist()
+    rows = points.tolist()
+
+    def chain(indices: list[int]) -> list[int]:
+        result: list[int] = []
+        for index in indices:
+            x, y = rows[index]
+            while len(result) >= 2:
+                (ax, ay), (bx, by) = rows[result[-2]], rows[result[-1]]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0:
+                    break
+                result.pop()
+            result.append(index)
+        return result[:-1]
+
+    return chain(order) + chain(order[::-1])
+
+
+def _depths(mesh: Mesh, patches: list[tuple[Points, Points]]) -> Points:
+    """Return each prism's thickness: less where the surface behind it is near, so that thin walls stay thin."""
+    depths = np.full(len(patches), THICKNESS)
+    if len(patches) * len(mesh.triangles) > 20_000_000:
+        return depths
+    corners = mesh.vertices[mesh.triangles]
+    origin, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    for index, (outline, normal) in enumerate(patches):
+        # Moeller and Trumbore's intersection of one ray with all triangles.
+        start = outline.mean(axis=0)
+        cross = np.cross(-normal, second)
+        determinant = np.einsum("ij,ij->i", first, cross)
+        inverse = np.divide(1.0, determinant, out=np.zeros_like(determinant), where=abs(determinant) > 1e-15)
+        offset = start - origin
+        u = np.einsum("ij,ij->i", offset, cross) * inverse
+        q = np.cross(offset, first)
+        v = (q @ -normal) * inverse
+        distance = np.einsum("ij,ij->i", second, q) * inverse
+        hits = distance[(inverse != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-4)]
+        if len(hits):
+            depths[index] = min(THICKNESS, max(float(hits.min()), 1e-3))
+    return depths

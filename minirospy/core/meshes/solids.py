@@ -1,0 +1,84 @@
+"""Meshes of polylines, and the heights of terrains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from minirospy.core.meshes.errors import MeshError
+from minirospy.core.meshes.mesh import Mesh
+
+__all__ = ["polyline_mesh", "terrain"]
+
+MAX_POINTS = 2000
+MAX_TERRAIN = 2049  # pixels on a side
+
+
+def polyline_mesh(points: Sequence[tuple[float, float]], height: float) -> Mesh:
+    """Return the prism from z = 0 to ``height`` over a simple polygon. Raise MeshError if there is no area."""
+    outline = [points[index] for index in range(len(points)) if points[index] != points[index - 1]]
+    if not 3 <= len(outline) <= MAX_POINTS:
+        raise MeshError(f"a polyline has 3 to {MAX_POINTS} points, not {len(outline)}")
+    corners = np.array(outline, np.float64)
+    x, y = corners.T
+    if x @ np.roll(y, -1) - y @ np.roll(x, -1) < 0:
+        corners = corners[::-1].copy()
+    count = len(corners)
+    top = np.array(_ears(corners), np.int32).reshape(-1, 3) + count
+    ring = np.arange(count, dtype=np.int32)
+    after = np.roll(ring, -1)
+    sides = np.concatenate(
+        [np.stack([ring, after, after + count], 1), np.stack([ring, after + count, ring + count], 1)]
+    )
+    vertices = np.zeros((2 * count, 3))
+    vertices[:count, :2] = vertices[count:, :2] = corners
+    vertices[count:, 2] = height
+    return Mesh.checked(vertices, np.concatenate([top, (top - count)[:, ::-1], sides]).astype(np.int32))
+
+
+def _ears(points: NDArray[np.float64]) -> list[tuple[int, int, int]]:
+    """Return the triangles of a counter-clockwise polygon, by cutting off ears."""
+    left = list(range(len(points)))
+    result: list[tuple[int, int, int]] = []
+    while len(left) > 3:
+        for at in range(len(left)):
+            a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
+            if _is_ear(points, a, b, c, left):
+                result.append((a, b, c))
+                del left[at]
+                break
+        else:
+            raise MeshError("a polyline crosses itself")
+    return [*result, (left[0], left[1], left[2])]
+
+
+def _is_ear(points: NDArray[np.float64], a: int, b: int, c: int, left: list[int]) -> bool:
+    def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
+        value: NDArray[np.float64] = (q[0] - p[0]) * (r[..., 1] - p[1]) - (q[1] - p[1]) * (r[..., 0] - p[0])
+        return value
+
+    pa, pb, pc = points[a], points[b], points[c]
+    if side(pa, pb, pc) < 0:
+        return False
+    others = points[[each for each in left if each not in (a, b, c)]]
+    inside = (side(pa, pb, others) > 0) & (side(pb, pc, others) > 0) & (side(pc, pa, others) > 0)
+    return not inside.any()
+
+
+def terrain(path: str) -> NDArray[np.float64]:
+    """Return a grey picture's heights from 0 to 1, the first row at the smallest y. Raise MeshError if it cannot be read."""
+    try:
+        from PIL import Image
+    except ImportError:
+        raise MeshError("reading the heightmap needs the library Pillow: minirospy[images]", path) from None
+    try:
+        with Image.open(path) as picture:
+            if max(picture.size) > MAX_TERRAIN:
+                raise MeshError(f"the heightmap is larger than {MAX_TERRAIN} pixels", path)
+            pixels = np.asarray(picture.convert("I" if picture.mode.startswith("I") else "L"), np.float64)
+    except (OSError, ValueError, SyntaxError) as error:
+        raise MeshError(f"the heightmap cannot be read: {error}", path) from None
+    scale = 65535.0 if pixels.max() > 255 else 255.0
+    return np.clip(pixels[::-1] / scale, 0.0, 1.0)

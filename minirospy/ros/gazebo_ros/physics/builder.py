@@ -1,0 +1,268 @@
+"""Models' records become bodies, joints and geoms of an MjSpec."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from minirospy.core.sdf.model import IDENTITY, Axis, Joint, Link, Model, Physics, Pose, Quaternion, Vector
+from minirospy.core.sdf.pose_math import compose, inverse, relative, rotate, transform
+from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
+from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
+from minirospy.ros.gazebo_ros.physics.shapes import Shapes
+from minirospy.ros.gazebo_ros.physics.tree import WORLD, LinkTree, plan_tree
+
+__all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits"]
+
+FIXED_KINDS = ("fixed",)
+MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
+MIN_RANGE = 1e-5  # MuJoCo refuses a range of length zero
+MOTOR_DAMPING = (
+    0.9999  # MuJoCo's largest impedance: rows of joint friction and motors are as hard as it allows
+)
+
+
+@dataclass
+class BuiltModel:
+    """What a model added to the spec.
+
+    ``roots``: the bodies below the world by the links' names; ``free``: those with six degrees of freedom; ``joints``: those
+    in the tree of bodies; ``others``: excluded contacts and equalities.
+    """
+
+    roots: dict[str, Any] = field(default_factory=dict)
+    bodies: dict[str, Any] = field(default_factory=dict)
+    free: set[str] = field(default_factory=set)
+    joints: set[str] = field(default_factory=set)
+    others: list[Any] = field(default_factory=list)
+
+
+class Builder:
+    """Adds models to a spec, and deletes them."""
+
+    def __init__(self, physics: Physics) -> None:
+        mujoco = load_mujoco()
+        self._mujoco = mujoco
+        self.spec = mujoco.MjSpec()
+        self.shapes = Shapes(self.spec)
+        self.spec.compiler.degree = False
+        self.spec.compiler.autolimits = False
+        option = self.spec.option
+        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        option.impratio = 10.0  # friction creeps less
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        self.set_physics(physics)
+
+    def set_physics(self, physics: Physics) -> None:
+        """Set the step and the gravity of the next compilation."""
+        self.spec.option.timestep = physics.step
+        self.spec.option.gravity = physics.gravity
+        self._step = physics.step
+
+    def add(self, model: Model, name: str, pose: Pose) -> BuiltModel:
+        """Add a model at a pose. Raise SimulationError if a part of it cannot be simulated; then nothing is added."""
+        built = BuiltModel()
+        try:
+            tree = LinkTree(order=list(model.links)) if model.is_static else plan_tree(model)
+            for link_name in tree.order:
+                self._add_link(built, tree, model, name, pose, model.links[link_name])
+            if not model.is_static:
+                self._add_excludes(built, model, name)
+                for joint in tree.loops:
+                    self._add_loop(built, model, name, joint)
+                self._add_mimics(built, model, name)
+        except (ValueError, TypeError, OSError) as error:
+            self.delete(built)
+            raise SimulationError(f"model '{name}': {_first_line(error)}") from error
+        except SimulationError:
+            self.delete(built)
+            raise
+        return built
+
+    def delete(self, built: BuiltModel) -> None:
+        """Delete a model from the spec."""
+        for each in built.others:
+            self.spec.delete(each)
+        for body in built.roots.values():
+            self.spec.delete(body)
+        built.roots, built.bodies, built.others = {}, {}, []
+
+    def _add_link(
+        self, built: BuiltModel, tree: LinkTree, model: Model, name: str, pose: Pose, link: Link
+    ) -> None:
+        joint = tree.joint_of.get(link.name)
+        scoped = f"{name}::{link.name}"
+        if joint is None or joint.parent == WORLD:
+            body = self.spec.worldbody.add_body(name=scoped)
+            built.roots[link.name] = body
+            local = compose(pose, link.pose)
+        else:
+            body = built.bodies[joint.parent].add_body(name=scoped)
+            local = relative(model.links[joint.parent].pose, link.pose)
+        built.bodies[link.name] = body
+        body.pos, body.quat = local.position, _wxyz(local.orientation)
+
+        if not model.is_static:
+            inertia = principal_inertia(link.inertial)
+            body.explicitinertial = True
+            body.mass, body.inertia = inertia.mass, inertia.moments
+            body.ipos, body.iquat = inertia.pose.position, _wxyz(inertia.pose.orientation)
+            body.gravcomp = 0.0 if link.has_gravity else 1.0
+            if joint is None:
+                body.add_freejoint(name=scoped)
+                built.free.add(link.name)
+            else:
+                self._add_joint(body, f"{name}::{joint.name}", joint)
+                built.joints.add(joint.name)
+
+        for collision in link.collisions:
+            self.shapes.add_collision(
+                body,
+                f"{scoped}::{collision.name}",
+                collision,
+                is_static=model.is_static or joint_is_rigid(tree, link.name),
+                pose=collision.pose,
+            )
+
+    def _add_joint(self, body: Any, scoped: str, joint: Joint) -> None:
+        kinds = self._mujoco.mjtJoint
+        if joint.kind in FIXED_KINDS:
+            return
+        if joint.kind == "ball":
+            body.add_joint(name=scoped, type=kinds.mjJNT_BALL, pos=joint.pose.position)
+            return
+        if joint.kind not in ("revolute", "continuous", "prismatic", "universal"):
+            raise SimulationError(f"joint '{joint.name}' has the unknown type '{joint.kind}'")
+        slides = joint.kind == "prismatic"
+        for axis_name, axis in zip(axis_names(scoped, joint), (joint.axis, joint.axis2), strict=False):
+            row = body.add_joint(name=axis_name, type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE)
+            row.pos = joint.pose.position
+            row.axis = _direction(joint, axis)
+            _set_first(row, "damping", _number(axis.damping))
+            _set_first(row, "stiffness", _number(axis.spring_stiffness))
+            row.springref = axis.spring_reference
+            row.frictionloss = max(axis.friction, 0.0)
+            row.solref_friction = [-1 / self._step, -1 / self._step]
+            row.solimp_friction = [MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0]
+            row.solref_limit = [0.005, 1.0]
+            row.solimp_limit = [0.95, 0.99, 0.001, 0.5, 2.0]
+            if joint.kind != "continuous" and has_limits(axis):
+                lower, upper = sorted((axis.lower, axis.upper))
+                if upper - lower < 2 * MIN_RANGE:
+                    lower, upper = lower - MIN_RANGE, upper + MIN_RANGE
+                row.limited = True
+                row.range = [max(lower, -MAX_LIMIT), min(upper, MAX_LIMIT)]
+
+    def _add_excludes(self, built: BuiltModel, model: Model, name: str) -> None:
+        """Exclude contacts within the model, or those of links that a joint connects if the model collides with itself."""
+        with_shapes = [link for link in model.links.values() if link.collisions]
+        joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
+        for index, first in enumerate(with_shapes):
+            for second in with_shapes[index + 1 :]:
+                both = model.self_collide or (first.self_collide and second.self_collide)
+                if both and frozenset((first.name, second.name)) not in joined:
+                    continue
+                built.others.append(
+                    self.spec.add_exclude(
+                        bodyname1=f"{name}::{first.name}", bodyname2=f"{name}::{second.name}"
+                    )
+                )
+
+    def _add_loop(self, built: BuiltModel, model: Model, name: str, joint: Joint) -> None:
+        """Close a kinematic loop with an equality: a weld, or connections at one or two points of the axis."""
+        child = model.links[joint.child].pose
+        parent = IDENTITY if joint.parent == WORLD else model.links[joint.parent].pose
+        first = f"{name}::{joint.child}"
+        second = "" if joint.parent == WORLD else f"{name}::{joint.parent}"
+        if joint.kind == "prismatic":
+            raise SimulationError(f"joint '{joint.name}' closes a loop: a prismatic joint cannot do that")
+        equality = self._mujoco.mjtEq
+        if joint.kind == "fixed":
+            pose = relative(child, parent)  # of the parent in the child
+            data = [0.0] * 11
+            data[3:6] = pose.position
+            data[6:10] = _wxyz(pose.orientation)
+            data[10] = 1.0
+            self._add_equality(built, equality.mjEQ_WELD, first, second, data)
+            return
+        x, y, z = joint.pose.position
+        points: list[Vector] = [(x, y, z)]
+        if joint.kind in ("revolute", "continuous"):
+            ax, ay, az = _direction(joint, joint.axis)
+            points = [(x + s * ax, y + s * ay, z + s * az) for s in (-0.05, 0.05)]
+        for point in points:
+            data = [0.0] * 11
+            data[0:3] = point
+            data[3:6] = transform(inverse(parent), transform(child, point))
+            self._add_equality(built, equality.mjEQ_CONNECT, first, second, data)
+
+    def _add_equality(self, built: BuiltModel, kind: Any, first: str, second: str, data: list[float]) -> None:
+        row = self.spec.add_equality(type=kind, objtype=self._mujoco.mjtObj.mjOBJ_BODY, name1=first)
+        row.name2 = second
+        row.data = data
+        row.solref = [0.005, 1.0]
+        built.others.append(row)
+
+    def _add_mimics(self, built: BuiltModel, model: Model, name: str) -> None:
+        for joint in model.joints.values():
+            mimic = joint.mimic
+            leader = model.joints.get(mimic.joint) if mimic else None
+            if mimic is None or leader is None or joint.kind in ("fixed", "ball") or leader.kind == "fixed":
+                continue
+            row = self.spec.add_equality(
+                type=self._mujoco.mjtEq.mjEQ_JOINT, objtype=self._mujoco.mjtObj.mjOBJ_JOINT
+            )
+            row.name1, row.name2 = f"{name}::{joint.name}", f"{name}::{mimic.joint}"
+            row.data = [mimic.offset, mimic.multiplier] + [0.0] * 9
+            row.solref = [0.005, 1.0]
+            built.others.append(row)
+
+
+def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
+    """Return the names of MuJoCo's joints for a joint: one for each axis, none for a fixed joint."""
+    if joint.kind in FIXED_KINDS:
+        return ()
+    return (scoped, f"{scoped}/1") if joint.kind == "universal" else (scoped,)
+
+
+def has_limits(axis: Axis) -> bool:
+    """Return whether at least one limit is finite."""
+    return max(axis.lower, axis.upper) < MAX_LIMIT or min(axis.lower, axis.upper) > -MAX_LIMIT
+
+
+def joint_is_rigid(tree: LinkTree, link: str) -> bool:
+    """Return whether fixed joints connect a link to the world."""
+    while (joint := tree.joint_of.get(link)) is not None and joint.kind in FIXED_KINDS:
+        link = joint.parent
+    return link == WORLD
+
+
+def _direction(joint: Joint, axis: Axis) -> Vector:
+    """Return the axis in the child link's frame."""
+    if not math.hypot(*axis.xyz) > 1e-9:
+        raise SimulationError(f"joint '{joint.name}' has an axis of length zero")
+    return rotate(joint.pose.orientation, axis.xyz)
+
+
+def _set_first(row: Any, name: str, value: float) -> None:
+    """Set a coefficient that is a polynomial's first one since MuJoCo 4, and a number before."""
+    if isinstance(getattr(row, name), float):
+        setattr(row, name, value)
+    else:
+        getattr(row, name)[0] = value
+
+
+def _number(value: float) -> float:
+    return max(value, 0.0) if math.isfinite(value) else 0.0
+
+
+def _wxyz(rotation: Quaternion) -> Quaternion:
+    x, y, z, w = rotation
+    return w, x, y, z
+
+
+def _first_line(error: BaseException) -> str:
+    lines = str(error).strip().splitlines()
+    return " ".join(lines[:2]) if lines else type(error).__name__

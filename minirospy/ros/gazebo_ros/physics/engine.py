@@ -1,0 +1,182 @@
+"""MuJoCo's compiled model and data, one step at a time, with motors as in ODE.
+
+After each step the positions of bodies, the contacts and the velocities belong to the new time: a step is the second half of
+``mj_step`` (forces, solver, integration) and the first half of the next one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from minirospy.core.sdf.model import Physics
+from minirospy.ros.gazebo_ros.physics.builder import MOTOR_DAMPING, Builder
+from minirospy.ros.gazebo_ros.physics.library import load_mujoco
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_COLLISION, GROUP_RAY_ONLY
+
+__all__ = ["Engine"]
+
+RAY_GROUPS = np.array([each in (GROUP_COLLISION, GROUP_RAY_ONLY) for each in range(6)], np.uint8)
+MAX_FORCE = 1e9  # N or N m; a motor without a limit
+
+
+class Engine:
+    """The compiled world.
+
+    A motor is a row of joint friction whose target velocity is not zero, as ODE's motors are: the solver holds the velocity with
+    at most the maximum force. MuJoCo computes the reference acceleration of such a row as ``-b * velocity``; this class adds
+    ``b * target`` between the two halves of a step.
+    """
+
+    def __init__(self, builder: Builder, physics: Physics) -> None:
+        self.mujoco = load_mujoco()
+        self._builder = builder
+        self.physics = physics
+        self.model: Any = builder.spec.compile()
+        self.data: Any = self.mujoco.MjData(self.model)
+        self.generation = 0  # grows with each compilation: ids of bodies and joints change
+        self.is_stale = True  # whether positions have changed since the last forward computation
+        self.records_details = False  # whether forces of contacts and joints are kept for the readers
+        self.contacts: NDArray[np.int32] = np.zeros((0, 2), np.int32)
+        self.contact_points: NDArray[np.float64] = np.zeros((0, 3))
+        self.contact_frames: NDArray[np.float64] = np.zeros((0, 9))
+        self.contact_depths: NDArray[np.float64] = np.zeros(0)
+        self.contact_wrenches: NDArray[np.float64] = np.zeros((0, 6))
+        self.joint_wrenches: NDArray[np.float64] = np.zeros((1, 6))
+        self._has_normals = "normal:" in (self.mujoco.mj_multiRay.__doc__ or "")
+        self._size_arrays()
+
+    def _size_arrays(self) -> None:
+        count = self.model.nv
+        self.target_velocity: NDArray[np.float64] = np.zeros(count)
+        self.motor_force: NDArray[np.float64] = np.zeros(count)  # of the last step
+        self.target_position: NDArray[np.float64] = np.zeros(count)
+        self.max_velocity: NDArray[np.float64] = np.full(count, np.inf)
+        self.follows_position: NDArray[np.bool_] = np.zeros(count, np.bool_)
+        self._followers: NDArray[np.intp] = np.zeros(0, np.intp)
+        self._follower_positions: NDArray[np.intp] = np.zeros(0, np.intp)
+        self._bias: NDArray[np.float64] = np.zeros(count)
+        self.position_of_dof: NDArray[np.intp] = np.zeros(count, np.intp)
+        dofs, positions = self.model.jnt_dofadr, self.model.jnt_qposadr
+        self.position_of_dof[dofs] = positions
+        self._set_friction_rows()
+
+    def _set_friction_rows(self) -> None:
+        rate = 1 / self.physics.step
+        self._rate = rate / MOTOR_DAMPING
+        self.model.dof_solref[:] = (-rate, -rate)
+        self.model.dof_solimp[:] = (MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0)
+
+    def recompile(self) -> None:
+        """Compile the changed spec; the states of what stays, and the time, are kept. Raise ValueError if it is invalid."""
+        self.model, self.data = self._builder.spec.recompile(self.model, self.data)
+        self.generation += 1
+        self.is_stale = True
+        self._size_arrays()
+        self._forget_details()
+
+    def set_physics(self, physics: Physics) -> None:
+        """Set the step and the gravity."""
+        self.physics = physics
+        self.model.opt.timestep = physics.step
+        self.model.opt.gravity[:] = physics.gravity
+        self._builder.set_physics(physics)
+        self._set_friction_rows()
+        self.motors_changed()
+        self.is_stale = True
+
+    def motors_changed(self) -> None:
+        """Note that targets of motors have changed."""
+        self._bias = self.target_velocity * self._rate
+        self._followers = np.flatnonzero(self.follows_position)
+        self._follower_positions = self.position_of_dof[self._followers]
+
+    def set_target(self, dof: int, velocity: float) -> None:
+        """Set the target velocity of one motor."""
+        self.target_velocity[dof] = velocity
+        self._bias[dof] = velocity * self._rate
+
+    def refresh(self) -> None:
+        """Compute the positions, contacts and velocities of bodies if the state has changed."""
+        if self.is_stale:
+            self.is_stale = False
+            self.mujoco.mj_step1(self.model, self.data)
+            self._forget_details()
+
+    def step(self) -> None:
+        """Advance by one step."""
+        model, data, mujoco = self.model, self.data, self.mujoco
+        self.refresh()
+        if self._followers.size:
+            self._follow()
+        rows = slice(data.ne, data.ne + data.nf)
+        dofs = data.efc_id[rows] if data.nf else None
+        if dofs is not None:
+            data.efc_aref[rows] += self._bias[dofs]
+
+        mujoco.mj_step2(model, data)
+        if dofs is not None:
+            self.motor_force[dofs] = data.efc_force[rows]
+        if self.records_details:
+            self._record()
+        mujoco.mj_step1(model, data)
+
+    def cast(
+        self,
+        origin: NDArray[np.float64],
+        vectors: NDArray[np.float64],
+        ids: NDArray[np.int32],
+        distances: NDArray[np.float64],
+        max_range: float,
+        excluded_body: int,
+    ) -> None:
+        """Write each ray's first geom and its distance, or -1. ``vectors`` are (n, 3) unit vectors in world axes."""
+        count = len(vectors)
+        # Newer versions have an argument for normals.
+        normals = (None,) if self._has_normals else ()
+        self.mujoco.mj_multiRay(
+            self.model,
+            self.data,
+            origin,
+            vectors.ravel(),
+            RAY_GROUPS,
+            True,
+            excluded_body,
+            ids,
+            distances,
+            *normals,
+            count,
+            max_range,
+        )
+
+    def _follow(self) -> None:
+        """Give position motors the velocity that reaches the target with this step."""
+        dofs = self._followers
+        lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
+        limit = self.max_velocity[dofs]
+        self._bias[dofs] = np.clip(lacking / self.physics.step, -limit, limit) * self._rate
+
+    def _record(self) -> None:
+        """Keep the contacts and forces of the step before the next one's replace them."""
+        data = self.data
+        contact = data.contact
+        self.contacts = contact.geom.copy()
+        self.contact_points = contact.pos.copy()
+        self.contact_frames = contact.frame.copy()
+        self.contact_depths = -contact.dist
+        wrenches = np.zeros((data.ncon, 6))
+        for index in range(data.ncon):
+            self.mujoco.mj_contactForce(self.model, data, index, wrenches[index])
+        self.contact_wrenches = wrenches
+        self.mujoco.mj_rnePostConstraint(self.model, data)
+        self.joint_wrenches = data.cfrc_int.copy()
+
+    def _forget_details(self) -> None:
+        self.contacts = np.zeros((0, 2), np.int32)
+        self.contact_points = np.zeros((0, 3))
+        self.contact_frames = np.zeros((0, 9))
+        self.contact_depths = np.zeros(0)
+        self.contact_wrenches = np.zeros((0, 6))
+        self.joint_wrenches = np.zeros((self.model.nbody, 6))

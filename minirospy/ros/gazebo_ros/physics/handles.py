@@ -1,0 +1,511 @@
+"""Models, links and joints of the running simulation. They stay valid until their model is removed.
+
+They are obtained from :class:`Simulation`, and are used in the same thread as it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from minirospy.core.sdf.model import Axis, Joint, Link, Model, Pose, Vector
+from minirospy.core.sdf.pose_math import compose, inverse, normalized, rotate, transform
+from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names
+from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, Engine
+from minirospy.ros.gazebo_ros.physics.states import ZERO, State, Wrench
+
+__all__ = ["Owner", "SimJoint", "SimLink", "SimModel"]
+
+
+class Owner(Protocol):
+    """What a model needs from the simulation."""
+
+    forced: dict[str, None]
+
+    @property
+    def time(self) -> float:
+        """Return the time in seconds."""
+
+    def recompile(self) -> None:
+        """Compile the world again."""
+
+
+@dataclass
+class TimedWrench:
+    """A wrench in world axes at a point of the link, while ``start`` <= time < ``end`` (s)."""
+
+    force: Vector
+    torque: Vector
+    point: Vector
+    start: float
+    end: float
+
+
+@dataclass
+class TimedForce:
+    """A joint's force or torque while ``start`` <= time < ``end`` (s)."""
+
+    force: float
+    start: float
+    end: float
+
+
+class SimLink:
+    """A rigid body."""
+
+    def __init__(self, engine: Engine, model: SimModel, record: Link) -> None:
+        self._engine = engine
+        self.model = model
+        self.record = record
+        self.name = record.name
+        self.id = 0  # MuJoCo's, which changes with each compilation
+        self.wrenches: list[TimedWrench] = []
+        self.has_damping = (record.linear_damping > 0 or record.angular_damping > 0) and not model.is_static
+
+    @property
+    def scoped_name(self) -> str:
+        """Return ``model::link``."""
+        return f"{self.model.name}::{self.name}"
+
+    @property
+    def pose(self) -> Pose:
+        """Return the pose in the world."""
+        self._engine.refresh()
+        data = self._engine.data
+        x, y, z = data.xpos[self.id].tolist()
+        w, qx, qy, qz = data.xquat[self.id].tolist()
+        return Pose((x, y, z), (qx, qy, qz, w))
+
+    @property
+    def state(self) -> State:
+        """Return the pose and the velocity of the link's origin."""
+        pose = self.pose
+        engine = self._engine
+        velocity = np.zeros(6)
+        kind = engine.mujoco.mjtObj.mjOBJ_XBODY
+        engine.mujoco.mj_objectVelocity(engine.model, engine.data, kind, self.id, velocity, 0)
+        wx, wy, wz, vx, vy, vz = velocity.tolist()
+        return State(pose, (vx, vy, vz), (wx, wy, wz))
+
+    def set_state(self, state: State) -> None:
+        """Move the whole model so that this link has the state, with joint angles kept and joint velocities zero."""
+        change = compose(state.pose, inverse(self.pose))
+        self.model.move(change, state.linear, state.angular, state.pose.position)
+
+    @property
+    def center_of_mass(self) -> Vector:
+        """Return the centre of mass in the world."""
+        self._engine.refresh()
+        x, y, z = self._engine.data.xipos[self.id].tolist()
+        return x, y, z
+
+    @property
+    def has_gravity(self) -> bool:
+        """Return whether gravity acts on the link."""
+        return float(self._engine.model.body_gravcomp[self.id]) == 0.0
+
+    @has_gravity.setter
+    def has_gravity(self, value: bool) -> None:
+        self.model.built.bodies[self.name].gravcomp = 0.0 if value else 1.0
+        if self._engine.model.ngravcomp:
+            self._engine.model.body_gravcomp[self.id] = 0.0 if value else 1.0
+            self._engine.is_stale = True
+        else:
+            self.model.recompile()
+
+    def add_wrench(
+        self,
+        force: Vector = ZERO,
+        torque: Vector = ZERO,
+        *,
+        point: Vector = ZERO,
+        start: float = 0.0,
+        duration: float = math.inf,
+    ) -> None:
+        """Apply a force and a torque in world axes at a point of the link's frame.
+
+        ``start``: time of the simulation in seconds; a time in the past means now. A negative duration means for ever.
+        """
+        start = max(start, self.model.time())
+        end = start + duration if duration >= 0 else math.inf
+        self.wrenches.append(TimedWrench(force, torque, point, start, end))
+        self.model.forces_changed()
+
+    def push(self, force: Vector = ZERO, torque: Vector = ZERO, *, point: Vector = ZERO) -> None:
+        """Apply a force and a torque in world axes at a point of the link's frame for the next step."""
+        now = self.model.time()
+        self.wrenches.append(TimedWrench(force, torque, point, now, now))
+        self.model.forces_changed()
+
+    def clear_wrenches(self) -> None:
+        """Remove all wrenches of :meth:`add_wrench`."""
+        self.wrenches.clear()
+
+    def apply_wrenches(self, now: float) -> bool:
+        """Add the forces of this step to MuJoCo's, and drop those that have ended. Return whether some remain."""
+        step = self._engine.physics.step
+        row = self._engine.data.xfrc_applied[self.id]
+        position, orientation = self.pose
+        center = self.center_of_mass
+        for each in self.wrenches:
+            if each.start <= now + 0.5 * step:
+                arm = rotate(orientation, each.point)
+                arm = _sum(arm, _difference(position, center))
+                row[:3] += each.force
+                row[3:] += _sum(each.torque, _cross(arm, each.force))
+        self.wrenches = [each for each in self.wrenches if each.end > now + 1.5 * step]
+        if self.has_damping:
+            # As in ODE, a share of the velocity is lost in each step.
+            _, linear, angular = self.state
+            mass = float(self._engine.model.body_mass[self.id])
+            moments = self._engine.model.body_inertia[self.id].tolist()
+            loss = self.record.linear_damping * mass / step
+            slow = self.record.angular_damping * min(moments) / step
+            row[:3] -= [loss * value for value in linear]
+            row[3:] -= [slow * value for value in angular]
+        return bool(self.wrenches) or self.has_damping
+
+
+class SimJoint:
+    """A joint, or one axis of a universal joint. A fixed or a ball joint has no axis: its position is 0.
+
+    Positions are in rad or m, velocities in rad/s or m/s, forces in N m or N.
+    """
+
+    def __init__(self, engine: Engine, model: SimModel, record: Joint, axis: Axis, scoped: str) -> None:
+        self._engine = engine
+        self.model = model
+        self.record = record
+        self.axis = axis
+        self.name = record.name
+        self.scoped = scoped  # MuJoCo's name, or an empty string
+        self.second: SimJoint | None = None  # the second axis of a universal joint
+        self.dof = -1  # MuJoCo's, which changes with each compilation
+        self._address = -1
+        self._force = 0.0
+        self._timed: list[TimedForce] = []
+        self._max_force = 0.0  # of the motor; 0: no motor
+        self._velocity = 0.0
+        self._target: float | None = None
+        self._max_velocity = math.inf
+
+    @property
+    def has_axis(self) -> bool:
+        """Return whether the joint can move about or along an axis."""
+        return self.dof >= 0
+
+    @property
+    def position(self) -> float:
+        """Return the position."""
+        return float(self._engine.data.qpos[self._address]) if self.dof >= 0 else 0.0
+
+    @property
+    def velocity(self) -> float:
+        """Return the velocity."""
+        return float(self._engine.data.qvel[self.dof]) if self.dof >= 0 else 0.0
+
+    @property
+    def effort(self) -> float:
+        """Return the force of the last step: what was applied, and that of the motor or of the joint's friction."""
+        if self.dof < 0:
+            return 0.0
+        engine = self._engine
+        return float(engine.data.qfrc_applied[self.dof] + engine.motor_force[self.dof])
+
+    def set_state(self, position: float, velocity: float = 0.0) -> None:
+        """Set position and velocity at once."""
+        if self.dof >= 0:
+            self._engine.data.qpos[self._address] = position
+            self._engine.data.qvel[self.dof] = velocity
+            self._engine.is_stale = True
+
+    def set_velocity_now(self, velocity: float) -> None:
+        """Set the velocity at once."""
+        if self.dof >= 0:
+            self._engine.data.qvel[self.dof] = velocity
+            self._engine.is_stale = True
+
+    def set_force(self, force: float) -> None:
+        """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
+        self._force = force
+        self.model.forces_changed()
+
+    def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
+        """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: for ever)."""
+        start = max(start, self.model.time())
+        end = start + duration if duration >= 0 else math.inf
+        self._timed.append(TimedForce(force, start, end))
+        self.model.forces_changed()
+
+    def clear_forces(self) -> None:
+        """Remove the forces of :meth:`set_force` and :meth:`add_force`."""
+        self._force = 0.0
+        self._timed.clear()
+        self.model.forces_changed()
+
+    def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
+        """Start or change a motor that holds a velocity with at most a force."""
+        self._velocity, self._target = velocity, None
+        self._start_motor(max_force)
+
+    def set_position(
+        self, position: float, max_force: float = math.inf, max_velocity: float = math.inf
+    ) -> None:
+        """Start or change a motor that moves to a position, with at most a force and a velocity."""
+        self._velocity, self._target, self._max_velocity = 0.0, position, max_velocity
+        self._start_motor(max_force)
+
+    def stop_motor(self) -> None:
+        """Remove the motor: the joint moves freely."""
+        self._max_force, self._target, self._velocity = 0.0, None, 0.0
+        self._write_motor()
+
+    def _start_motor(self, max_force: float) -> None:
+        force = min(max(max_force, 0.0), MAX_FORCE)
+        same = force == self._max_force and self.dof >= 0
+        self._max_force = force
+        if same and self._target is None and not self._engine.follows_position[self.dof]:
+            self._engine.set_target(self.dof, self._velocity)
+        elif same and self._target is not None and self._engine.follows_position[self.dof]:
+            self._engine.target_position[self.dof] = self._target
+            self._engine.max_velocity[self.dof] = self._max_velocity
+        else:
+            self._write_motor()
+
+    def _write_motor(self) -> None:
+        if self.dof < 0:
+            return
+        engine, dof = self._engine, self.dof
+        friction = max(self.axis.friction, 0.0)
+        engine.model.dof_frictionloss[dof] = self._max_force or friction
+        engine.target_velocity[dof] = self._velocity
+        engine.follows_position[dof] = self._target is not None
+        if self._target is not None:
+            engine.target_position[dof] = self._target
+        engine.max_velocity[dof] = self._max_velocity
+        engine.motors_changed()
+        engine.is_stale = True
+
+    def bind(self) -> None:
+        """Find MuJoCo's ids after a compilation, and write the motor again."""
+        if not self.scoped or self.record.kind == "ball":
+            return
+        row = self._engine.model.joint(self.scoped)
+        self.dof, self._address = int(row.dofadr[0]), int(row.qposadr[0])
+        if self._max_force or self._engine.model.dof_frictionloss[self.dof] != max(self.axis.friction, 0.0):
+            self._write_motor()
+
+    def apply_forces(self, now: float) -> bool:
+        """Write this step's force. Return whether a force remains for later steps."""
+        if self.dof < 0:
+            return False
+        force = self._force
+        if self._timed:
+            step = self._engine.physics.step
+            force += sum(each.force for each in self._timed if each.start <= now + 0.5 * step)
+            self._timed = [each for each in self._timed if each.end > now + 1.5 * step]
+        limit, fastest = self.axis.effort, self.axis.velocity
+        if 0 <= limit < math.inf:
+            force = min(max(force, -limit), limit)
+        if force and 0 < fastest < math.inf:
+            velocity = self.velocity
+            if (velocity > fastest and force > 0) or (velocity < -fastest and force < 0):
+                force = 0.0
+        self._engine.data.qfrc_applied[self.dof] = force
+        return bool(self._force or self._timed)
+
+    def reset(self) -> None:
+        """Return to the initial position without forces and motor."""
+        self.clear_forces()
+        self.stop_motor()
+        self.set_state(self.axis.initial_position)
+
+    def wrench(self) -> Wrench:
+        """Return the force and torque that the child exerts on the parent at the joint, in the child link's axes.
+
+        It belongs to the last step, and needs ``Simulation.records_details``.
+        """
+        engine = self._engine
+        link = self.model.links[self.record.child]
+        torque_x, torque_y, torque_z, *rest = engine.joint_wrenches[link.id].tolist()
+        force: Vector = (rest[0], rest[1], rest[2])
+        root = int(engine.model.body_rootid[link.id])
+        reference = engine.data.subtree_com[root].tolist()
+        pose = link.pose
+        anchor = transform(pose, self.record.pose.position)
+        arm = _difference((reference[0], reference[1], reference[2]), anchor)
+        torque = _sum((torque_x, torque_y, torque_z), _cross(arm, force))
+        back = inverse(pose).orientation
+        fx, fy, fz = rotate(back, force)
+        tx, ty, tz = rotate(back, torque)
+        return Wrench((-fx, -fy, -fz), (-tx, -ty, -tz))
+
+
+class SimModel:
+    """A model in the simulation: its links and joints by name."""
+
+    def __init__(
+        self, engine: Engine, name: str, record: Model, start: Pose, built: BuiltModel, owner: Owner
+    ) -> None:
+        self._engine = engine
+        self._owner = owner
+        self.name = name
+        self.record = record
+        self.built = built
+        self.start = start  # the pose to which a reset returns
+        self.is_removed = False
+        self.links: Mapping[str, SimLink] = {
+            key: SimLink(engine, self, link) for key, link in record.links.items()
+        }
+        joints: dict[str, SimJoint] = {}
+        for key, joint in record.joints.items():
+            names = ("",) if key not in built.joints else axis_names(f"{name}::{key}", joint) or ("",)
+            joints[key] = SimJoint(engine, self, joint, joint.axis, names[0])
+            if len(names) == 2:
+                joints[key].second = SimJoint(engine, self, joint, joint.axis2, names[1])
+        self.joints: Mapping[str, SimJoint] = joints
+
+    @property
+    def is_static(self) -> bool:
+        """Return whether the model never moves by itself."""
+        return self.record.is_static
+
+    @property
+    def canonical_link(self) -> SimLink:
+        """Return the link that carries the model's frame: the first one."""
+        return next(iter(self.links.values()))
+
+    @property
+    def pose(self) -> Pose:
+        """Return the pose of the model's frame, which moves with the first link."""
+        link = self.canonical_link
+        return compose(link.pose, inverse(link.record.pose))
+
+    @property
+    def state(self) -> State:
+        """Return the pose of the model's frame, and the velocity of its origin."""
+        link = self.canonical_link
+        state = link.state
+        pose = compose(state.pose, inverse(link.record.pose))
+        arm = _difference(pose.position, state.pose.position)
+        return State(pose, _sum(state.linear, _cross(state.angular, arm)), state.angular)
+
+    def set_state(self, state: State) -> None:
+        """Move the model; joint angles are kept, joint velocities become zero."""
+        change = compose(state.pose, inverse(self.pose))
+        self.move(change, state.linear, state.angular, state.pose.position)
+
+    def set_velocity(self, linear: Vector, angular: Vector) -> None:
+        """Set the velocity of the model's origin in world axes; the pose and the joints stay as they are."""
+        origin = self.pose.position
+        for name in self.built.free:
+            self._set_free_velocity(self.links[name], linear, angular, origin)
+        self._engine.is_stale = True
+
+    def move(self, change: Pose, linear: Vector, angular: Vector, origin: Vector) -> None:
+        """Apply a change of pose in the world, and set the velocity of a rigid motion with ``linear`` at ``origin``."""
+        self._engine.refresh()
+        for joint in self.all_joints():
+            joint.set_velocity_now(0.0)
+        for name in self.built.roots:
+            base = self.links[name].pose if name in self.built.free else self._rest_pose(name)
+            self._place(name, compose(change, base))
+        self._engine.is_stale = True
+        for name in self.built.free:
+            self._set_free_velocity(self.links[name], linear, angular, origin)
+        self._engine.is_stale = True
+
+    def _rest_pose(self, root: str) -> Pose:
+        """Return the pose in the world of a root body that is not free, with its joint at position 0."""
+        model, body = self._engine.model, self.links[root].id
+        x, y, z = model.body_pos[body].tolist()
+        w, qx, qy, qz = model.body_quat[body].tolist()
+        return Pose((x, y, z), (qx, qy, qz, w))
+
+    def _place(self, root: str, pose: Pose) -> None:
+        """Set a root body's pose, with its joint at position 0 if it has one."""
+        engine = self._engine
+        body = self.links[root].id
+        x, y, z, w = normalized(pose.orientation)
+        if root in self.built.free:
+            address = int(engine.model.jnt_qposadr[engine.model.body_jntadr[body]])
+            engine.data.qpos[address : address + 7] = (*pose.position, w, x, y, z)
+            return
+        spec = self.built.roots[root]  # the next compilation reads the pose here
+        spec.pos, spec.quat = pose.position, (w, x, y, z)
+        engine.model.body_pos[body] = pose.position
+        engine.model.body_quat[body] = (w, x, y, z)
+
+    def _set_free_velocity(self, link: SimLink, linear: Vector, angular: Vector, origin: Vector) -> None:
+        """Set a free body's velocity; MuJoCo's angular part is in the body's axes."""
+        engine = self._engine
+        pose = link.pose
+        dof = int(engine.model.body_dofadr[link.id])
+        moved = _sum(linear, _cross(angular, _difference(pose.position, origin)))
+        engine.data.qvel[dof : dof + 3] = moved
+        engine.data.qvel[dof + 3 : dof + 6] = rotate(inverse(pose).orientation, angular)
+
+    def all_joints(self) -> Iterator[SimJoint]:
+        """Yield each axis."""
+        for joint in self.joints.values():
+            yield joint
+            if joint.second is not None:
+                yield joint.second
+
+    def bind(self) -> None:
+        """Find MuJoCo's ids after a compilation."""
+        for link in self.links.values():
+            link.id = int(self._engine.model.body(link.scoped_name).id)
+        for joint in self.all_joints():
+            joint.bind()
+
+    def reset(self) -> None:
+        """Return to the pose and joint positions of the start, at rest, without forces and motors."""
+        for link in self.links.values():
+            link.clear_wrenches()
+        for joint in self.all_joints():
+            joint.reset()
+        for name in self.built.roots:
+            self._place(name, compose(self.start, self.links[name].record.pose))
+        self._engine.is_stale = True
+        self.set_velocity(ZERO, ZERO)
+
+    def apply_forces(self, now: float) -> bool:
+        """Write the forces of one step. Return whether the next step has forces, too."""
+        remains = False
+        for link in self.links.values():
+            if link.wrenches or link.has_damping:
+                remains = link.apply_wrenches(now) or remains
+        for joint in self.all_joints():
+            remains = joint.apply_forces(now) or remains
+        return remains
+
+    def time(self) -> float:
+        """Return the time of the simulation in seconds."""
+        return self._owner.time
+
+    def recompile(self) -> None:
+        """Compile the world again."""
+        self._owner.recompile()
+
+    def forces_changed(self) -> None:
+        """Tell the simulation that a force acts on this model."""
+        self._owner.forced[self.name] = None
+
+
+def _sum(left: Vector, right: Vector) -> Vector:
+    return left[0] + right[0], left[1] + right[1], left[2] + right[2]
+
+
+def _difference(left: Vector, right: Vector) -> Vector:
+    return left[0] - right[0], left[1] - right[1], left[2] - right[2]
+
+
+def _cross(left: Vector, right: Vector) -> Vector:
+    ax, ay, az = left
+    bx, by, bz = right
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

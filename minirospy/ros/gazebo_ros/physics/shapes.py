@@ -1,0 +1,233 @@
+"""The shapes of collisions and visuals, as MuJoCo's geoms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from minirospy.core.meshes.errors import MeshError
+from minirospy.core.meshes.files import read_mesh
+from minirospy.core.meshes.mesh import Mesh
+from minirospy.core.meshes.parts import collision_parts
+from minirospy.core.meshes.solids import polyline_mesh, terrain
+from minirospy.core.sdf.model import (
+    Box,
+    Collision,
+    Color,
+    Cylinder,
+    Geometry,
+    Heightmap,
+    MeshShape,
+    Plane,
+    Polyline,
+    Pose,
+    Quaternion,
+    Sphere,
+    Surface,
+    Visual,
+)
+from minirospy.core.sdf.pose_math import compose
+from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
+
+__all__ = ["GROUP_COLLISION", "GROUP_CONTACT_ONLY", "GROUP_RAY_ONLY", "GROUP_VISUAL", "Shapes", "friction"]
+
+# MuJoCo's groups of geoms, of which a ray or a camera selects some.
+GROUP_COLLISION = 0
+GROUP_VISUAL = 2
+GROUP_CONTACT_ONLY = 3
+GROUP_RAY_ONLY = 4
+
+SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with steps of 1 to 2.5 ms
+SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
+MAX_FRICTION = 20.0  # a larger coefficient changes nothing, and makes the solver slow
+MIN_SIZE = 1e-6  # m; MuJoCo refuses sizes of zero
+_GREY: Color = (0.7, 0.7, 0.7, 1.0)
+
+
+def friction(surface: Surface) -> tuple[float, int]:
+    """Return a geom's coefficient and its priority.
+
+    The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo has one
+    coefficient for both directions, so the mean of ``mu`` and ``mu2`` is used.
+    """
+    mean = (min(max(surface.mu, 0.0), MAX_FRICTION) + min(max(surface.mu2, 0.0), MAX_FRICTION)) / 2
+    return mean, round((MAX_FRICTION - mean) * 1e6)
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A geom to add: its type, sizes and pose in the shape's frame, or a mesh or heightmap by name."""
+
+    kind: str
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pose: Pose = Pose()  # noqa: RUF009 (immutable)
+    asset: str = ""
+    group: int = GROUP_COLLISION
+    color: Color | None = None
+
+
+class Shapes:
+    """Adds geoms to bodies of an MjSpec, and shares the meshes among them."""
+
+    def __init__(self, spec: Any) -> None:
+        self._mujoco = load_mujoco()
+        self._spec = spec
+        self._assets: dict[tuple[object, ...], list[_Piece]] = {}
+        self._count = 0
+
+    def add_collision(
+        self, body: Any, name: str, collision: Collision, *, is_static: bool, pose: Pose
+    ) -> None:
+        """Add a collision's geoms; ``pose`` is that of the collision in the body."""
+        mu, priority = friction(collision.surface)
+        for index, piece in enumerate(self._pieces(collision.geometry, is_static=is_static)):
+            geom = self._add(body, f"{name}#{index}" if index else name, piece, pose)
+            geom.group = piece.group
+            geom.friction = [mu, 0.0, 0.0]
+            geom.priority = priority
+            geom.solref, geom.solimp = SOLREF, SOLIMP
+            if piece.group == GROUP_RAY_ONLY:
+                geom.contype = geom.conaffinity = 0
+
+    def add_visual(self, body: Any, name: str, visual: Visual, pose: Pose) -> None:
+        """Add a visual's geoms, which touch nothing; ``pose`` is that of the visual in the body."""
+        opacity = 1.0 - min(max(visual.transparency, 0.0), 1.0)
+        for index, piece in enumerate(self._visible(visual.geometry)):
+            geom = self._add(body, f"{name}#{index}" if index else name, piece, pose)
+            geom.group = GROUP_VISUAL
+            geom.contype = geom.conaffinity = 0
+            red, green, blue, alpha = visual.material.color or piece.color or _GREY
+            geom.rgba = [red, green, blue, alpha * opacity]
+
+    def _add(self, body: Any, name: str, piece: _Piece, pose: Pose) -> Any:
+        kinds = self._mujoco.mjtGeom
+        geom = body.add_geom(name=name, type=getattr(kinds, f"mjGEOM_{piece.kind}"), size=piece.size)
+        if piece.kind == "MESH":
+            geom.meshname = piece.asset
+        elif piece.kind == "HFIELD":
+            geom.hfieldname = piece.asset
+        whole = compose(pose, piece.pose)
+        geom.pos = whole.position
+        geom.quat = _wxyz(whole.orientation)
+        return geom
+
+    def _pieces(self, geometry: Geometry, *, is_static: bool) -> list[_Piece]:
+        simple = _primitive(geometry)
+        if simple is not None:
+            return [simple]
+        key = ("collision", is_static, geometry)
+        if key not in self._assets:
+            self._assets[key] = list(self._make_pieces(geometry, is_static=is_static))
+        return self._assets[key]
+
+    def _make_pieces(self, geometry: Geometry, *, is_static: bool) -> Iterator[_Piece]:
+        if isinstance(geometry, Heightmap):
+            yield self._heightmap(geometry)
+            return
+
+        mesh = _joined(_meshes(geometry))
+        parts = collision_parts(mesh, is_static=is_static)
+        is_whole = parts.are_exact
+        for part in parts.meshes:
+            name = self._add_mesh(part.vertices, part.triangles if is_whole else None)
+            yield _Piece("MESH", asset=name, group=GROUP_COLLISION if is_whole else GROUP_CONTACT_ONLY)
+        if not is_whole:
+            yield _Piece("MESH", asset=self._add_mesh(mesh.vertices, mesh.triangles), group=GROUP_RAY_ONLY)
+
+    def _visible(self, geometry: Geometry) -> list[_Piece]:
+        if isinstance(geometry, Plane):
+            x, y = geometry.size
+            size = (max(x, MIN_SIZE) / 2, max(y, MIN_SIZE) / 2, 1.0)
+            return [_Piece("PLANE", size, Pose(orientation=_turn_to(geometry.normal)))]
+        simple = _primitive(geometry)
+        if simple is not None:
+            return [simple]
+        key = ("visual", geometry)
+        if key not in self._assets:
+            if isinstance(geometry, Heightmap):
+                self._assets[key] = self._pieces(geometry, is_static=True)
+            else:
+                self._assets[key] = [
+                    _Piece("MESH", asset=self._add_mesh(mesh.vertices, triangles), color=color)
+                    for mesh in _meshes(geometry)
+                    for triangles, color in mesh.by_material()
+                ]
+        return self._assets[key]
+
+    def _add_mesh(self, vertices: NDArray[np.float64], triangles: NDArray[np.int32] | None) -> str:
+        self._count += 1
+        name = f"mesh{self._count}"
+        mesh = self._spec.add_mesh(name=name)
+        if triangles is not None:
+            used, faces = np.unique(triangles, return_inverse=True)
+            vertices = vertices[used]
+            mesh.userface = faces.ravel().astype(np.int32)
+        mesh.uservert = vertices.astype(np.float32).ravel()
+        # An open or flat mesh has no volume; the bodies' inertias are given, so this only chooses the mesh's own frame.
+        mesh.inertia = self._mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        return name
+
+    def _heightmap(self, shape: Heightmap) -> _Piece:
+        heights = terrain(shape.path)
+        self._count += 1
+        name = f"terrain{self._count}"
+        x, y, z = shape.size
+        rows, columns = heights.shape
+        self._spec.add_hfield(
+            name=name,
+            nrow=rows,
+            ncol=columns,
+            size=[x / 2, y / 2, max(z, MIN_SIZE), max(z, 1.0) / 10],
+            userdata=heights.astype(np.float32).ravel(),
+        )
+        return _Piece("HFIELD", asset=name, pose=Pose(shape.position))
+
+
+def _primitive(geometry: Geometry) -> _Piece | None:
+    """Return the geom of a shape that MuJoCo has itself, or None."""
+    if isinstance(geometry, Box):
+        x, y, z = (max(abs(side) / 2, MIN_SIZE) for side in geometry.size)
+        return _Piece("BOX", (x, y, z))
+    if isinstance(geometry, Cylinder):
+        return _Piece("CYLINDER", (max(geometry.radius, MIN_SIZE), max(geometry.length / 2, MIN_SIZE), 0.0))
+    if isinstance(geometry, Sphere):
+        return _Piece("SPHERE", (max(geometry.radius, MIN_SIZE), 0.0, 0.0))
+    if isinstance(geometry, Plane):
+        return _Piece("PLANE", (0.0, 0.0, 1.0), Pose(orientation=_turn_to(geometry.normal)))
+    return None
+
+
+def _meshes(geometry: Geometry) -> list[Mesh]:
+    try:
+        if isinstance(geometry, Polyline):
+            return [polyline_mesh(geometry.points, geometry.height)]
+        assert isinstance(geometry, MeshShape)
+        return read_mesh(geometry.path, geometry.submesh, geometry.scale, is_centered=geometry.is_centered)
+    except MeshError as error:
+        raise SimulationError(str(error)) from error
+
+
+def _joined(meshes: list[Mesh]) -> Mesh:
+    return meshes[0] if len(meshes) == 1 else Mesh.join(meshes)
+
+
+def _turn_to(normal: tuple[float, float, float]) -> Quaternion:
+    """Return the rotation that turns the z axis to the normal."""
+    x, y, z = normal
+    length = (x * x + y * y + z * z) ** 0.5
+    if length < MIN_SIZE:
+        return 0.0, 0.0, 0.0, 1.0
+    x, y, z = x / length, y / length, z / length
+    if z < -1 + 1e-12:
+        return 1.0, 0.0, 0.0, 0.0
+    scale = (2 * (1 + z)) ** 0.5
+    return -y / scale, x / scale, 0.0, scale / 2
+
+
+def _wxyz(rotation: Quaternion) -> tuple[float, float, float, float]:
+    x, y, z, w = rotation
+    return w, x, y, z

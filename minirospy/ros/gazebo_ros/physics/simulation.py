@@ -1,0 +1,356 @@
+"""A world in MuJoCo, built from the records of ``minirospy.core.sdf.model``.
+
+A :class:`Simulation` is not thread-safe: its owner calls it from one thread at a time. The same world, seed and calls give
+the same states, bit for bit, on one machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from minirospy.core.sdf.model import Model, Physics, Pose, Vector, World
+from minirospy.core.sdf.pose_math import rotate
+from minirospy.ros.gazebo_ros.physics.builder import Builder
+from minirospy.ros.gazebo_ros.physics.engine import Engine
+from minirospy.ros.gazebo_ros.physics.handles import SimModel
+from minirospy.ros.gazebo_ros.physics.library import SimulationError
+from minirospy.ros.gazebo_ros.physics.states import Contact, LostModel, RayHits, Wrench
+
+__all__ = ["Simulation"]
+
+MAX_DISTANCE = 1e5  # m from the origin; a model beyond it has left the world
+MAX_SPEED = 1e5  # m/s or rad/s; a faster model has exploded
+NANOSECONDS = 1_000_000_000
+
+
+class Simulation:
+    """The running world."""
+
+    def __init__(self, world: World | None = None, *, seed: int = 0) -> None:
+        """Build the world. Raise SimulationError if MuJoCo is missing; a model that is invalid is in ``warnings``."""
+        world = world or World()
+        self.world = world
+        self.random = np.random.default_rng(seed)  # for the noise of sensors
+        self.warnings: list[str] = []
+        self.forced: dict[str, None] = {}  # the models on which forces act
+        self._had_forces = False
+        self._time_ns = 0
+        self._models: dict[str, SimModel] = {}
+        self._builder = Builder(world.physics)
+        self._engine = Engine(self._builder, world.physics)
+        self._geom_names: list[str] = []
+        self._model_of_dof: list[str] = []
+        self._model_of_position: list[str] = []
+        self._farthest: NDArray[np.float64] = np.zeros(
+            0
+        )  # for each of MuJoCo's positions; angles have no limit
+        self._add_all(world.models)
+
+    # ---- time and steps
+
+    @property
+    def time(self) -> float:
+        """Return the time in seconds."""
+        return self._time_ns / NANOSECONDS
+
+    @property
+    def time_ns(self) -> int:
+        """Return the time in nanoseconds; it is a sum of steps, without rounding errors."""
+        return self._time_ns
+
+    @property
+    def physics(self) -> Physics:
+        """Return the step, the gravity and the other parameters."""
+        return self._engine.physics
+
+    def set_physics(self, physics: Physics) -> None:
+        """Set the step and the gravity. Raise SimulationError if a value is not finite or the step is not positive."""
+        if not (0 < physics.step <= 1 and all(map(math.isfinite, physics.gravity))):
+            raise SimulationError("the step must be positive and at most 1 s, and gravity finite")
+        self._engine.set_physics(physics)
+
+    @property
+    def records_details(self) -> bool:
+        """Return whether contacts and joints' wrenches of each step are recorded, which takes time."""
+        return self._engine.records_details
+
+    @records_details.setter
+    def records_details(self, value: bool) -> None:
+        self._engine.records_details = value
+
+    def step(self, count: int = 1) -> list[LostModel]:
+        """Advance by steps. Return the models that were removed because they became NaN or left the world."""
+        lost: list[LostModel] = []
+        for _ in range(count):
+            if self.forced or self._had_forces:
+                self._apply_forces()
+            engine = self._engine
+            engine.refresh()
+            positions, velocities = engine.data.qpos.copy(), engine.data.qvel.copy()
+            engine.step()
+            # NaN and large values fail this comparison, too.
+            data = engine.data
+            if not (abs(data.qvel) < MAX_SPEED).all() or not (abs(data.qpos) < self._farthest).all():
+                lost += self._remove_lost(positions, velocities)
+            self._time_ns += round(self.physics.step * NANOSECONDS)
+            self._engine.data.time = self.time
+        return lost
+
+    def _apply_forces(self) -> None:
+        data = self._engine.data
+        data.xfrc_applied[:] = 0
+        data.qfrc_applied[:] = 0
+        now = self.time
+        self._had_forces = bool(self.forced)
+        for name in list(self.forced):
+            if not self._models[name].apply_forces(now):
+                del self.forced[name]
+
+    def _remove_lost(
+        self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
+    ) -> list[LostModel]:
+        """Remove the models with invalid states; the others return to the state before the step."""
+        data = self._engine.data
+        lost: dict[str, str] = {}
+        fastest = np.full(len(data.qvel), MAX_SPEED)
+        _find_lost(lost, data.qvel, fastest, "is faster than 100 km/s", self._model_of_dof)
+        _find_lost(lost, data.qpos, self._farthest, "is more than 100 km away", self._model_of_position)
+        is_spread = not all(np.isfinite(data.qvel))
+        if is_spread and len(set(self._model_of_dof)) > 1:
+            # A NaN spreads to all models in contact: the fastest one before the step is its source.
+            candidates = [name for name, reason in lost.items() if reason == "became NaN"]
+            speeds = dict.fromkeys(candidates, 0.0)
+            for dof, name in enumerate(self._model_of_dof):
+                if name in speeds:
+                    speeds[name] = max(speeds[name], abs(float(velocities[dof])))
+            if speeds:
+                source = max(speeds, key=lambda name: speeds[name])
+                lost = {name: why for name, why in lost.items() if name == source or name not in candidates}
+
+        data.qpos[:], data.qvel[:] = positions, velocities
+        data.qacc_warmstart[:] = 0
+        self._engine.is_stale = True
+        result = [LostModel(name, f"{reason}: removed") for name, reason in lost.items()]
+        self._remove([each.name for each in result])
+        return result
+
+    # ---- models
+
+    @property
+    def models(self) -> Mapping[str, SimModel]:
+        """Return the models by name."""
+        return self._models
+
+    def model(self, name: str) -> SimModel:
+        """Return a model. Raise SimulationError if it does not exist."""
+        try:
+            return self._models[name]
+        except KeyError:
+            raise SimulationError(f"there is no model '{name}'") from None
+
+    def add_model(self, model: Model, pose: Pose | None = None, name: str = "") -> SimModel:
+        """Add a model at a pose (default: the model's own) under a name (default: the model's own).
+
+        The states of the others and the time stay. Raise SimulationError if the name is taken or the model is invalid.
+        """
+        added = self._build(model, pose or model.pose, name or model.name)
+        try:
+            self._engine.recompile()
+        except ValueError as error:
+            self._drop(added)
+            raise SimulationError(f"model '{added.name}': {_one_line(error)}") from error
+        self._finish([added])
+        return added
+
+    def remove_model(self, name: str) -> None:
+        """Remove a model; the states of the others and the time stay. Raise SimulationError if it does not exist."""
+        self.model(name)
+        self._remove([name])
+
+    def recompile(self) -> None:
+        """Compile the world again after a change of the spec."""
+        self._engine.recompile()
+        self._bind()
+
+    def _add_all(self, models: Iterable[Model]) -> None:
+        """Add the world's models with one compilation; if that fails, one by one."""
+        added: list[SimModel] = []
+        for model in models:
+            try:
+                added.append(self._build(model, model.pose, model.name))
+            except SimulationError as error:
+                self.warnings.append(str(error))
+        try:
+            self._engine.recompile()
+        except ValueError:
+            for each in added:
+                self._drop(each)
+            for each in added:
+                try:
+                    self.add_model(each.record, each.start, each.name)
+                except SimulationError as error:
+                    self.warnings.append(str(error))
+            return
+        self._finish(added)
+
+    def _build(self, model: Model, pose: Pose, name: str) -> SimModel:
+        if name in self._models:
+            raise SimulationError(f"there is a model '{name}' already")
+        if not model.links:
+            raise SimulationError(f"model '{name}' has no links")
+        if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
+            raise SimulationError(f"model '{name}': the pose is not finite")
+        built = self._builder.add(model, name, pose)
+        added = SimModel(self._engine, name, model, pose, built, self)
+        self._models[name] = added
+        return added
+
+    def _drop(self, model: SimModel) -> None:
+        self._builder.delete(model.built)
+        model.is_removed = True
+        del self._models[model.name]
+        self.forced.pop(model.name, None)
+
+    def _finish(self, added: list[SimModel]) -> None:
+        self._bind()
+        for model in added:
+            for joint in model.all_joints():
+                if joint.axis.initial_position:
+                    joint.set_state(joint.axis.initial_position)
+            if any(link.has_damping for link in model.links.values()):
+                self.forced[model.name] = None
+
+    def _remove(self, names: list[str]) -> None:
+        for name in names:
+            self._drop(self._models[name])
+        self._engine.recompile()
+        self._bind()
+
+    def _bind(self) -> None:
+        for model in self._models.values():
+            model.bind()
+        model = self._engine.model
+        self._geom_names = [model.geom(index).name.partition("#")[0] for index in range(model.ngeom)]
+        bodies = [model.body(index).name for index in range(model.nbody)]
+        owners = {link.id: name for name, each in self._models.items() for link in each.links.values()}
+        assert len(owners) == len(bodies) - 1
+        self._model_of_dof = [owners[int(body)] for body in model.dof_bodyid]
+        joints = [owners[int(body)] for body in model.jnt_bodyid]
+        self._farthest = np.full(model.nq, np.inf)
+        for joint in np.flatnonzero(model.jnt_type == 0):  # free bodies
+            address = int(model.jnt_qposadr[joint])
+            self._farthest[address : address + 3] = MAX_DISTANCE
+        starts = [int(address) for address in model.jnt_qposadr] + [model.nq]
+        self._model_of_position = [
+            joints[index] for index in range(len(joints)) for _ in range(starts[index], starts[index + 1])
+        ]
+
+    # ---- resets
+
+    def reset_models(self) -> None:
+        """Return all models to their poses and joint positions of the start, at rest; the time goes on."""
+        for model in self._models.values():
+            model.reset()
+        self._engine.data.qacc_warmstart[:] = 0
+
+    def reset(self) -> None:
+        """Reset the models and the time."""
+        self._time_ns = 0
+        self._engine.data.time = 0.0
+        self.reset_models()
+
+    # ---- sensing
+
+    def cast_rays(
+        self,
+        pose: Pose,
+        directions: NDArray[np.float64],
+        max_range: float,
+        *,
+        min_range: float = 0.0,
+        exclude: str = "",
+    ) -> RayHits:
+        """Cast rays from the origin of a pose in the world; ``directions`` are (n, 3) unit vectors in the pose's frame.
+
+        A ray begins at ``min_range``: what is nearer, such as the sensor's own housing, does not stop it. ``exclude`` is a
+        link (``model::link``) whose collisions are ignored.
+        """
+        engine = self._engine
+        engine.refresh()
+        count = len(directions)
+        ids = np.full(count, -1, np.int32)
+        distances = np.full(count, -1.0)
+        if count:
+            origin = np.array(pose.position)
+            vectors = np.ascontiguousarray(directions @ _matrix(pose).T)
+            body = engine.model.body(exclude).id if exclude else -1
+            engine.cast(origin, vectors, ids, distances, max_range, body)
+            if min_range > 0:
+                for index in np.flatnonzero((distances >= 0) & (distances < min_range)):
+                    start = origin + min_range * vectors[index]
+                    found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
+                    engine.cast(
+                        start, vectors[index : index + 1].copy(), found, hit, max_range - min_range, body
+                    )
+                    ids[index] = found[0]
+                    distances[index] = hit[0] + min_range if hit[0] >= 0 else -1.0
+        missed = (distances < 0) | (distances > max_range)
+        distances[missed] = np.inf
+        ids[missed] = -1
+        names = self._geom_names
+        return RayHits(distances, tuple(names[each] if each >= 0 else "" for each in ids.tolist()))
+
+    def contacts(self) -> list[Contact]:
+        """Return the contacts of the last step; ``records_details`` must have been set before it."""
+        engine = self._engine
+        pairs: dict[tuple[str, str], list[int]] = {}
+        for index, (first, second) in enumerate(engine.contacts.tolist()):
+            if first >= 0 and second >= 0:
+                pairs.setdefault((self._geom_names[first], self._geom_names[second]), []).append(index)
+        return [self._contact(first, second, rows) for (first, second), rows in pairs.items()]
+
+    def _contact(self, first: str, second: str, rows: list[int]) -> Contact:
+        engine = self._engine
+        # MuJoCo's normals point from the first geom to the second one, and its forces act on the second one.
+        frames = engine.contact_frames[rows].reshape(-1, 3, 3)
+        local = engine.contact_wrenches[rows].reshape(-1, 2, 3)
+        wrenches = -np.einsum("nij,nki->nkj", frames, local)
+        return Contact(
+            first,
+            second,
+            tuple((x, y, z) for x, y, z in engine.contact_points[rows].tolist()),
+            tuple((-x, -y, -z) for x, y, z in frames[:, 0].tolist()),
+            tuple(engine.contact_depths[rows].tolist()),
+            tuple(Wrench(_vector(force), _vector(torque)) for force, torque in wrenches.tolist()),
+        )
+
+
+def _find_lost(
+    lost: dict[str, str],
+    values: NDArray[np.float64],
+    limits: NDArray[np.float64],
+    reason: str,
+    owners: list[str],
+) -> None:
+    for index in np.flatnonzero(~(abs(values) < limits)):
+        why = reason if math.isfinite(values[index]) else "became NaN"
+        lost.setdefault(owners[index], why)
+
+
+def _vector(values: list[float]) -> Vector:
+    x, y, z = values
+    return x, y, z
+
+
+def _matrix(pose: Pose) -> NDArray[np.float64]:
+    """Return the rotation matrix of a pose."""
+    columns = [rotate(pose.orientation, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+    return np.transpose(np.array(columns))
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,55 @@
+"""Records of what the simulation reports. All vectors are in world axes if not stated otherwise."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from minirospy.core.sdf.model import IDENTITY, Pose, Vector
+
+__all__ = ["ZERO", "Contact", "LostModel", "RayHits", "State", "Wrench"]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class State(NamedTuple):
+    """A pose in the world, and the velocity of its origin in world axes (m/s, rad/s)."""
+
+    pose: Pose = IDENTITY
+    linear: Vector = ZERO
+    angular: Vector = ZERO
+
+
+class Wrench(NamedTuple):
+    """A force (N) and a torque (N m)."""
+
+    force: Vector = ZERO
+    torque: Vector = ZERO
+
+
+class Contact(NamedTuple):
+    """The contact points between two collisions, named ``model::link::collision``.
+
+    The normals point from the second collision to the first one. The forces act on the first one, and the torques are those
+    forces' about the contact points.
+    """
+
+    collision1: str
+    collision2: str
+    positions: tuple[Vector, ...]
+    normals: tuple[Vector, ...]
+    depths: tuple[float, ...]
+    wrenches: tuple[Wrench, ...]
+
+
+class RayHits(NamedTuple):
+    """The distances (m, infinite if nothing is hit) and the names of the collisions (empty if nothing is hit)."""
+
+    distances: object
+    collisions: tuple[str, ...]
+
+
+class LostModel(NamedTuple):
+    """A model that the simulation removed, with the reason in one line."""
+
+    name: str
+    reason: str
