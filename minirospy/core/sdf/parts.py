@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from minirospy.base.errors import SdfError
 from minirospy.core.sdf.model import (
     IDENTITY,
     Axis,
@@ -103,7 +104,12 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
 
     part = element.first("inertia")
     keys = {"ixx": 1.0, "ixy": 0.0, "ixz": 0.0, "iyy": 1.0, "iyz": 0.0, "izz": 1.0}
-    xx, xy, xz, yy, yz, zz = (source.number(part, key, default) for key, default in keys.items())
+    try:
+        xx, xy, xz, yy, yz, zz = (source.number(part, key, default) for key, default in keys.items())
+    except SdfError as error:
+        # Gazebo's editor of buildings writes NaN.
+        source.warn(part, f"link [{name}] gets the inertia of SDF's default: {error.text}")
+        xx, xy, xz, yy, yz, zz = keys.values()
     inertia = (xx, xy, xz, yy, yz, zz)
     if not is_static and min(inertia[index] for index in _DIAGONAL) <= 0.0:
         source.warn(element, f"link [{name}] has an inertia of 0 or less, which is not possible")

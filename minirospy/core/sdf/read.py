@@ -19,12 +19,14 @@ from minirospy.core.sdf.urdf import read_urdf
 
 __all__ = ["Resolve", "new_source", "no_files", "parse_model", "parse_urdf", "parse_world"]
 
+_OLDEST = (1, 4)
+
 
 def parse_urdf(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "robot_description", name: str = ""
 ) -> Model:
     """Return the model of a robot description; ``name`` replaces the robot's. Raise SdfError if it cannot be used."""
-    return read_urdf(text, new_source(file, resolve), name)
+    return read_urdf(parse_document(text, file), new_source(file, resolve), name)
 
 
 def parse_model(
@@ -34,10 +36,10 @@ def parse_model(
     root = parse_document(text, file)
     source = new_source(file, resolve)
     if root.tag == "robot":
-        return read_urdf(text, source, name)
+        return read_urdf(root, source, name)
     if root.tag not in ("sdf", "gazebo", "model"):
         raise source.error(root, f"the root is <{root.tag}>: <sdf> or <robot> is expected")
-    source = replace(source, version=sdf_version(root))
+    source = _versioned(source, root)
     if root.tag == "model":
         return read_model(root, source, name)
     for element in _entities(root):
@@ -59,7 +61,7 @@ def parse_world(text: str | bytes, resolve: Resolve = no_files, *, file: str = "
     if root.tag not in ("sdf", "gazebo", "world"):
         raise source.error(root, f"the root is <{root.tag}>: <sdf> is expected")
     world = root if root.tag == "world" else root.first("world")
-    return read_world(world or root, replace(source, version=sdf_version(root)))
+    return read_world(world or root, _versioned(source, root))
 
 
 def new_source(file: str, resolve: Resolve) -> Source:
@@ -67,6 +69,13 @@ def new_source(file: str, resolve: Resolve) -> Source:
     is_file = os.path.isabs(file) and os.path.isfile(file)
     path = os.path.realpath(file) if is_file else ""
     return Source(file, resolve, [], Shared(), os.path.dirname(path), chain=(path,) if path else ())
+
+
+def _versioned(source: Source, root: Element) -> Source:
+    version = sdf_version(root)
+    if version < _OLDEST:
+        source.warn(root, f"SDF {version[0]}.{version[1]} is older than 1.4: parts of it may be missing")
+    return replace(source, version=version)
 
 
 def _entities(root: Element) -> list[Element]:

@@ -28,6 +28,7 @@ from minirospy.core.sdf.text import Element
 __all__ = ["read_collision", "read_geometry", "read_surface", "read_visual"]
 
 _SURFACE = Surface()
+_MIN_SIDE = 1e-4  # m; a box without thickness, as a picture on a wall has it
 _MAX_POINTS = 10_000  # of a polyline
 
 
@@ -96,9 +97,10 @@ class _LeftOutError(ValueError):
 
 
 def _read_box(element: Element, source: Source) -> Box:
-    size = source.vector(element, "size", (1.0, 1.0, 1.0))
-    _require(min(size), "the box has a size of 0 or less")
-    return Box(size)
+    x, y, z = source.vector(element, "size", (1.0, 1.0, 1.0))
+    if sum(side > 0.0 for side in (x, y, z)) < 2:
+        raise _LeftOutError("the box has a size of 0 or less")
+    return Box((max(x, _MIN_SIDE), max(y, _MIN_SIDE), max(z, _MIN_SIDE)))
 
 
 def _read_cylinder(element: Element, source: Source) -> Cylinder:

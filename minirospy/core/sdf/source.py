@@ -65,7 +65,7 @@ class Source:
     def warn(self, element: Element | None, text: str) -> None:
         """Add a line about a part that is left out or changed. Repeated lines are added once."""
         line = f"{self.file}:{element.line}: {text}" if element and element.line else f"{self.file}: {text}"
-        if line not in self.warnings[-1000:]:
+        if line not in self.warnings[-100:]:
             self.warnings.append(line)
 
     def error(self, element: Element, text: str) -> SdfError:

@@ -12,7 +12,6 @@ Source: http://sdformat.org/tutorials?tut=pose_frame_semantics, https://classic.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
 
 from minirospy.base.errors import SdfError, UrdfError
@@ -21,7 +20,7 @@ from minirospy.core.sdf.model import IDENTITY, Inertial, Model, Pose
 from minirospy.core.sdf.poses import add_inertials, moved, multiply, pose_from_rpy
 from minirospy.core.sdf.read_model import read_model
 from minirospy.core.sdf.source import Source
-from minirospy.core.sdf.text import Element, clean_xml, new_element, parse_document
+from minirospy.core.sdf.text import Element, copy_of, new_element
 from minirospy.core.urdf.model import (
     Box,
     Collision,
@@ -36,7 +35,7 @@ from minirospy.core.urdf.model import (
 )
 from minirospy.core.urdf.model import Joint as UrdfJoint
 from minirospy.core.urdf.model import Material as UrdfMaterial
-from minirospy.core.urdf.read import parse_robot
+from minirospy.core.urdf.read import robot_from_element
 
 __all__ = ["read_urdf"]
 
@@ -58,17 +57,16 @@ _WITHOUT_EFFECT = frozenset(
 _MOVED = ("sensor", "light", "projector")
 
 
-def read_urdf(text: str | bytes, source: Source, name: str = "") -> Model:
+def read_urdf(root: Element, source: Source, name: str = "") -> Model:
     """Return the model of a robot description. Raise SdfError if the description cannot be used."""
-    cleaned = clean_xml(text)
     try:
-        robot = parse_robot(cleaned, source.file)
+        robot = robot_from_element(root, source.file)
     except UrdfError as error:
         raise SdfError(error.file, error.line, error.text) from None
     for problem in robot.problems:
         line = f"{source.file}:{problem.line}: {problem}" if problem.line else f"{source.file}: {problem}"
         source.warnings.append(line)
-    converter = _Converter(robot, parse_document(cleaned, source.file), source)
+    converter = _Converter(robot, root, source)
     element = converter.convert()
     model = read_model(element, source, name or robot.name)
     return replace(
@@ -271,7 +269,7 @@ class _Converter:
             if child.tag == "material":
                 script = _value(child)
             elif child.tag == "visual":
-                visual.children += [deepcopy(part) for part in child.children]
+                visual.children += [copy_of(part) for part in child.children]
         look = visual.first("material")
         if look is None:
             look = new_element("material", line=visual.line)
@@ -311,8 +309,8 @@ class _Converter:
                     if part.tag == "surface":
                         own = part
                     else:
-                        collision.children.append(deepcopy(part))
-        surface = deepcopy(own) if own is not None else new_element("surface", line=collision.line)
+                        collision.children.append(copy_of(part))
+        surface = copy_of(own) if own is not None else new_element("surface", line=collision.line)
         for tag, values in (("friction", friction), ("contact", contact)):
             _child(_child(surface, tag), "ode").children[:0] = values.children
         collision.children.append(surface)
@@ -334,7 +332,7 @@ class _Converter:
                     link, "self_collide", "true" if _value(child).lower() in _TRUE else "false", child.line
                 )
             elif tag not in _CONTACT and tag not in _FRICTION and tag not in _OWN_TAGS:
-                blob = deepcopy(child)
+                blob = copy_of(child)
                 if tag in _MOVED and pose != IDENTITY:
                     self._move(blob, pose)
                 self._rename_collisions(blob, owner)
@@ -372,7 +370,7 @@ class _Converter:
             if child.tag in _DYNAMICS:
                 _set(_child(_child(element, "axis"), "dynamics"), _DYNAMICS[child.tag], child)
             elif child.tag not in _WITHOUT_EFFECT:
-                blob = deepcopy(child)
+                blob = copy_of(child)
                 if child.tag == "initial_joint_position":
                     blob.text = _value(child)
                 element.children.append(blob)
@@ -423,7 +421,7 @@ class _Converter:
                 continue
             if child.tag in _WITHOUT_EFFECT:
                 continue
-            blob = deepcopy(child)
+            blob = copy_of(child)
             if child.tag == "joint":
                 self._rename_links(blob)
             model.children.append(blob)

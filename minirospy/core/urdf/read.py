@@ -16,7 +16,7 @@ from minirospy.core.urdf.joints import read_joint
 from minirospy.core.urdf.links import ElementError, read_link, read_material
 from minirospy.core.urdf.model import Joint, Link, Material, Problem, Robot
 
-__all__ = ["parse_robot", "read_robot"]
+__all__ = ["parse_robot", "read_robot", "robot_from_element"]
 
 _TREE = "Failed to build tree"
 _ROOT = "Failed to find root link"
@@ -29,7 +29,11 @@ def read_robot(path: str | Path) -> Robot:
 
 def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
     """Parse a robot description. ``file`` is its name in errors. Raise UrdfError if the description is invalid."""
-    root = parse_xml(text, file)
+    return robot_from_element(parse_xml(text, file), file)
+
+
+def robot_from_element(root: Element, file: str = "robot_description") -> Robot:
+    """Return the robot that a parsed description describes. Raise UrdfError as :func:`parse_robot` does."""
     if root.tag != "robot":
         raise UrdfError(file, root.line, "Could not find the 'robot' element in the xml file")
     if "name" not in root.attributes:
