@@ -113,7 +113,10 @@ from minirospy.ros.gazebo_ros.spawning import (
 
 __all__ = ["Services"]
 
-_NOT_A_MODEL = "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, or cannot be converted to Gazebo compatible format."
+_NOT_A_MODEL = (
+    "GazeboRosApiPlugin SpawnModel Failure: input model_xml not SDF or URDF, "
+    "or cannot be converted to Gazebo compatible format."
+)
 
 
 class Services:
@@ -212,7 +215,8 @@ class Services:
             elif request.reference_frame not in WORLD_FRAMES:
                 return SpawnModelResponse(
                     False,
-                    "SpawnModel: reference reference_frame not found, did you forget to scope the link by model name?",
+                    "SpawnModel: reference reference_frame not found, "
+                    "did you forget to scope the link by model name?",
                 )
             if request.model_name in self._simulation.models:
                 rospy.logerr("SpawnModel: Failure - model name %s already exist.", request.model_name)
@@ -260,7 +264,10 @@ class Services:
         response.header.frame_id = request.relative_entity_name
         state = self._relative(model.state, request.relative_entity_name)
         if state is None:
-            response.status_message = "GetModelState: reference relative_entity_name not found, did you forget to scope the body by model name?"
+            response.status_message = (
+                "GetModelState: reference relative_entity_name not found, "
+                "did you forget to scope the body by model name?"
+            )
             return response
         response.pose = to_pose(state.pose)
         response.twist = to_twist(state.linear, state.angular)
@@ -369,7 +376,10 @@ class Services:
             return response
         state = self._relative(link.state, request.reference_frame)
         if state is None:
-            response.status_message = "GetLinkState: reference reference_frame not found, did you forget to scope the link by model name?"
+            response.status_message = (
+                "GetLinkState: reference reference_frame not found, "
+                "did you forget to scope the link by model name?"
+            )
             return response
         response.link_state = LinkState(
             request.link_name,

@@ -27,7 +27,7 @@ from gazebo_msgs.srv import (
     SetPhysicsProperties,
     SpawnModel,
 )
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Empty
 from visualization_msgs.msg import MarkerArray
@@ -60,9 +60,9 @@ async def spawn(node: Node, text: str, name: str, pose: Pose, frame: str = "") -
     return response.success, response.status_message
 
 
-def test_a_robot_from_a_launch_file_falls_and_rests(master: str, tmp_path: Path, start: Start) -> None:
+def test_a_robot_from_a_launch_file_falls_and_rests(master: str, tmp_path: Path, launch: Start) -> None:
     urdf = written(tmp_path, "box.urdf", '\n<?xml version="1"?>\n' + BOX)
-    launch = written(
+    file = written(
         tmp_path,
         "box.launch",
         f"""<launch>
@@ -72,7 +72,7 @@ def test_a_robot_from_a_launch_file_falls_and_rests(master: str, tmp_path: Path,
                 args="-urdf -param robot_description -model box -x 1 -z 2"/>
         </launch>""",
     )
-    process = start("roslaunch", "roslaunch", launch)
+    process = launch(file)
 
     async def body(node: Node) -> None:
         def rests(states: ModelStates) -> bool:
@@ -125,7 +125,7 @@ def test_services_answer_with_the_texts_of_ros(master: str, start: Start) -> Non
             "GetLinkState: link not found, did you forget to scope the link by model name?"
         )
 
-        wanted = ModelState("box", at(x=3, z=1), reference_frame="other")
+        wanted = ModelState("box", at(x=3, z=1), Twist(), "other")
         assert (await call(node, "set_model_state", SetModelState, wanted)).success
         state = await call(node, "get_link_state", GetLinkState, "box::base_link", "world")
         position = state.link_state.pose.position
@@ -159,7 +159,7 @@ def test_joints_and_forces_of_models(master: str, start: Start) -> None:
         assert (await spawn(node, BOX, "box", at(y=5, z=0.5)))[0]
         await call(node, "set_model_configuration", SetModelConfiguration, "arm", "", ["hinge"], [0.5])
         hinge = await call(node, "get_joint_properties", GetJointProperties, "hinge")
-        assert hinge.position == [0.5]
+        assert list(hinge.position) == [0.5]
         response = await call(
             node, "set_model_configuration", SetModelConfiguration, "arm", "", ["hinge"], []
         )
@@ -275,7 +275,7 @@ def test_spawn_model_sets_joints_and_deletes_at_its_end(master: str, tmp_path: P
     process = start("gazebo_ros", "spawn_model", *words)
 
     async def body(node: Node) -> None:
-        while (await call(node, "get_joint_properties", GetJointProperties, "hinge")).position != [0.25]:
+        while (await call(node, "get_joint_properties", GetJointProperties, "hinge")).position != (0.25,):
             await asyncio.sleep(0.05)
         await asyncio.to_thread(end, process)
         world = await call(node, "get_world_properties", GetWorldProperties)
