@@ -175,6 +175,11 @@ class ControllerManager:
         for each in reversed(loaded):
             self.table.close(each)
 
+    def unregister(self) -> None:
+        """End the services, after :meth:`close`, so that another controller manager of the node can use the namespace."""
+        for service in self._services:
+            service.shutdown()
+
     def _wait_for_update(self) -> bool:
         """Wait until the loop has used the new table; return False if the node shuts down."""
         if self._has_updated and not self._is_closed:
