@@ -118,6 +118,6 @@ $(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py min
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
 
 # Written again when a module that programs import changes what it offers.
-$(READY): $(STAMP) $(wildcard minirospy/ros/*.py minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
+$(READY): $(STAMP) $(wildcard minirospy/ros/*.py minirospy/ros/*.json minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
 	@$(BIN)/python -m minirospy.ros.overlay_modules
 	@$(PYTHON) -c "open('$(READY)', 'w').close()"

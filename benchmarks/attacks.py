@@ -1,4 +1,4 @@
-"""Attacks on a master. Each is a function that runs until the target's time is over."""
+"""Attacks on a master. Each is a function that runs until the target's time is up."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Target:
             time.sleep(pause)
 
     def hold(self, request: bytes, count: int) -> None:
-        """Send a request on many connections, without reading the responses."""
+        """Send a request on many connections and do not read the responses."""
         while not self.is_over:
             with contextlib.ExitStack() as stack:
                 for _ in range(count):
@@ -110,7 +110,7 @@ class Target:
                 self.wait(5.0)
 
     def wait(self, seconds: float) -> None:
-        """Wait, at most until the end."""
+        """Wait, but not beyond the end."""
         time.sleep(max(0.0, min(seconds, self.end - time.monotonic())))
 
 
@@ -185,7 +185,7 @@ def many_elements(target: Target) -> None:
 
 
 def many_structs(target: Target) -> None:
-    """Send setParam with an array of 300,000 structs, and getParam for it."""
+    """Send setParam with an array of 300,000 structs, and then getParam for it."""
     item = b"<value><struct><member><name>a</name><value>b</value></member></struct></value>"
     target.exchange(valued(array(item, 150_000), "/attack/structs"))
     while not target.is_over:
@@ -247,12 +247,12 @@ def slow_readers(target: Target) -> None:
 
 
 def pipelines(target: Target) -> None:
-    """Send a thousand calls at once from each of 300 clients that do not read."""
+    """Send a thousand calls in one batch from each of 300 clients that do not read."""
     target.hold(called("getParamNames", "/bad") * 1000, 300)
 
 
 def busy_connections(target: Target) -> None:
-    """Request an array of 1,900 numbers repeatedly with 1000 clients, each after its previous response."""
+    """Request an array of 1,900 numbers again and again with 1000 clients, each after its previous response."""
     target.exchange(valued(array(b"<value><int>1</int></value>", 1900), "/attack/middling"))
     request = called("getParam", "/bad", "/attack/middling")
     with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:

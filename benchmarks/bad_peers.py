@@ -66,7 +66,7 @@ class Row(NamedTuple):
 
 
 class Victim:
-    """An attacked process: its memory, the lines that it logs, and a well-behaved client's call."""
+    """An attacked process: its memory, its log lines, and a well-behaved client's calls."""
 
     def __init__(self, command: list[str], environ: dict[str, str], ready: str) -> None:
         self.process = subprocess.Popen(
@@ -238,7 +238,7 @@ def measure(name: str, victim: Victim, attack: Attack, port: int, peers: int, as
 
 
 def ask_node(api: str, service: str) -> None:
-    """Call the node's Slave API and its service once. Raise OSError without a correct response."""
+    """Call the node's Slave API and its service once. Raise OSError if a response is not correct."""
     with ServerProxy(api) as proxy:
         proxy.getPid("/good")
     with _connect(port_of(service)) as sock:

@@ -89,7 +89,7 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
     start = time.perf_counter()
     for _ in range(count):
         publication.publish(frame)
-    # Wait for messages in the sockets. A condition is not possible, because a recorder may have lost some.
+    # Wait until no messages are left in the sockets. There is no condition for this, because a recorder may have lost some.
     time.sleep(_SETTLE_SECONDS)
     process.send_signal(signal.SIGINT)
     _, status, usage = os.wait4(process.pid, 0)
@@ -176,7 +176,7 @@ def subscribe(topic: str) -> socket.socket:
 
 
 def receive(socks: list[socket.socket]) -> dict[int, int]:
-    """Return the arrival time of each message, by its number, until the publisher has exited."""
+    """Return the arrival time of each message by its number, until the publisher exits."""
     arrived: dict[int, int] = {}
     received = [bytearray() for _ in socks]
     space = bytearray(1 << 22)
@@ -207,7 +207,7 @@ def receive(socks: list[socket.socket]) -> dict[int, int]:
 
 
 def play(stack: str, path: Path, times: list[int], what: str) -> Measured:
-    """Play a bag; return how many microseconds later than stored its messages arrived."""
+    """Play a bag; return how many microseconds late its messages arrived, compared with the stored times."""
     command = [*program(stack, "play"), str(path), "-d", "1", "-q"]
     with contextlib.ExitStack() as opened:
         process = opened.enter_context(

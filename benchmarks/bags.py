@@ -1,13 +1,10 @@
 """`python benchmarks/bags.py`: messages per second and memory of the rosbag API and commands, compared with Debian's and rosbags.
 
-Each case is a process: minirospy's, Debian's rosbag (if /usr/bin/python3 has it) and PyPI's rosbags, on the same bag.
-Rates are
-by CPU time, so that a busy machine affects them less; memory is the peak of the process. All modules are compiled before,
-as in
-installed packages. `--messages 10000000 --cases open,list,filter` shows the memory for a large bag; `--large 5000 --cases
-info,info_mcap` the time for one of 5 GB and its MCAP counterpart; `--nodes 3` adds three rounds of bag_nodes.py: record
-and play
-compared with the C++ ones.
+Each case runs in a separate process: minirospy, Debian's rosbag (if /usr/bin/python3 has it) and PyPI's rosbags, on the same
+bag. Rates are per second of CPU time, so that a busy machine affects them less; memory is the process's peak. All modules
+are compiled in advance, as in installed packages. `--messages 10000000 --cases open,list,filter` shows the memory for a large
+bag; `--large 5000 --cases info,info_mcap` shows the time for a bag of 5 GB and its MCAP counterpart; `--nodes 3` adds three
+rounds of bag_nodes.py, which compares record and play with the C++ programs.
 """
 
 from __future__ import annotations

@@ -1,13 +1,16 @@
 """`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients] [soak]`: the page's frame rate, and the cost of its server.
 
-page: a layout in headless chromium with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and the
-topics with the scan open; frames per second by requestAnimationFrame. clients: ten programs that use the page's protocol, on
-50 topics at a raised rate: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
-soak: ten such clients and two pages in chromium, on 50 topics, a scan, and moving frames, all at a raised rate of 100 Hz,
-until
-each client has received as many messages as in an hour at 10 Hz; memory of the server, the clients and the pages over the run.
---pages 10: eight more pages have the 50 topics open.
-CPU is that of a process, in percent of one core.
+page: headless chromium shows a layout with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and
+the topics with the scan open; measures frames per second with requestAnimationFrame.
+
+clients: ten programs use the page's protocol on 50 topics at a raised rate; measures the memory of the server and of a client
+over the run, and the server's CPU time for each MB that it sends.
+
+soak: ten such clients and two pages in chromium receive 50 topics, a scan and moving frames, all at a raised rate of 100 Hz,
+until each client has received as many messages as in an hour at 10 Hz; measures the memory of the server, the clients and
+the pages over the run. With --pages 10, eight more pages have the 50 topics open.
+
+CPU use is that of a process, in percent of one core.
 """
 
 from __future__ import annotations

@@ -38,8 +38,8 @@ MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
 async def robots(endpoint, first, count):
     """Simulate ``count`` robots until stdin is closed."""
-    # When it closes a dead link, a Zenoh thread waits for 10 s. A real robot has one link, so here each link also has
-    # a thread.
+    # When it closes a dead link, a Zenoh thread waits for 10 s. A real robot has one link, so give each link its own
+    # thread here.
     pools = ", ".join(f"{pool}: (worker_threads: {count})" for pool in ("rx", "tx", "net", "acc", "app"))
     os.environ.setdefault("ZENOH_RUNTIME", f"({pools})")
     from minirospy.fleet.keys import ROOT, Claim, ServiceToken, TopicToken, claim_key, service_key, topic_key
@@ -91,7 +91,7 @@ async def robots(endpoint, first, count):
 
 
 async def control(endpoint, expected):
-    """Show the fleet; print how long it takes, and for each line on stdin, how long until all robots are shown again."""
+    """Show the fleet. Print how long that takes and, for each line on stdin, how long until all robots are shown again."""
     from minirospy import Node
     from minirospy.base.errors import MasterUnreachableError
     from minirospy.fleet.gateway import Gateway, GatewayOptions
@@ -109,7 +109,7 @@ async def control(endpoint, expected):
             try:
                 state = await node._node.master("getSystemState")
             except MasterUnreachableError:
-                # Poll rarely, because this process shares the cores with a thousand robots that reconnect.
+                # Poll rarely: this process shares the cores with a thousand robots that reconnect.
                 await asyncio.sleep(1.0)
                 continue
             every = {name for table in state for name, _ in table}

@@ -21,7 +21,7 @@ import psutil
 
 SECONDS = 0.7
 IMAGE = 921_600
-# number of runs before a ratio over its limit counts, because noise disappears but a slowdown stays
+# number of runs before a ratio over its limit counts: noise disappears, a slowdown does not
 TRIES = 4
 
 
@@ -240,7 +240,7 @@ def report(costs: dict[str, float]) -> list[str]:
 def main() -> int:
     """Measure, and repeat if a ratio is over its limit; return the exit status."""
     for _ in range(TRIES):
-        # Use a new process each time, because a process cannot start a node twice.
+        # Use a new process each time: a process cannot start a node twice.
         result = subprocess.run([sys.executable, __file__, "once"], check=False)
         if result.returncode == 0:
             return 0

@@ -423,7 +423,7 @@ def measure(name: str, clients: int, seconds: float, environ: dict[str, str], to
         assert attackers.stdout
         for thread in (reader, writer, robot):
             thread.start()
-        # The attackers connect, then send; the measurement starts before they do.
+        # The attackers connect first and then send; the measurement starts before they send.
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             last = time.monotonic()

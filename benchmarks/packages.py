@@ -29,7 +29,7 @@ class Measurement(NamedTuple):
     unit: str
     code: str
     ours: str = ""
-    """The program for minirospy, if minirospy offers a faster method."""
+    """The program for minirospy, if minirospy has a faster method."""
     needs_master: bool = False
     peer: str = ""
     """The interpreter for both programs, if only the programs that they start differ; otherwise, each stack uses its own."""

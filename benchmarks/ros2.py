@@ -1,8 +1,8 @@
 """The overhead of the ROS 2 bridge: small messages and images from a publisher on one side to a subscriber on the other.
 
-Run by minirospy's Python after `make ros2`, which installs ROS 2: python benchmarks/ros2.py [SECONDS]. Prints messages
-sent and
-lost, median and 99th percentile of the latency. For each kind there is a route within ROS 1 and one within ROS 2.
+Run it with minirospy's Python after `make ros2`, which installs ROS 2: python benchmarks/ros2.py [SECONDS]. It prints the
+numbers of messages sent and lost, and the median and 99th percentile of the latency. Each kind of message is also measured
+within ROS 1 and within ROS 2.
 """
 
 from __future__ import annotations

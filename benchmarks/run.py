@@ -1,4 +1,4 @@
-"""`make bench`: minirospy, compared with a real rospy if /usr/bin/python3 has one, in one run, alternating.
+"""`make bench`: minirospy and, if /usr/bin/python3 has it, real rospy, alternating in one run.
 
 The results are medians of the rounds; ``ratio`` is how many times better than rospy. All traffic is on loopback.
 ``--json`` keeps the results of every round, ``--plot`` draws the ratios.

@@ -1,12 +1,11 @@
-"""Many nodes shut down together: how many registrations are left at the master?
+"""Many nodes shut down together. How many registrations are left at the master?
 
     python benchmarks/shutdown.py --nodes 200 --rounds 20
     python benchmarks/shutdown.py --launch --nodes 100 --rounds 10
 
-Each node publishes, subscribes and offers a service. All get Ctrl-C at the same moment, as processes of one terminal do;
-with ``--launch`` a roslaunch gets it, and with ``--kill`` the nodes get SIGKILL while their roslaunch keeps running. Each
-round
-prints a line; the exit status is 1 if a node, a topic or a service was left. Not for Windows.
+Each node publishes, subscribes and offers a service. All receive Ctrl-C at the same moment, like the processes of one terminal;
+with ``--launch``, roslaunch receives it, and with ``--kill`` the nodes get SIGKILL while roslaunch keeps running. Each round
+prints a line; the exit status is 1 if a node, a topic or a service is left. Does not run on Windows.
 """
 
 from __future__ import annotations

@@ -76,7 +76,7 @@ class Churn:
     def join(self) -> None:
         """Start a node; a node with the same name may already exist."""
         name = f"/robot{self._random.randrange(NAMES)}"
-        # Always use a new address: a new process would have a new port, here it has a new path.
+        # Always use a new address. A new process would have a new port; here it has a new path.
         uri = f"http://127.0.0.1:{self._random.choice(self._slaves).port}/{self._random.randrange(10**9)}/"
         self._live[name] = uri
         for topic in ("/rosout", f"{name}/out"):

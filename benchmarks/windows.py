@@ -173,7 +173,7 @@ def _commands(system: str, folder: Path, environ: dict[str, str]) -> tuple[Start
 
 
 def _seconds(python: Starter, *words: str) -> float:
-    """Return how long a process takes. Run it twice, because the first run fills the system's caches."""
+    """Return how long a process takes. Run it twice: the first run fills the system's caches."""
     for _ in range(2):
         start = time.perf_counter()
         run = python(*words)

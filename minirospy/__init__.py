@@ -3,7 +3,7 @@
 ``import minirospy as rospy`` offers what ``import rospy`` does: the names below are loaded when they are
 first used, so that a command which needs none of them starts quickly.
 
-The way of a message, file by file::
+The path of a message, file by file::
 
     Bool.msg -> core/idl/parse -> spec -> core/idl/emit -> class
     publish  -> client/publisher (serialize, caller's thread) -> runtime/node/topics.Publication
@@ -38,7 +38,7 @@ _ELSEWHERE = {
     "get_ros_root": "minirospy.ros.rospy.rospy.core",
     "parse_rosrpc_uri": "minirospy.ros.rospy.rospy.core",
 }
-"""Public names that are not of `minirospy.client`."""
+"""Public names that are not in `minirospy.client`."""
 
 
 def __getattr__(name: str) -> Any:

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-# On a busy machine, examples are slow without being wrong.
+# Examples are slow on a busy machine, which is not an error.
 settings.register_profile("minirospy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("minirospy")
 
@@ -33,7 +33,10 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Stop garbage collection meanwhile: it would examine all tests again and again. Later collections leave them out."""
+    """Stop garbage collection during the collection of tests: it would examine all of them again and again.
+
+    Later collections skip them.
+    """
     gc.disable()
     try:
         return (yield)
@@ -98,7 +101,7 @@ def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def _own_environment(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _board_folder: Path
 ) -> None:
-    """Remove the user's ROS variables; put files into a temporary folder, and sockets on loopback."""
+    """Remove the user's ROS variables. Put files into a temporary folder and sockets on loopback."""
     home: Path = tmp_path_factory.mktemp("ros")
     for name in list(os.environ):
         if name.startswith(("ROS_", "MINIROSPY_")):
@@ -106,7 +109,7 @@ def _own_environment(
     monkeypatch.setenv("ROS_HOME", str(home))
     monkeypatch.setenv("ROS_LOG_DIR", str(home / "log"))
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
-    # Nothing listens on this port, so that a test without its own master fails immediately.
+    # Nothing listens on this port, so a test without its own master fails immediately.
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(_board_folder))

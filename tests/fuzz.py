@@ -96,7 +96,7 @@ class Target:
         self._master = Master()
         self._master.notifier.send = lambda notice: None
         await self._master.start()
-        # A name that an input cannot guess and thus take over.
+        # An input cannot guess this name and thus take it over.
         self._name = f"/kept{random.getrandbits(64):x}"
         self._master.dispatch(
             "registerPublisher", [self._name, self._name, "std_msgs/String", "http://127.0.0.1:1/"]

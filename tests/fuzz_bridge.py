@@ -4,10 +4,8 @@
     python tests/fuzz_bridge.py --minutes 1 --only rosbridge
 
 Inputs are mutated handshakes and frames of the Foxglove protocol and of rosbridge, and requests for images. A finding is
-written
-to ``fuzz-bridge-finding.bin``, with the kind of its input in the first line; ``python tests/fuzz_bridge.py FILE`` runs it
-again.
-At the end the memory of the process at each quarter is printed.
+written to ``fuzz-bridge-finding.bin``, with the kind of its input in the first line; ``python tests/fuzz_bridge.py FILE``
+runs it again. At the end, the process's memory after each quarter of the run is printed.
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@
 Bags of both versions, MCAP files, XML (launch files, robot descriptions, manifests, test results), YAML (all of minirospy's
 loaders), with mutations of lengths and brackets, among others. Each kind of finding is written to
 ``fuzz-reader-finding-N.bin`` once, with the name of its reader in the first line; ``python tests/fuzz_readers.py FILE``
-runs it
-again. At the end the inputs, the errors by type, the slowest input and the peak memory are printed.
+runs it again. At the end, the number of inputs, the errors by type, the slowest input and the peak memory are printed.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-# Limit for the process's address space: a reader that allocates more gets a MemoryError, which is a finding.
+# Limit of the process's address space; a reader that allocates more gets a MemoryError, which counts as a finding.
 MEMORY_BYTES = 3 << 30
-MAX_SECONDS = 20.0  # CPU seconds for an input of some kilobytes; if an input takes longer, it is a finding
+MAX_SECONDS = 20.0  # CPU seconds for an input of some kilobytes; taking longer counts as a finding
 MAX_INPUT = 50_000  # maximum size of an input in bytes
 
 

@@ -1,4 +1,4 @@
-"""An event loop whose clock the test controls, so that timeouts expire when the test decides, on any machine."""
+"""An event loop whose clock the test controls: timeouts expire when the test decides, on any machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 __all__ = ["ManualLoop", "run_manually", "until"]
 
-_PATIENCE = 60.0  # seconds of wall time after which a condition is assumed never to become true
+_PATIENCE = 60.0  # seconds of wall time after which a condition counts as never becoming true
 
 
 class ManualLoop(asyncio.SelectorEventLoop):

@@ -604,7 +604,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.chdir(ROOT)
     shares = []
     for name in options.rooms or ROOMS:
-        # Each room gets a process, because pytest runs once per process.
+        # Run each room in its own process, because pytest runs once per process.
         pid = os.fork()
         if not pid:
             share = run_room(name, options)

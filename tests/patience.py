@@ -1,4 +1,4 @@
-"""Raises the product's time limits in a test above any stall of a machine that runs tests."""
+"""Raise the product's time limits in a test above any stall of the machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 __all__ = ["PATIENCE", "patient_limits"]
 
-PATIENCE = 60.0  # seconds; longer than a machine that runs tests may stall
+PATIENCE = 60.0  # seconds; longer than any stall of a machine that runs tests
 LIMITS = (
     "aio.topics.JOIN_SECONDS",
     "fleet.definitions.ANSWER_SECONDS",

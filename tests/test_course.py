@@ -32,7 +32,7 @@ PAGES: tuple[str, ...] = record.PAGES if record else ()
 
 
 class Course:
-    """One student for all tests, because each page continues with the files that earlier pages left in the home folder."""
+    """One student for all tests: each page continues with the files that earlier pages left in the home folder."""
 
     def __init__(self, home: Path, boards: Path) -> None:
         assert record is not None

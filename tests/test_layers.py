@@ -32,7 +32,7 @@ LAYERS = [
 UPWARDS = {("ros/rosbag/commands/rosbag_play.py", "web")}
 OPTIONAL_PACKAGES = [
     "ament_index_python", "angles", "camera_info_manager_py", "diagnostic_aggregator",
-    "diagnostic_updater", "dynamic_reconfigure", "foxglove_bridge", "image_geometry", "image_transport",
+    "diagnostic_updater", "foxglove_bridge", "image_geometry", "image_transport",
     "interactive_markers", "joint_state_publisher", "joint_state_publisher_gui", "kdl_parser_py",
     "laser_geometry", "map_server", "message_filters", "resource_retriever", "robot_pose_publisher",
     "ros_numpy", "rosauth", "rosbridge_server", "rosclean", "rosserial_python",
@@ -42,9 +42,19 @@ OPTIONAL_PACKAGES = [
     "urdfdom_py", "web_video_server", "xacro",
 ]  # fmt: skip
 """The ROS packages on which no other package depends."""
+CONTROL_PACKAGES = [
+    "ackermann_steering_controller", "control_toolbox", "controller_interface", "controller_manager",
+    "controller_manager_msgs", "diff_drive_controller", "effort_controllers", "force_torque_sensor_controller",
+    "forward_command_controller", "four_wheel_steering_controller", "gripper_action_controller",
+    "hardware_interface", "imu_sensor_controller", "joint_limits_interface", "joint_state_controller",
+    "joint_trajectory_controller", "minirospy_hardware", "position_controllers", "realtime_tools", "ros_control",
+    "ros_controllers", "transmission_interface", "velocity_controllers",
+]  # fmt: skip
+"""The packages of ros_control, which depend on each other."""
 LEAVES = {
     **{room: [room] for room in ("web", "fleet", "ros2")},
     "ROS packages": [f"ros/{package}" for package in OPTIONAL_PACKAGES],
+    "ros_control": ["core/control", *(f"ros/{package}" for package in CONTROL_PACKAGES)],
     "rosbag's migration": ["ros/rosbag/migration", "ros/rosbag/rosbag/migration.py"],
     "bags of version 1.2": ["core/bag/reader12.py"],
 }
@@ -55,6 +65,8 @@ SYSTEM_PACKAGES = {"catkin", "catkin_pkg", "python_orocos_kdl", "rospkg"}
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
     ("catkin", "rosunit"): "run_tests runs the tests of all kinds",
+    ("controller_manager_msgs", "rosparam"): "its Python module needs both, as the real one",
+    ("controller_manager_msgs", "rosservice"): "its Python module needs both, as the real one",
     ("diagnostic_aggregator", "rosparam"): "the real add_analyzers imports it, too",
     ("image_transport", "cv_bridge"): "has the codecs of compressed_image_transport, which names it",
     ("laser_geometry", "tf2_ros"): "for types; the real one names tf, which needs tf2_ros",
@@ -244,7 +256,7 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
 
 
 def test_few_modules_import_types_in_a_circle() -> None:
-    """A part and its owner name each other's types in three places only."""
+    """A part and its owner name each other's types in only three places."""
     found = [circle for room in DEPTH for circle in circles(graph_of_imports(room, for_types=True))]
     owners = {"minirospy.aio.node", "minirospy.client.session", "minirospy.runtime.rpc.server"}
     assert [circle for circle in found if not circle & owners] == []
@@ -447,7 +459,7 @@ ROS_PROGRAMS = [
     "ros/tf2_ros/transformations_calls.py",
 ]  # fmt: skip
 """These use private names of ROS's own packages, as other people's programs do: their accesses have no limit."""
-MAX_PRIVATE_ACCESSES = 240  # of tests to members that begin with one underscore; to be lowered, never raised
+MAX_PRIVATE_ACCESSES = 214  # of tests to members that begin with one underscore; to be lowered, never raised
 
 
 def private_accesses(path: Path) -> list[str]:

@@ -44,7 +44,7 @@ async def kernel():
     cell("globals().update(p=rospy.Publisher('/t', String, queue_size=1)) or p.wait_for_subscribers(timeout=30)")
     cell("rospy.sleep(30)", interrupted="minirospy.client.time.sleep")
     cell("rospy.wait_for_message('/none', String)", interrupted="minirospy.client.subscriber.wait_for_message")
-    cell("rospy.wait_for_service('/none')", interrupted="minirospy.client.services.wait_for_service")
+    cell("rospy.wait_for_service('/none')", interrupted="minirospy.client.service_proxy.wait_for_service")
     cell("rospy.Rate(0.01).sleep()", interrupted="minirospy.client.time.sleep")
     cell("rospy.is_shutdown(), p.publish('still here')")
     async with Node("cells") as node:

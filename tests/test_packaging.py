@@ -112,6 +112,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/share/msgs/std_msgs/msg/Bool.msg",
         "minirospy/share/rpi_feros/package.xml",
         "minirospy/share/launch/package.xml",
+        "minirospy/ros/passed_on.json",
         "minirospy/workspace/shell/ros.bash",
         "minirospy/workspace/shell/ros.bat",
         "minirospy/workspace/shell/ros.ps1",
@@ -278,7 +279,7 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
 
 @pytest.mark.timeout(180)
 def test_folder_of_pip_target_offers_rospy(wheel: Path, tmp_path: Path) -> None:
-    """Python reads no `.pth` file there, but a program run by `minirospy python` can import rospy nevertheless."""
+    """Python reads no `.pth` file in such a folder, but a program run by `minirospy python` can import rospy nevertheless."""
     folder = tmp_path / "folder"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder)

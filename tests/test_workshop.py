@@ -130,7 +130,7 @@ def test_first_node_as_a_class_ends_by_ctrl_c(start: Start) -> None:
 def test_action_client_prints_the_progress_of_the_leds(start: Start, board: Board) -> None:
     server = start(LISTINGS / "ledrun_server.py")
     wait_line(server, "Server pripravljen")
-    # Start it before the runs, which take a second each: all ten may be over by the time it is ready.
+    # Start it before the runs, which take a second each; otherwise all ten may be over when it is ready.
     cancel = start("-c", CANCEL)
     wait_line(cancel, "ready")
     edges = board.watch(LEDS, timeout=40)
@@ -154,7 +154,7 @@ def test_ctrl_c_ends_the_server_in_the_middle_of_a_goal(start: Start, board: Boa
     client = start(LISTINGS / "ledrun_client.py")
     assert any(edge.level for edge in edges)
     interrupt(server)
-    # The client waits for a server to return; without one, Ctrl-C stops it. The listing then has no result to print.
+    # The client waits for a server to return; without one, Ctrl-C stops the client. The listing then has no result to print.
     wait_line(client, "Server is active.")
     client.send_signal(CTRL_C)
     output, _ = client.communicate(timeout=30)

@@ -56,7 +56,7 @@ LISTS: dict[str, tuple[str, Callable[[], str]]] = {
     "minirospy/workspace/shell/ros.ps1": (r"(?<=\n\$_ros_commands = @\(\n).*?(?=\n\))", _powershell),
     "packaging/conda/meta.yaml": (r"(?<=\n  entry_points:\n).*?(?=\n\nrequirements:)", _recipe),
 }
-"""The position of the list in each file, and a function that returns the list."""
+"""For each file, where the list is, and a function that returns the list."""
 
 
 def outdated(*, write: bool = False) -> list[str]:

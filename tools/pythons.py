@@ -1,10 +1,8 @@
 """Run the fast tests on every Python from 3.10 on: `make pythons`, or `python tools/pythons.py [-- ARGUMENT ...]`.
 
-Each gets an environment in build/pythons, and runs the tests with `-X dev`: a socket or file that is not closed fails its
-test.
-Versions as arguments (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`) choose some; a path of an interpreter is
-used as
-it is. Arguments after `--` are passed to pytest. The exit status is 1 if a test failed on one of them.
+Each version gets an environment in build/pythons, and runs the tests with `-X dev`, so that a test fails if it leaves a
+socket or file open. Arguments select versions (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`), or name an
+interpreter's path. Arguments after `--` are passed to pytest. The exit status is 1 if a test failed on any version.
 """
 
 from __future__ import annotations
@@ -52,7 +50,10 @@ def main(words: Sequence[str]) -> int:
 
 
 def choose(words: Sequence[str], found: Sequence[str]) -> list[str]:
-    """Return the versions that ``words`` select from those found, which are sorted. Raise LookupError if one is not found."""
+    """Return the versions selected by ``words`` from the sorted ones that were found.
+
+    Raise LookupError if one was not found.
+    """
     with_gil = [name for name in found if not name.endswith("t")] or list(found)
     names = {{"oldest": with_gil[0], "newest": with_gil[-1]}.get(word, word) for word in words}
     if missing := names - set(found):
@@ -67,7 +68,10 @@ def _version(python: str) -> str:
 
 
 def _environment(python: str, label: str) -> Path:
-    """Return the interpreter of an environment with this checkout and its test dependencies; create it once."""
+    """Return the interpreter of an environment with this checkout and its test dependencies.
+
+    The environment is created once.
+    """
     folder = FOLDER / label
     inner = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / ".installed"

@@ -54,7 +54,7 @@ def main() -> int:
             raise ReleaseError(
                 f"not all is committed, but a release is built from the last commit:\n{changed}"
             )
-        # Use one commit for both builds, even if another one is made in the meantime.
+        # Use one commit for both builds, even if another one is made meanwhile.
         commit, epoch = _run("git", "log", "-1", "--format=%H %ct").split()
         dist = ROOT / "dist"
         with tempfile.TemporaryDirectory() as scratch:
@@ -120,7 +120,7 @@ def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[
 
 
 def faults_of_metadata(text: str, urls: Mapping[str, str]) -> list[str]:
-    """Return the faults of a METADATA file. Its addresses should be ``urls``, and the README's links must lead there."""
+    """Return the faults of a METADATA file. Its addresses should be ``urls``, and the README's links should lead there."""
     metadata = message_from_string(text)
     given = [f"{label}, {url}" for label, url in urls.items()]
     faults = []
@@ -170,7 +170,7 @@ def _metadata(wheel: Path) -> str:
 
 
 def unpack(archive: tarfile.TarFile, folder: Path) -> None:
-    """Unpack an archive as data, which is the default from Python 3.14 on, and unsupported in the first 3.10 and 3.11."""
+    """Unpack an archive as data, which is the default from Python 3.14 on, and is not supported in the first 3.10 and 3.11."""
     archive.extraction_filter = getattr(tarfile, "data_filter", lambda member, _: member)
     archive.extractall(folder)
 
@@ -223,7 +223,7 @@ def find_pythons() -> dict[str, str]:
             text=True,
             check=False,
         )
-        # pyenv also has commands for versions that are not selected; Debian's have no ensurepip without python3-venv.
+        # pyenv also has commands for versions that are not selected. Debian's versions lack ensurepip without python3-venv.
         if done.returncode == 0:
             major, minor, is_free = map(int, done.stdout.split())
             versions.setdefault((major, minor, is_free), path)

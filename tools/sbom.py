@@ -94,7 +94,7 @@ def _page_libraries(files: dict[str, bytes]) -> list[Json]:
         inside: list[Json] = []
         described = {Path(path).name: digest for path, digest in entry["files"].items()}
         if bundle := entry.get("bundle"):
-            # This is esbuild's output for the parts of the library that the page uses.
+            # This is esbuild's output for those parts of the library that the page uses.
             described[bundle["file"]] = bundle["sha256"]
         for file, expected in described.items():
             name = VENDOR + folder + "/" + (f"{file}.txt" if file == "LICENSE" else file)
@@ -135,7 +135,7 @@ def _definitions(files: dict[str, bytes]) -> list[Json]:
             "name": texts["name"],
             "version": texts["version"],
             "description": (manifest.findtext("description") or "").strip(),
-            # "BSD" in ROS's packages is not an SPDX name.
+            # "BSD", used in ROS's packages, is not an SPDX name.
             "licenses": [{"license": {"name": texts["license"]}}],
         }
         found.append(part)

@@ -3,9 +3,8 @@
 ``versions.json`` in the folder has each package, its version, npm's digest of its archive, and the files to take, with
 the SHA-256 of each. For a new version: change it there, delete its "integrity", and run this. npm must be installed.
 
-A package with a "bundle" becomes one file, by the esbuild version given there: the exports that a script next to this one
-takes
-from the package, and nothing else. The page has no build step: the file is in the repository.
+The esbuild version given there combines a package with a "bundle" into one file, which contains only the exports that a
+script next to this one takes from the package. The page has no build step: the file is in the repository.
 """
 
 from __future__ import annotations
@@ -72,7 +71,7 @@ def _file_name(path: str) -> str:
 
 
 def _without_map(body: bytes) -> bytes:
-    """Remove the line that names a source map, which is not vendored, because a browser would request it."""
+    """Remove the line that names a source map: a browser would request it, and it is not vendored."""
     kept = [line for line in body.split(b"\n") if not line.startswith(b"//# sourceMappingURL=")]
     return b"\n".join(kept)
 

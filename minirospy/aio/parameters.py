@@ -56,7 +56,7 @@ class ParameterWatch:
         self._node._later(self._add_again)
 
     def _changed(self, name: str, value: object) -> None:
-        # The master appends a slash to a name that is below the subscribed one.
+        # The master appends a slash if the changed name is below the subscribed one.
         for listener in list(self.listeners):
             listener(name.rstrip("/") or "/", value)
 

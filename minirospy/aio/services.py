@@ -94,8 +94,7 @@ class ServiceProxy(Generic[_Response_co]):
                 keeping = isinstance(error.__cause__, CallFailed)
                 raise
             finally:
-                # Close the connection after a cancelled call, because the next call on this connection would read the
-                # cancelled call's response.
+                # Close the connection after a cancelled call: the next call would otherwise read the cancelled call's response.
                 if not keeping:
                     self._disconnect()
 
@@ -104,7 +103,7 @@ class ServiceProxy(Generic[_Response_co]):
     def close(self) -> None:
         """Close a persistent connection. If another task is calling through it, that call fails. Idempotent."""
         if self._lock.locked() and self._client:
-            # Let the call in progress close the socket, because closing it here would not wake that call.
+            # Let the call in progress close the socket; closing it here would not wake that call.
             self._client.hang_up()
         else:
             self._disconnect()

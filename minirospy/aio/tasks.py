@@ -20,7 +20,7 @@ _MAX_CHARACTERS = 500
 
 
 class ErrorReporter:
-    """Reports unexpected errors in a long-running task: one line every ten seconds, with a count of the suppressed errors."""
+    """Reports unexpected errors in a long-running task: one line per ten seconds, with the number of suppressed errors."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
         """Create a reporter for the task that ``work`` describes, such as "the watch of the graph"."""

@@ -37,8 +37,8 @@ class Rate:
     async def sleep(self) -> None:
         """Sleep for the rest of the period. Raise the same exceptions as :meth:`Node.sleep`."""
         now = self._node.now().to_nsec()
-        # Time jumped back, or the loop body took several periods: start a new period now, so that the sleep is not
-        # very long and the missed periods are not made up for.
+        # Time has jumped back, or the loop body took several periods.
+        # Start a new period now, so that the sleep is not very long, and missed periods are not made up for.
         if not self._last <= now <= self._last + 2 * self._period:
             self._last = now
         self._last += self._period
@@ -59,7 +59,7 @@ class SimulatedTime:
     """The time in the last /clock message, in nanoseconds; 0 before the first one."""
 
     def __init__(self, stopping: asyncio.Event, on_silence: Callable[[], object] = lambda: None) -> None:
-        """Create the clock. ``on_silence()`` is called once, if a sleep has waited two seconds for the first message."""
+        """Create the clock. ``on_silence()`` is called once if a sleep has waited two seconds for the first message."""
         self.now = 0
         self._first = FirstTimeWait(on_silence)
         self._stopping = stopping
@@ -87,6 +87,6 @@ class SimulatedTime:
                 raise ROSTimeMovedBackwardsException((start - self.now) / 1e9)
 
     async def _next_tick(self) -> None:
-        # A node shutdown does not change the time, so wake up periodically to check for it.
+        # A shutdown of the node does not change the time, so wake up periodically to check for one.
         with contextlib.suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._tick.wait(), _LOOK_SECONDS)

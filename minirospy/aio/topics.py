@@ -121,7 +121,7 @@ class Subscription(Handle, Generic[_M_co]):
     def _end(self) -> None:
         self._ended = True
         self._arrived.set()
-        # Wake the tasks that wait for publishers, so that they check again.
+        # Wake the tasks that wait for publishers; they then check again.
         for callback in self._state.subscription.on_connected:
             callback()
 
@@ -211,7 +211,7 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def wait_for_expected(self) -> None:
-        """Wait up to a second for subscribers to connect: those that the master listed when the topic was registered."""
+        """Wait up to a second for subscribers to connect; the master listed them when the topic was registered."""
         await self
         state = self._state
         if state is None:
@@ -251,8 +251,7 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # `async for ... break` discards the subscription without closing it, so leave the topic when it is
-        # garbage-collected.
+        # Leave the topic when the subscription is garbage-collected: `async for ... break` discards it without closing it.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 
@@ -278,7 +277,7 @@ class SubscribedTopic:
             await self._node._node.unsubscribe(self.subscription)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
-        # Copy a small frame, because it is in a buffer that the next receive overwrites.
+        # Copy a small frame, because the next receive overwrites its buffer.
         kept = frame if len(frame) > CHUNK else bytes(frame)
         for handle in list(self._handles):
             handle._put(kept, header)

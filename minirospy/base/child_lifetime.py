@@ -38,7 +38,7 @@ class JobSystem(Protocol):
 
 
 class ProcessJob:
-    """The job that contains this process and its children. A process cannot leave its job, so all guards share the same one."""
+    """The job that contains this process and its children. A process cannot leave its job, so all guards share it."""
 
     def __init__(self, system: JobSystem) -> None:
         self._system = system
@@ -51,8 +51,7 @@ class ProcessJob:
         with self._lock:
             try:
                 if self._job is None:
-                    # The job's handle is never closed here: the system closes it when this process has exited, for
-                    # whatever reason.
+                    # The job's handle is never closed here. The system closes it when this process exits, whatever the reason.
                     job = self._system.create()
                     self._system.set_limits(job, _BREAKAWAY_OK)
                     self._system.add_this_process(job)
@@ -97,7 +96,10 @@ class ChildLifetime:
 
 
 def guard_children() -> ChildLifetime:
-    """On Windows, let processes started after this call terminate with this process, until the result is closed."""
+    """On Windows, make child processes started from now on terminate when this process does.
+
+    Closing the returned object ends this.
+    """
     return ChildLifetime(_process_job())
 
 
@@ -119,8 +121,7 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # This process belongs to another program's job, such as an IDE's or a service's, and that job does not
-            # allow processes to leave.
+            # This process belongs to another program's job, such as an IDE's or a service's, which lets no process leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 

@@ -36,7 +36,7 @@ On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just be
 
 _POLL_SECONDS = 0.1
 # seconds to wait for the first /clock message before warning; a simulator normally sends it sooner
-_SILENT_SECONDS = 2.0
+SILENT_SECONDS = 2.0
 
 SILENT_CLOCK = (
     "/use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the simulator or "
@@ -65,7 +65,7 @@ class SignalSafeEvent(threading.Event):
 
     def set(self) -> None:
         """Set the event, and wake the waiting threads."""
-        # Set the flag before reading the list, because a thread adds itself to the list and then checks the flag.
+        # Set the flag before reading the list: a waiting thread first adds itself to the list and then checks the flag.
         self._is_set = True
         for lock in self._waiting.copy():
             # Another thread, or a signal handler in this thread, has already released the lock.
@@ -92,7 +92,7 @@ class SignalSafeEvent(threading.Event):
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
-    """Like ``event.wait(timeout)``, but a signal can interrupt the wait on every OS."""
+    """Like ``event.wait(timeout)``, except that a signal can interrupt the wait on every OS."""
     if threading.current_thread() is not threading.main_thread():
         return event.wait(timeout)
     end = None if timeout is None else time.monotonic() + timeout
@@ -106,7 +106,7 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 def time_of_clock_message(body: bytes | memoryview) -> int | None:
     """Return the time in a serialized /clock message, in nanoseconds, or None if it is not a rosgraph_msgs/Clock."""
-    # A Clock is one time: seconds and nanoseconds. Check the size, because a node may publish another type.
+    # A Clock is a single time: seconds and nanoseconds. Check the size, because a node may publish another type.
     if len(body) != _CLOCK.size:
         return None
     seconds, nanoseconds = _CLOCK.unpack(body)
@@ -135,14 +135,14 @@ class WallClock:
 
 
 class FirstTimeWait:
-    """Calls a function once if a simulated clock's first time does not arrive within two seconds."""
+    """Calls a function once if the first time of a simulated clock does not arrive within two seconds."""
 
     def __init__(self, on_silence: Callable[[], object]) -> None:
-        self._pending = [on_silence]  # a list, whose pop() is atomic, because several threads may wait
+        self._pending = [on_silence]  # a list, because list.pop() is atomic and several threads may wait
 
     def check(self, started: float) -> None:
         """Call the function if the wait that began at ``started`` (in seconds of time.monotonic()) has lasted too long."""
-        if self._pending and time.monotonic() - started >= _SILENT_SECONDS:
+        if self._pending and time.monotonic() - started >= SILENT_SECONDS:
             try:
                 on_silence = self._pending.pop()
             except IndexError:
@@ -167,8 +167,7 @@ class SimulatedClock:
         self._now = now
         self._first = FirstTimeWait(on_silence)
         self._changed = changed or threading.Condition()
-        # Sleepers do not wait on the condition, because a signal handler may wait for a thread that sets the clock or
-        # sleeps.
+        # Sleepers do not wait on the condition: a signal handler may wait for a thread that sets the clock or sleeps.
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
@@ -207,6 +206,6 @@ class SimulatedClock:
 
     @staticmethod
     def _wait(sleeper: SignalSafeEvent) -> None:
-        """Wait until the clock is set, or until it is time to poll the stop event, because that event does not end this wait."""
+        """Wait until the clock is set or the stop event must be polled, because that event does not end this wait."""
         sleeper.wait(_POLL_SECONDS)
         sleeper.clear()

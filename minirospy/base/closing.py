@@ -1,4 +1,4 @@
-"""Close several objects, even if closing one of them fails."""
+"""Close several objects, even if closing one fails."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. Like ROS's value, it ends in a newline."""
+"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. It ends with a newline, as in ROS."""
 
 ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 
@@ -46,8 +46,8 @@ _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
 LOOPBACK = "127.0.0.0/8, ::1"
-"""The networks that may connect to a local process. Listening only on loopback is not enough: neighbouring machines can
-connect if the kernel has net.ipv4.route_localnet set, as on container hosts.
+"""The networks that may connect to a local process. Listening only on loopback is not enough: if net.ipv4.route_localnet is
+set in the kernel, as on container hosts, neighbouring machines can connect to it.
 """
 
 
@@ -102,7 +102,7 @@ class Environment(NamedTuple):
         return environment.on_this_machine() if local else environment
 
     def on_this_machine(self) -> Environment:
-        """Return the record changed so that the process listens on loopback, advertises localhost and refuses other machines."""
+        """Return a copy for a process that listens on loopback, advertises localhost and refuses other machines."""
         return self._replace(host="localhost", allow=LOOPBACK, local=True)
 
     @property
@@ -175,8 +175,7 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
 
     This does not use urllib.parse, because importing it takes a twentieth of a command's run time.
     """
-    # Reject control characters and spaces, because the path is sent in the first line of a request, and the URI is
-    # written to log lines.
+    # Reject control characters and spaces: the path is sent in the first line of a request, and the URI is written to logs.
     if has_controls(uri) or " " in uri:
         raise ValueError(f"[{escaped(uri)}] is not of the form {scheme}://host:port")
     found, _, rest = uri.partition("://")
@@ -201,7 +200,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only this machine's addresses can be bound. (Wine binds any address for datagrams, so use TCP.)
+        # Only this machine's addresses can be bound. (Use TCP, because Wine binds any address for datagrams.)
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:
@@ -246,7 +245,7 @@ def _checked_uri(uri: str) -> str:
 
 
 def _local_uri(uri: str) -> str:
-    """Return the URI of a master on this machine, rewritten to reach a master that listens only on loopback."""
+    """Return the URI of a master on this machine, rewritten so that it reaches a master that listens only on loopback."""
     host, port, path = split_uri(uri)
     if host in ("localhost", "127.0.0.1", "::1"):
         return uri
@@ -292,7 +291,7 @@ def _advertised_host(environ: Mapping[str, str]) -> str:
             return _checked_host(named, variable)
     name = socket.gethostname()
     try:
-        # Pass bytes, because looking up a str would import the IDNA codec.
+        # Pass bytes: looking up a str would import the IDNA codec.
         socket.getaddrinfo(name.encode() if name.isascii() else name, None, socket.AF_INET)
     except OSError:
         return "localhost"

@@ -123,7 +123,7 @@ __all__ = [
 
 
 class MinirospyError(Exception):
-    """The root of minirospy's own errors; ``str()`` is one line for the user."""
+    """The base class of minirospy's own errors; ``str()`` is one line for the user."""
 
 
 class UsageError(MinirospyError):
@@ -241,7 +241,7 @@ class RpcProtocolError(RpcError):
 
 
 class RpcUnreachable(RpcError):
-    """The peer at ``uri`` could not be reached, or did not respond in time."""
+    """The peer at ``uri`` could not be reached or did not respond in time."""
 
     def __init__(self, uri: str, why: str) -> None:
         super().__init__(uri, why)
@@ -253,7 +253,7 @@ class RpcUnreachable(RpcError):
 
 
 class RpcTimeout(RpcUnreachable):
-    """The peer accepted the connection but did not respond in time: its process is stopped, or busy."""
+    """The peer accepted the connection but did not respond in time: its process is suspended or busy."""
 
     def __init__(self, uri: str, seconds: float) -> None:
         super().__init__(uri, f"timed out after {seconds:g} s")
@@ -272,7 +272,7 @@ class HandshakeRefused(WireError):
 
 
 class CallFailed(WireError):
-    """The service responded to a call with an error; ``text`` is encoded as the server sent it."""
+    """The service responded to a call with an error; ``text`` is in the server's encoding."""
 
     def __init__(self, text: bytes) -> None:
         super().__init__(text)
@@ -328,7 +328,7 @@ class SdfError(SourceError):
 
 
 class BagError(MinirospyError):
-    """A bag cannot be read or written. ``str()`` does not contain the file name, because the caller knows it."""
+    """A bag cannot be read or written. ``str()`` does not contain the file name, which the caller knows."""
 
 
 class BagFormatError(BagError):
@@ -433,7 +433,7 @@ class ValueTextError(MinirospyError):
 
 
 class ROSException(Exception):
-    """The root of rospy's errors."""
+    """The base class of rospy's errors."""
 
 
 class ROSInitException(ROSException):
@@ -457,7 +457,10 @@ class ThreadLimitError(ROSException):
 
 
 class NoThreadsAtEndError(ThreadLimitError):
-    """A thread cannot be started: Python 3.12.0 to 3.12.2 start none after the main thread has exited (CPython issue 113964)."""
+    """A thread cannot be started.
+
+    Python 3.12.0 to 3.12.2 start none after the main thread has exited (CPython issue 113964).
+    """
 
     def __init__(self) -> None:
         super().__init__(0, [])
@@ -506,7 +509,7 @@ class ServiceException(Exception):
 
 
 class TransformException(Exception):
-    """The root of tf2's errors. Source: http://wiki.ros.org/tf2/Errors."""
+    """The base class of tf2's errors. Source: http://wiki.ros.org/tf2/Errors."""
 
     __module__ = "tf2"
 

@@ -15,13 +15,14 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Direction marks are included because they reverse the text that follows, which could make a name look like another
-# one.
+# Includes direction marks: they reverse the text that follows, which could make a name look like another one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 
 _OWN_SEQUENCE = re.compile(r"\033\[[0-9;]*m|\r?\033\[K|\033\[2J\033\[;H|\033\]2;[^\x00-\x1f\x7f-\x9f]*\007")
-"""The control sequences that the commands themselves send to a terminal: colours, clearing a line or screen, the window title."""
+"""The control sequences that commands themselves send to a terminal: colours, clearing a line or the screen, the window
+title.
+"""
 
 
 def escaped(text: str, keep: str = "") -> str:
@@ -34,7 +35,7 @@ def escaped(text: str, keep: str = "") -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Return whether ``text`` contains a control character or a line separator, so that it is neither a name nor a URI."""
+    """Return whether ``text`` contains a control character or a line separator, and therefore cannot be a name or a URI."""
     return _NAME_CONTROL.search(text) is not None
 
 
@@ -76,13 +77,12 @@ class SafeTerminal(io.TextIOWrapper):
         return super().write(text)
 
     def close(self) -> None:
-        """Write pending output; the terminal itself stays open, because the interpreter's own stream uses it."""
+        """Write pending output. The terminal itself stays open, because the interpreter's own stream uses it."""
         # ValueError means that the stream was already closed.
         with contextlib.suppress(ValueError):
             self.flush()
             self.detach()
 
     def __del__(self) -> None:
-        # Unlike TextIOWrapper.__del__, do not close the stream, because that would close the buffer, which
-        # sys.__stdout__ shares.
+        # Unlike TextIOWrapper.__del__, do not close the stream: that would close the buffer, which sys.__stdout__ shares.
         pass

@@ -23,13 +23,12 @@ def return_large_blocks(least: int = _LARGE) -> None:
         return
     import ctypes
 
-    # musl does not have mallopt(), and a Python without libffi has no ctypes.
+    # musl has no mallopt(), and a Python without libffi has no ctypes.
     with contextlib.suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # Keep glibc's default ratio; otherwise each block above 128 KiB would grow and shrink the heap at its
-            # end.
+            # Keep glibc's default ratio. Otherwise each block above 128 KiB would grow and shrink the heap at its end.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 

@@ -26,7 +26,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
     The command line works in sh, cmd.exe and PowerShell. ``upgrade``: replace an installed version that is too old.
     """
-    # Import these modules here, only to describe an error: if all libraries are installed, commands do not load them.
+    # Import these modules here, because only this error message needs them.
     import importlib.util
     import sysconfig
 
@@ -34,15 +34,14 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     words = " ".join(_quoted(each) for each in requirements)
     option = " --upgrade" if upgrade else ""
     if (prefix / _PIPX_FILE).is_file():
-        # Do not use `pipx inject`: pipx 1.7 regards minirospy itself as already injected, and does nothing.
+        # Do not use `pipx inject`: pipx 1.7 thinks that minirospy itself is already injected, and does nothing.
         return f"pipx runpip {_quoted(prefix.name)} install{option} {words}"
     if (prefix / _UV_FILE).is_file():
         return _uv_tool_command(prefix / _UV_FILE, requirements, option)
     if importlib.util.find_spec("pip") is None:
         return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
 
-    # If the environment is externally managed (PEP 668), pip requires this option; the user also needed it to install
-    # minirospy.
+    # If the environment is externally managed (PEP 668), pip requires this option, as it did to install minirospy.
     marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
     if sys.prefix == sys.base_prefix and marker.is_file():
         option += " --break-system-packages"
@@ -50,7 +49,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
 
 def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
-    """Return uv's command with all earlier requirements, because uv removes those that a new command omits."""
+    """Return uv's command with all earlier requirements, because uv removes those that the new command does not repeat."""
     try:
         text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
     except OSError:
@@ -88,14 +87,14 @@ def _python() -> str:
 
     for name in ("python", "python3"):
         found = shutil.which(name)
-        # Do not use os.path.samefile, because a venv's interpreter may be a link to the system's interpreter.
+        # Do not use os.path.samefile: a venv's interpreter may be a link to the system's.
         if found is not None and os.path.normcase(found) == os.path.normcase(sys.executable):
             return name
     return _quoted_path(sys.executable)
 
 
 def _quoted(word: str) -> str:
-    """Quote a word for any shell. Uses double quotes, because cmd.exe does not treat single quotes as quotes."""
+    """Quote a word for any shell, with double quotes, because single quotes have no meaning in cmd.exe."""
     return f'"{word}"' if _SHELLS_OWN.search(word) else word
 
 

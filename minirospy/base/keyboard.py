@@ -11,7 +11,7 @@ from typing import ClassVar
 
 __all__ = ["LOOK_SECONDS", "Keys"]
 
-LOOK_SECONDS = 0.05  # seconds that Keys.next waits for a key
+LOOK_SECONDS = 0.05  # seconds for which Keys.next waits for a key
 
 
 class Keys:
@@ -45,7 +45,7 @@ class Keys:
         if sys.platform != "win32" and self.is_terminal and not self._is_closed:
             import termios
 
-            # The terminal cannot be restored if its window was closed.
+            # The terminal cannot be restored if its window is closed.
             with contextlib.suppress(termios.error):
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
@@ -69,15 +69,14 @@ class Keys:
         ready, _, _ = select.select([sys.stdin], [], [], LOOK_SECONDS)
         if not ready:
             return ""
-        # Bypass Python's buffer, because select does not see its contents. A read that returns no bytes means that
-        # the terminal is closed.
+        # Bypass Python's buffer, which select does not see. A read that returns no bytes means that the terminal is closed.
         try:
             key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
         except OSError:
             return self._end
         if key != "\x1b":
             return key or self._end
-        # Read the rest of the key without waiting, because all bytes of one key arrive together.
+        # Read the rest of the key without waiting: the bytes of a key arrive together.
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
         return self._ARROWS.get(sequence[-1:], "")

@@ -1,4 +1,4 @@
-"""Array methods that numpy has removed, but that ROS 1 programs still call."""
+"""Array methods that numpy has removed but that ROS 1 programs still call."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from typing import IO
 __all__ = ["create_file", "open_file", "open_text", "read_file", "remove_file", "replace_file"]
 
 OPEN_ELSEWHERE_PATIENCE = 1.0
-"""Seconds to retry on Windows while another process, such as a virus scanner, has the file open."""
+"""Seconds for which to retry on Windows while another process, such as a virus scanner, has the file open."""
 
 REFUSES_OPEN_FILES = sys.platform == "win32"
 
@@ -37,14 +37,13 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     single hard link. With O_TRUNC the file is truncated only after these checks.
     """
     if os.path.islink(path):
-        # Check for a link explicitly, because Windows has no O_NOFOLLOW; on other systems this only makes the error
-        # clearer.
+        # Check for a link explicitly: Windows has no O_NOFOLLOW. On other systems, the check only makes the error clearer.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
     file = os.open(path, (flags & ~os.O_TRUNC) | OPEN_FLAGS, mode)
     try:
         found = os.fstat(file)
-        # Allow devices: only root can create them, and a user may choose /dev/null.
+        # Allow devices: only root can create them, and a user may want /dev/null.
         if not (stat.S_ISREG(found.st_mode) or stat.S_ISCHR(found.st_mode)):
             raise _refusal(path, "it is not a regular file")
         if found.st_nlink > 1 and flags & (os.O_WRONLY | os.O_RDWR):
@@ -103,7 +102,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             action()
             return
         except PermissionError:
-            # On other systems the folder's permissions cause the error, and waiting does not change them.
+            # On other systems the cause is the folder's permissions, which waiting does not change.
             if not REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)

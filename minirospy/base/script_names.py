@@ -23,7 +23,7 @@ def find_packages_named_like_scripts() -> None:
     """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
-    # A program that was started with `python -m` has a spec, and Python does not search its folder.
+    # A program started with `python -m` has a spec, and Python does not search its folder.
     if (
         not file
         or getattr(main, "__spec__", None)
@@ -31,7 +31,7 @@ def find_packages_named_like_scripts() -> None:
     ):
         return
     path = os.path.abspath(file)
-    # catkin_make's copy of a program runs the file in the source folder: Python searches the copy's folder.
+    # A program copied by catkin_make runs the file in the source folder, but Python searches the folder of the copy.
     if sys.path and os.path.isfile(os.path.join(sys.path[0], os.path.basename(path))):
         sys.meta_path.insert(0, _Finder(sys.path[0], os.path.basename(path)))
 

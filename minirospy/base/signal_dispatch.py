@@ -14,7 +14,7 @@ _this_thread = threading.local()
 
 @contextlib.contextmanager
 def dispatching_signal() -> Iterator[None]:
-    """Make :func:`is_dispatching_signal` return True in this thread during the block, which handles a signal."""
+    """Make :func:`is_dispatching_signal` return True in this thread for the duration of the block, which handles a signal."""
     _this_thread.is_dispatching = True
     try:
         yield
@@ -23,7 +23,7 @@ def dispatching_signal() -> Iterator[None]:
 
 
 def is_dispatching_signal() -> bool:
-    """Return whether this thread is handling a signal, inside an interrupted call."""
+    """Return whether this thread is running a signal handler that interrupted another call."""
     return getattr(_this_thread, "is_dispatching", False)
 
 

@@ -25,11 +25,11 @@ ALONE, PAUSE = Need
 
 Steps = Generator[Need | None, None, _T]  # work that yields between its steps and returns its result
 
-SMALL_ITEMS = 2000  # number of items; a value with this many takes a few milliseconds to serialize
+SMALL_ITEMS = 2000  # number of items that take a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""Number of items; a value with this many takes about 0.1 ms to serialize, which is short even if a thousand clients request
-it at the same time.
+"""Number of items that take about 0.1 ms to serialize, which is short even if a thousand clients request them at the same
+time.
 """
 
 _LETTERS_PER_ITEM = 16
@@ -46,12 +46,12 @@ def finish(steps: Steps[_T]) -> _T:
 
 
 def is_small(value: object, most: int = SMALL_ITEMS) -> bool:
-    """Return whether an XML-RPC value has at most about ``most`` items. A long string counts as many items."""
+    """Return whether an XML-RPC value has at most about ``most`` items. Long strings count as many items."""
     return _left(value, most) >= 0
 
 
 def _left(value: object, left: int) -> int:
-    """Return ``left`` minus the number of items in ``value``, which may be negative."""
+    """Return ``left`` minus the number of items in ``value``; the result may be negative."""
     if isinstance(value, (str, bytes)):
         return left - 1 - len(value) // _LETTERS_PER_ITEM
     if not isinstance(value, (list, tuple, dict)):

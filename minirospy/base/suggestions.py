@@ -14,7 +14,7 @@ __all__ = ["did_you_mean", "nearest"]
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three names in ``known`` that are similar to ``name``."""
     if not isinstance(name, str):
-        # Programs may pass a value that is not a string. No name is similar to it.
+        # Programs may pass a value that is not a string; no name is similar to that.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.
@@ -23,7 +23,7 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 _SLIP = 0.85
-"""Minimum similarity (difflib's ratio) for two names that differ in only one or two missing, wrong or extra letters."""
+"""Minimum similarity (difflib's ratio) of two names that differ only in one or two missing, wrong or extra letters."""
 
 _STEM = 4  # minimum length, in letters, of a prefix for which completions are suggested
 
@@ -45,7 +45,7 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
     """
     from difflib import SequenceMatcher
 
-    # Pass the part as the second sequence, because the matcher caches its analysis of that one.
+    # Pass the part as the second sequence, for which the matcher caches its analysis.
     wanted = [(part, SequenceMatcher(b=part)) for part in reversed(_parts_of(word))]
     found = []
     for name in known:
@@ -54,16 +54,16 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
         for (meant, matcher), part in zip(wanted, reversed(parts), strict=False):
             matcher.set_seq1(part)
             ratios.append(1.0 if part == meant else _ratio(part, meant, matcher, cutoff))
-        # Also suggest a name whose last part is the same, in another package or namespace.
+        # Also suggest names in other packages or namespaces that have the same last part.
         if ratios and (min(ratios) >= cutoff or (ratios[0] == 1 and cutoff < _SLIP)):
             found.append((-sum(ratios) / len(ratios), len(parts) != len(wanted), name))
-    # If the name exists in a different letter case or without an extension, suggest only that name.
+    # If the name exists in another letter case or without an extension, suggest only that name.
     exact = [entry for entry in found if entry[0] == -1]
     return [name for *_, name in sorted(exact or found)]
 
 
 def _parts_of(name: str) -> list[str]:
-    """Return the parts of a name that are compared: without a file extension or an option's dashes."""
+    """Return the parts of a name to compare, after removing the file extension or an option's leading dashes."""
     stem, dot, _ = name.rpartition(".")
     return [part for part in (stem if dot else name).lstrip("-").lower().split("/") if part]
 

@@ -65,14 +65,14 @@ class TVal:
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
-        # The program may have assigned fractions, or numpy values, which overflow.
+        # The program may have assigned fractions or numpy values, which overflow.
         whole, rest = _split(secs)
         return whole * _BILLION + rest + int(nsecs)
 
     def __bool__(self) -> bool:
         return bool(self.secs or self.nsecs)
 
-    # Time and Duration are comparable only with their own class; a TVal is comparable with both.
+    # Time and Duration are comparable only with their own class, a TVal with both.
     def __lt__(self, other: TVal) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, TVal) else NotImplemented
 
@@ -107,7 +107,7 @@ class TVal:
 class Time(TVal):
     """A point in time since the epoch; never negative."""
 
-    # Use genpy's module name, so that programs that use real ROS can load pickles from this one, and vice versa.
+    # Use genpy's module name, so that programs that use real ROS can load pickles made here, and vice versa.
     __module__ = "genpy.rostime"
 
     __slots__: list[str] = []
@@ -246,12 +246,12 @@ class Duration(TVal):
     __hash__ = TVal.__hash__
 
 
-# Define the same slots as genpy's classes do; the attributes themselves belong to TVal.
+# Define the same slots as genpy's classes; the attributes themselves belong to TVal.
 Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Split into whole seconds and the remaining nanoseconds, which are truncated, not rounded, as in genpy."""
+    """Split into whole seconds and remaining nanoseconds, which are truncated instead of rounded, as in genpy."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 

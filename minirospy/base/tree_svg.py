@@ -43,7 +43,7 @@ def tree_svg(
 
     drawing = _Drawing(children, frozenset(round_))
     right = float(_GAP_X)
-    # Draw the roots first. Nodes that remain afterwards are part of a cycle.
+    # Draw the roots first. Any nodes left after that are part of a cycle.
     for name in [*(name for name in children if name not in below), *children]:
         if name not in drawing.places:
             right = drawing.place(name, right)
@@ -58,8 +58,7 @@ class _Drawing:
 
     def place(self, root: str, left: float) -> float:
         """Place a tree to the right of ``left``; return its right edge."""
-        # Use an explicit list for the way down and back up, because recursion would exhaust Python's stack for deep
-        # trees.
+        # Use an explicit list for the way down and back up: recursion would exhaust Python's stack for deep trees.
         order: list[tuple[str, float]] = []
         waiting = [(root, float(_GAP_Y + _LINE))]
         seen = set()

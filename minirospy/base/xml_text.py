@@ -17,7 +17,7 @@ from minirospy.base.errors import MinirospyError
 __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml", "new_parser", "parse_xml"]
 
 MAX_LEVELS = 100  # maximum depth of nested tags; parsers and libraries recurse at least once per level
-# maximum tags per document; a tag of 4 characters already uses about 500 bytes of memory
+# maximum tags per document; even a tag of 4 characters uses about 500 bytes of memory
 _MAX_ELEMENTS = 1_000_000
 
 
@@ -57,7 +57,7 @@ class XmlElement:
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that rejects declarations that may expand (Parse raises XmlError). It delivers text in large pieces."""
+    """Return a parser that delivers text in large pieces. It rejects declarations that may expand (Parse raises XmlError)."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 

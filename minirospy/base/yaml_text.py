@@ -1,4 +1,4 @@
-"""Load YAML with PyYAML's safe loaders, but reject text that takes minutes, fills the memory or crashes Python. Pure.
+"""Load YAML with PyYAML's safe loaders, but reject text that would take minutes, fill the memory or crash Python. Pure.
 
 A short text may be nested without limit, expand through its aliases, or be a single number that takes hours to parse:
 `1:59:59:...` has base 60. Every rejection, and every other error in PyYAML, is raised as a yaml.YAMLError. PyYAML is
@@ -34,7 +34,7 @@ def safe_load(text: str) -> object:
 
 @lru_cache(maxsize=1)
 def _plain_loader() -> type[yaml.SafeLoader]:
-    """Return a safe loader that reads !!binary as bytes, even after `import rosparam`, which changes PyYAML's own loaders."""
+    """Return a safe loader that reads !!binary as bytes even after `import rosparam`, which changes PyYAML's own loaders."""
     import yaml
 
     class PlainLoader(yaml.SafeLoader):
@@ -86,13 +86,13 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
 
 
 def _require_text(text: object) -> None:
-    """Raise TypeError if a value is not a string, which is an error in the program, not in the text."""
+    """Raise TypeError if a value is not a string; that is an error in the program, not in the text."""
     if not isinstance(text, str | bytes):
         raise TypeError(f"YAML is a text, not {type(text).__name__}")
 
 
 def fast_loader() -> type[yaml.SafeLoader]:
-    """Return PyYAML's compiled safe loader. If that is missing, return the pure Python one, which takes ten times as long."""
+    """Return PyYAML's compiled safe loader or, if that is missing, the pure Python one, which takes ten times as long."""
     import yaml
 
     fastest: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -124,8 +124,7 @@ def check_yaml(text: str) -> None:
     YAML libraries accept such text: nesting may crash Python, and a value with aliases is small only until it is sent or
     printed. Raise yaml.YAMLError if the text is not YAML.
     """
-    # Compute an upper bound for the depth from brackets and indentation, which is within the limit for nearly all
-    # texts.
+    # Compute an upper bound of the depth from brackets and indentation; it is within the limit for nearly all texts.
     indent = max(map(len, _INDENT.findall(text)), default=0)
     has_aliases = "*" in text and "&" in text
     if text.count("[") + text.count("{") + 2 * indent < _MAX_LEVELS and not has_aliases:
@@ -171,9 +170,7 @@ def one_line(error: Exception) -> str:
 
 
 _RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)
-"""Exceptions that check_yaml and PyYAML raise, for example for an invalid date, or for !!bool before text that is not a
-boolean.
-"""
+"""Exceptions that check_yaml and PyYAML raise, for example for an invalid date or for !!bool before other text."""
 
 
 def _reason(error: Exception) -> str:

@@ -28,13 +28,13 @@ def level_of(value: object) -> int:
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
         raise TypeError("not a level")
-    # Accept numpy.bool_ and similar types, which are neither int nor bool.
+    # Accept types like numpy.bool_, which are neither int nor bool.
     return 1 if value else 0
 
 
 def detector_of(channel: int, edge: int, bouncetime: int) -> Detector:
     """Create a detector for an edge; ``bouncetime`` is in ms. Raise ValueError or TypeError if an argument is invalid."""
-    # Require whole milliseconds: like RPi.GPIO, raise TypeError for a time in seconds such as 0.2.
+    # Require whole milliseconds. Like RPi.GPIO, raise TypeError for a time in seconds such as 0.2.
     edge, bouncetime = operator.index(edge), operator.index(bouncetime)
     if edge not in {Slope.RISING, Slope.FALLING, Slope.BOTH}:
         raise ValueError("The edge must be set to RISING, FALLING or BOTH")

@@ -53,7 +53,7 @@ class Board:
 
     def __init__(self, name: str | None = None) -> None:
         directory = BoardDirectory.find(name)
-        # Use weak references, so that an abandoned watch receives no further edges.
+        # Use weak references, so that no further edges are collected for an abandoned watch.
         self._watchers: weakref.WeakSet[queue.SimpleQueue[Edge]] = weakref.WeakSet()
         self._lock = threading.Lock()
         self.name = directory.name
@@ -80,7 +80,7 @@ class Board:
         self._link.call(Release(pin))
 
     def set(self, pin: int, level: int) -> None:
-        """Drive an input to ``level`` (0 or 1) from outside, or set an output as another program would."""
+        """Drive an input to ``level`` (0 or 1) from outside, or set an output in the same way as another program."""
         self._link.call(Force(pin, level))
 
     @property

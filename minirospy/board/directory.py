@@ -1,4 +1,4 @@
-"""A board's files: find the paths of its socket, lock and saved pins from the board's name.
+"""A board's files: derives the paths of its socket, lock and saved pins from its name.
 
 ``MINIROSPY_BOARD`` is the board's name (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder for its files,
 by default one in the temporary folder that only this user may enter.
@@ -78,7 +78,7 @@ class BoardDirectory:
 
     @property
     def address_path(self) -> Path:
-        """The path of the file that a TCP server stores "port token" in. Only this user may read it."""
+        """The path of the file in which a TCP server stores "port token". Only this user may read it."""
         return self.folder / f"{self.name}.address"
 
     @property
@@ -88,12 +88,12 @@ class BoardDirectory:
 
     @property
     def state_path(self) -> Path:
-        """The path of the file that contains the board's state, as the last server saved it."""
+        """The path of the file in which the last server saved the board's state."""
         return self.folder / f"{self.name}.pins"
 
     @property
     def log_path(self) -> Path:
-        """The path of the log file for the error that ended a server."""
+        """The path of the log file for the error with which a server ended."""
         return self.folder / f"{self.name}.log"
 
 

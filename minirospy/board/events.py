@@ -65,14 +65,14 @@ class Detector:
         """Wait up to ``timeout`` seconds for an edge to report; return whether one occurred."""
         if timeout is not None or sys.platform != "win32":
             return self._occurred.wait(timeout)
-        # Wait in slices, because Windows delivers Ctrl-C only between waits.
+        # Wait in slices: Windows delivers Ctrl-C only between waits.
         while not self._occurred.wait(0.2):
             pass
         return True
 
 
 class CallbackThread:
-    """Runs callbacks in the order of their edges. If a callback raises, prints the exception and runs the next one."""
+    """Runs callbacks in the order of their edges. If a callback raises, prints the exception and goes on with the next one."""
 
     def __init__(self) -> None:
         self._due: queue.SimpleQueue[Detector | None] = queue.SimpleQueue()

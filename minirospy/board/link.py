@@ -44,13 +44,13 @@ if TYPE_CHECKING:
 __all__ = ["Edge", "Link"]
 
 START_PATIENCE = 30.0
-"""Seconds to wait for a server to start; a loaded small machine needs two or three, a machine with blocked I/O up to fifteen."""
+"""Seconds to wait for a server to start. A small machine under load needs two or three, one with blocked I/O up to fifteen."""
 
 ANSWER_PATIENCE = 40.0  # seconds to wait for a response; longer than it takes to replace a dead server
 
-CLOSE_PATIENCE = 0.5  # seconds that close() waits for the last outputs to arrive
+CLOSE_PATIENCE = 0.5  # seconds for which close() waits for the last outputs to arrive
 
-# maximum number of requests in progress; beyond that, an output waits for the server
+# maximum number of requests in progress; above it, an output waits for the server
 MAX_UNACKNOWLEDGED = 10_000
 
 _SERVE = """\
@@ -59,9 +59,7 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""Code that does the same as `python -m minirospy.board.server`, but also works if the package was imported from the current
-folder.
-"""
+"""Does the same as `python -m minirospy.board.server`, but also works if the package was imported from the current folder."""
 
 
 class Edge(NamedTuple):
@@ -84,8 +82,7 @@ class Link:
     def __init__(self, directory: BoardDirectory, on_edge: Callable[[Edge], None] | None = None) -> None:
         self._directory = directory
         self._on_edge = on_edge
-        # Use a reentrant lock: a signal handler (a node's shutdown hook) may set pins while its thread holds the
-        # lock.
+        # Use a reentrant lock: a signal handler, such as a node's shutdown hook, may set pins while its thread holds the lock.
         self._news = threading.Condition(threading.RLock())
         self._number = 0
         self._acknowledged = 0
@@ -105,9 +102,8 @@ class Link:
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
         """Perform ``operation``, and return when the mirror shows its effect.
 
-        If it is None, only wait for the operations sent before. Raise BoardError if the board refuses or does not respond
-        within
-        ``timeout`` seconds.
+        If it is None, only wait for the operations sent earlier. Raise BoardError if the board refuses, or does not
+        respond within ``timeout`` seconds.
         """
         with self._news:
             number = self._send(operation)
@@ -188,8 +184,8 @@ class Link:
                 return None
             now = time.time()
             edges = []
-            # A killed server may not have saved its last changes: repeat the setup of this process's pins, with the
-            # last levels in the mirror.
+            # A killed server may not have saved the last changes.
+            # Repeat the setup of this process's pins, with their last levels in the mirror.
             for pin in sorted(self._mine):
                 state = self.states[pin]
                 latch = state.latch if state.function is Function.OUT else None
@@ -211,7 +207,7 @@ class Link:
         if isinstance(message, Changed):
             self.states[message.pin] = message.state
             level = message.state.level
-            # Skip a change sent before this process's latest write, because it would undo that write for a moment.
+            # Skip a change that was sent before this process's latest write: it would undo that write for a moment.
             if message.pin not in self._written:
                 self.levels[message.pin] = level
             return Edge(message.pin, level, message.time) if message.edge else None
@@ -262,7 +258,7 @@ class _Connection:
                 yield list(self._stream.feed(data))
 
     def hang_up(self) -> None:
-        # Call shutdown first: it wakes the reader, while close would not.
+        # Call shutdown first, which, unlike close, wakes the reader.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
@@ -282,9 +278,8 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without a responding server: the new server exited because another one was still running, and
-            # that one has exited since. Negative status: a Ctrl-C for this process killed the new server before it
-            # had detached from the terminal.
+            # Status 0 without a responding server: the new server exited because of another one, which has exited since.
+            # Negative status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)
@@ -341,20 +336,20 @@ def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
     windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    # A temporary board is for the processes started here, and need not outlive this one.
+    # A temporary board is only for the processes started here, so it need not outlive this one.
     start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
     with open(os.devnull, "a") if windows else private_files.open_text(directory.log_path, "a") as log:
         process = start(
             [sys.executable, "-c", _SERVE, root, str(directory.folder), directory.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            # On Windows the server writes the log itself; server.py explains why.
+            # On Windows the server writes the log itself; see server.py for the reason.
             stderr=log,
             cwd=directory.folder,
             start_new_session=True,
             creationflags=flags,
         )
-    # Wait for the server's exit status, because otherwise it would remain as a zombie of a long-lived client.
+    # Wait for the server's exit status; otherwise it would remain as a zombie of a long-lived client.
     threading.Thread(target=process.wait, name="gpio-server-wait", daemon=True).start()
     return process
 

@@ -37,7 +37,7 @@ PINS = 54  # number of pins on the chip, in BCM numbering: 0 to 53
 LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}
 
 BUTTONS = (11, 12)
-"""BCM pins of the wired buttons. A resistor pulls each pin to 0; pressing the button drives it to 1."""
+"""BCM pins of the wired buttons. A resistor pulls each pin to 0, and pressing the button drives it to 1."""
 
 
 class Function(IntEnum):
@@ -101,7 +101,7 @@ class Release(NamedTuple):
 
 
 class Force(NamedTuple):
-    """Drive an input to ``level``, or set an output's latch as another program would."""
+    """Drive an input to ``level``, or set an output's latch, as another program would."""
 
     pin: int
     level: int
@@ -179,7 +179,7 @@ class BoardModel:
         return {pin: state if initial is None else state._replace(latch=_level(initial))}
 
     def _pressed(self, pin: int) -> int:
-        # A button at a pin with a pull-up connects the pin to ground; the wired buttons connect it to 3.3 V.
+        # A button at a pin with a pull-up connects it to ground; the wired buttons connect theirs to 3.3 V.
         return 0 if pin not in BUTTONS and self.pins[pin].pull is Pull.UP else 1
 
 

@@ -96,7 +96,7 @@ class PersonMoved(NamedTuple):
 
 
 class Done(NamedTuple):
-    """All requests up to ``number`` are done."""
+    """All requests up to ``number`` have been executed."""
 
     number: int
 

@@ -1,4 +1,4 @@
-"""Detect a Raspberry Pi, whose physical pins the virtual board does not control."""
+"""Detect a Raspberry Pi. The virtual board does not control its physical pins."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def model_name(file: Path = _MODEL_FILE) -> str | None:
 
 
 def warn_of_missing_library(file: Path = _MODEL_FILE) -> None:
-    """If this is a Raspberry Pi, warn on stderr that the program only controls a virtual board."""
+    """If this is a Raspberry Pi, warn on stderr that the program controls only a virtual board."""
     name = model_name(file)
     if name is not None:
         print(

@@ -119,12 +119,10 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # Dict from channel to BCM pin, for the channels that are set up; used by input() and output(), which must be
-        # fast.
+        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use it.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
-        # The channels that cleanup() has released in a signal handler, and their BCM pins, so that the interrupted
-        # call still finds them.
+        # The channels that cleanup() released in a signal handler, with their BCM pins: the interrupted call may still use them.
         self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
@@ -201,9 +199,8 @@ class Gpio:
             )
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
-                # If this runs in a shutdown hook, the interrupted program may already have checked its flag and be
-                # about to use a pin. That use must not fail, because RPi.GPIO, which is written in C, would finish
-                # the program's call first.
+                # In a shutdown hook, the interrupted program may have checked its flag already and be about to use a pin.
+                # That must not fail: in RPi.GPIO, which is written in C, the program's call would finish first.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -216,8 +213,7 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Reset the mode even if no channel was set up, because RPi.GPIO only checks whether any pin has been
-                # accessed.
+                # Reset the mode even if no channel was set up: RPi.GPIO only checks whether any pin has been accessed.
                 self._mode = None
 
         if not mine:
@@ -373,15 +369,14 @@ class Gpio:
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
-            # Record the pin before calling the board: Ctrl-C may interrupt that call, and cleanup() must then undo
-            # its effect.
+            # Record the pin before calling the board: Ctrl-C may interrupt the call, and cleanup() must then undo its effect.
             self._directions[pin] = direction
 
         link.call(Setup(pin, direction, pull, level))
 
         with self._lock:
             if pin not in self._directions:
-                # A signal handler has called cleanup() during the call to the board.
+                # During the call to the board, a signal handler has called cleanup().
                 return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin

@@ -22,7 +22,7 @@ NOISE = 0.004  # standard deviation of a range, in metres
 FIELDS = (0.4, 0.2)  # reach of the warning field and of the protective field, in metres
 
 _PLAIN, _REFLECTOR = 90.0, 250.0
-_DARK_EDGE = 0.35  # minimum brightness, from 0 to 1, of a surface seen from the side
+_DARK_EDGE = 0.35  # minimum brightness, from 0 to 1, of a surface seen at a flat angle
 
 
 class Wall(NamedTuple):
@@ -66,7 +66,7 @@ class Scan(NamedTuple):
         return nearest >= FIELDS[0], nearest >= FIELDS[1]
 
 
-# A room of 6 m by 4 m with a door to the left, and a reflector on the wall ahead; the scanner is at the wall behind.
+# A room of 6 m by 4 m. There is a door to the left and a reflector on the wall ahead; the scanner is at the wall behind.
 WALLS = (
     Wall(-1.0, -2.0, 5.0, -2.0),
     Wall(5.0, -2.0, 5.0, -0.3),

@@ -40,12 +40,12 @@ from minirospy.board.protocol import (
 
 __all__ = ["main"]
 
-LINGER = 1.5  # seconds that a board without clients waits for the next client
+LINGER = 1.5  # seconds for which a board without clients waits for the next one
 
 SAVE_AFTER = 0.05
-"""Delay in seconds before a change is saved, so that a fast-blinking LED causes at most 20 writes a second."""
+"""Delay in seconds before a change is saved, so that even a fast-blinking LED causes at most 20 writes a second."""
 
-# Maximum unsent bytes for a client; beyond that the client is disconnected, and reconnects when it reads again
+# Maximum unsent bytes for a client; above it, the client is disconnected, and reconnects when it reads again
 MAX_UNSENT = 1 << 20
 
 LOCK_PATIENCE = 5.0  # seconds to wait for the lock if another server is about to exit
@@ -55,10 +55,9 @@ def main(argv: list[str]) -> int:
     """Serve the board NAME in FOLDER until it has no clients; return 0, also if another server is running."""
     directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
-        # On Windows, do not keep the log file open as on other systems, because neither the file nor its folder could
-        # then be removed.
+        # Windows only: do not keep the log file open, because an open file and its folder cannot be removed there.
         sys.stderr = _LogOnDemand(directory.log_path)
-    # A board with saved state is not temporary, even if another process starts it again.
+    # A board with saved state is not temporary, even if another process restarts it.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
     with _locked(directory) as owned:
         if owned:
@@ -71,7 +70,7 @@ def main(argv: list[str]) -> int:
 
 
 class _LogOnDemand(io.TextIOBase):
-    """A standard error stream that opens its file for each write, so that the file exists only after an error."""
+    """A standard error stream that opens its file for each write, so that no file exists without an error."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -107,7 +106,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # A client may have the address file open, which prevents its removal. The next server replaces it.
+            # A client may have the address file open, which prevents removing it. The next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):
@@ -159,7 +158,7 @@ class _Server:
         if self._saving is not None:
             self._saving.cancel()
             self._saving = None
-        # Ignore errors, because clients must not fail if the folder was removed (by a test, or by cleaning /tmp).
+        # Ignore errors: clients must not fail because the folder was removed (by a test, or by cleaning /tmp).
         with contextlib.suppress(OSError):
             _write_private(self._directory.state_path, encode_board(self._model.pins, self._model.person))
 
@@ -185,7 +184,7 @@ class _Client(asyncio.Protocol):
         except ProtocolError:
             self.drop()
             return
-        # The last Done covers all requests before it, so a burst of outputs gets a single response.
+        # The last Done covers all earlier requests, so a burst of outputs gets a single response.
         done: list[Message] = [answer for answer in answers if isinstance(answer, Done)]
         refused: list[Message] = [answer for answer in answers if isinstance(answer, Refused)]
         if answers:

@@ -10,7 +10,7 @@ from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
 
-PWM_LIMIT = 50.0  # Hz; a faster PWM appears on the board with this frequency and its own duty cycle
+PWM_LIMIT = 50.0  # Hz; a faster PWM is shown on the board at this frequency, with its own duty cycle
 
 
 class Output(Protocol):

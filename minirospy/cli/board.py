@@ -1,4 +1,4 @@
-"""`minirospy board`: draws the virtual board, and has commands for its buttons, pins and the simulated person."""
+"""`minirospy board`: draws the virtual board. Its verbs control the buttons, the pins and the simulated person."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""The person's step per key press, in metres. It is also the width of a map cell, and half a cell's height."""
+"""The person's step per key press, in metres. Also the width of a map cell, and half of its height."""
 
 _MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead and to each side
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set the variable, because nodes read it as well, so that they and the verbs open the same board.
+        # Set the variable for the nodes, which read it, too: they and the verbs must open the same board.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
@@ -204,7 +204,7 @@ def _press(pin: Sequence[int]) -> None:
         for each in pin:
             board.press(each)
             used = board.state().pins[each]
-            # An input with a pull resistor may have a button that the user has connected.
+            # The user may have connected a button to an input with a pull resistor.
             if each not in BUTTONS and (used.function is Function.OUT or used.pull == Pull.OFF):
                 part = f"it is wired to a {LEDS[each]} LED" if each in LEDS else "nothing is wired to it"
                 warn(

@@ -17,7 +17,7 @@ _Json = Any
 
 
 class _Token(NamedTuple):
-    """A token. ``is_kept``: the token was read from ROS_HOME, where this user's bridges store their tokens."""
+    """A token. ``is_kept``: it was read from ROS_HOME, where this user's bridges store their tokens."""
 
     text: str
     is_kept: bool
@@ -40,7 +40,7 @@ def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
         except BridgeError as error:
             faults.append(error)
         else:
-            # A bridge has several ports, one per protocol: list each bridge once.
+            # A bridge has several ports, one per protocol, so list each bridge only once.
             found.setdefault(status["node"], status)
 
     if as_json and found:
@@ -96,7 +96,7 @@ def _fetch(port: int, token: _Token) -> _Json:
     import http.client
     import ssl
 
-    # The server is on this machine, so its certificate need not be verified.
+    # The server is on this machine, so do not verify its certificate.
     context = ssl._create_unverified_context()
     plain = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWER_SECONDS)
     encrypted = http.client.HTTPSConnection("127.0.0.1", port, timeout=ANSWER_SECONDS, context=context)

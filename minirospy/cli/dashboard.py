@@ -1,4 +1,4 @@
-"""`minirospy dashboard`, `rqt` and its tools: the graph and the board in a browser. docs/dashboard.md describes how to use it."""
+"""`minirospy dashboard`, `rqt` and its tools: the graph and the board in a browser. docs/dashboard.md describes their use."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def dashboard(argv: Sequence[str] | None = None) -> int:
 
 
 def __getattr__(name: str) -> Any:
-    """Return the function for an rqt command (``rqt_plot``), or its Command (``RQT_PLOT``), from COMMANDS."""
+    """Return the function for an rqt command (``rqt_plot``) or its Command (``RQT_PLOT``), from COMMANDS."""
     command = COMMANDS.get(name.lower())
     if command is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -36,7 +36,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command. The arguments may contain remappings, because launch files may start the command as a node."""
+    """Run a command. It may be started as a node by a launch file, so the arguments may contain remappings."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)
@@ -310,7 +310,7 @@ def _serve(
     from minirospy.web.dashboard.dashboard import PORT, Dashboard
     from minirospy.web.serve import run
 
-    # Allow bags named on the command line in any folder, not only below the working folder.
+    # Bags named on the command line may be in any folder, not only below the working folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
@@ -326,7 +326,7 @@ def _serve(
     )
 
     class Started:
-        """Opens the dashboard on the given port; by default on PORT, or on any free port if PORT is in use."""
+        """Opens the dashboard on the given port. The default is PORT, or any free port if PORT is in use."""
 
         dashboard: Dashboard
 
@@ -412,7 +412,7 @@ def _announce(
     from minirospy.web.dashboard.views import link
 
     is_any = address in ("0.0.0.0", "::")
-    # Do not use localhost: a browser may try ::1 first, and another user's program may listen on this port at ::1.
+    # Do not use localhost: a browser may try ::1 first, and another user's program may listen on this port there.
     host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
     # A local user's link has the same rights as the user's own programs.
     own = tokens.read if read_only else tokens.write
@@ -431,7 +431,7 @@ def _announce(
 
 
 def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
-    """Open the browser with a one-time code instead of the token. Return whether there is a browser. Runs on the loop."""
+    """Open the browser with a one-time code in place of the token. Return whether there is a browser. Runs on the loop."""
     import asyncio
 
     from minirospy.web.dashboard.browser import open_link
@@ -443,7 +443,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Schedule the check a second late, so that the code has expired according to the clock of Codes.
+    # Check a second late, so that the code has certainly expired by the clock of Codes.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 
@@ -458,7 +458,7 @@ _ARGUMENTS: Mapping[str, tuple[Callable[[Parser], None] | None, Callable[..., tu
     "rqt_reconfigure": (_add_nodes, _nodes),
     "rqt_top": (None, _top),
 }
-"""Commands that have arguments, each with two functions.
+"""Commands that take arguments, each with two functions.
 
 One function adds the arguments; the other converts them to a view and its settings.
 """

@@ -29,13 +29,15 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""Seconds for which the button is held and then left released.
+"""Seconds for which the button is held, and for which it is then left released.
 
 Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
 """
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0
-"""Timeout in seconds, long enough for Windows with a virus scanner or for a Raspberry Pi. A failed launch ends the wait early."""
+"""Timeout in seconds, long enough for a Raspberry Pi, or for Windows with a virus scanner. A failed launch ends the wait
+early.
+"""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",
@@ -78,14 +80,14 @@ def _demo(presses: int | None) -> int:
                     took = _follow(board, level)
                     failures += took is None
                     show.tell(count, level, took)
-                    _rest(board, launch, show, _HOLD_SECONDS if level else _REST_SECONDS)
+                    _rest(launch, show, _HOLD_SECONDS if level else _REST_SECONDS)
         if failures:
             print(f"GPIO {LED} did not follow GPIO {BUTTON} {failures} times", file=sys.stderr)
         return 1 if failures else 0
 
 
 def _is_dumb() -> bool:
-    """Return whether the output is a terminal that cannot move the cursor back, such as an editor's."""
+    """Return whether the output is a terminal that cannot move the cursor back, for example an editor's."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -189,7 +191,7 @@ def _wait_for(board: Board, level: int, timeout: float) -> int | None:
     return None
 
 
-def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: float) -> None:
+def _rest(launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: float) -> None:
     end = time.monotonic() + seconds
     while (rest := end - time.monotonic()) > 0:
         if launch.poll() is not None:
@@ -199,7 +201,7 @@ def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture
 
 
 class _Lines:
-    """Prints one line per press, for an output that is not a terminal or cannot be redrawn."""
+    """Prints a line per press, for an output that is not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)
@@ -219,7 +221,7 @@ class _Lines:
 
 
 class _Picture:
-    """Shows the demo on a terminal, as a picture of the board and the current step."""
+    """Shows the demo on a terminal: a picture of the board, and the current step."""
 
     def __init__(self, board: Board) -> None:
         from rich.console import Console

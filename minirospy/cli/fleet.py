@@ -227,7 +227,7 @@ def _gateway(
     options = GatewayOptions(name, imports or not name, namespace, network, rules)
 
     async def start(node: Node) -> Gateway:
-        # Send the gateway's log to the node's log.
+        # Pass the gateway's log to the node's log.
         logging.getLogger("minirospy.fleet").parent = node.log
         return Gateway(node, options)
 

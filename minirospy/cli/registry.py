@@ -92,7 +92,7 @@ COMMANDS = (
     Entry("ros.roswtf.commands.doctor", "main", "DOCTOR", "", "doctor",
           "what is wrong here, in the network, in the graph (as roswtf)"),
     Entry("cli.completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),
-    # Shells call this command, not users.
+    # Shells call this command; users do not.
     Entry("cli.completion.complete", "main", "", "", "complete"),
     Entry("ros.rosmaster.commands.master", "roscore", "ROSCORE", "roscore"),
     Entry("ros.rosmaster.commands.master", "rosmaster", "ROSMASTER", "rosmaster"),
@@ -128,7 +128,7 @@ SHELL_FUNCTIONS = {
     "roscp": "package_file_and_target",
     "rosmv": "package_file_and_target",
 }
-"""The functions that `minirospy shell` defines, each with its completer in minirospy.cli.completion.completers."""
+"""The functions that `minirospy shell` defines, each with the name of its completer in minirospy.cli.completion.completers."""
 
 
 def console_scripts() -> dict[str, str]:

@@ -50,8 +50,12 @@ WINDOWS = (
            "Bags: recorded, shown on a timeline and played, in a browser."),
     Window("rqt_console", "console", "Shows the log lines of all nodes", "0.4.12",
            "The log lines of all nodes, in a browser."),
+    Window("rqt_controller_manager", "controllers", "Shows, starts and stops controllers", "0.20.0",
+           "Controllers of ros_control: shown, loaded, started and stopped, in a browser."),
     Window("rqt_graph", "graph", "Shows nodes and topics", "0.4.14", "Nodes and topics, in a browser."),
     Window("rqt_image_view", "image", "Shows images of a topic", "0.4.17", "Images of topics, in a browser."),
+    Window("rqt_joint_trajectory_controller", "trajectory", "Moves the joints of a controller", "0.21.2",
+           "Sliders that move the joints of a JointTrajectoryController, in a browser."),
     Window("rqt_launch", "launch", "Starts launch files, and shows their nodes", "0.4.13",
            "Launch files: started and watched, in a browser."),
     Window("rqt_logger_level", "console", "Shows log lines, and sets the levels of loggers", "0.4.13",
@@ -81,14 +85,14 @@ WINDOWS = (
 
 def view_of_plugin(plugin: str) -> str:
     """Return the view for a name passed to `rqt --standalone`. Raise UsageError if there is none."""
-    # Imported here because every command imports this module.
+    # Imported here, because every command imports this module.
     from minirospy.base.errors import UsageError
     from minirospy.web.dashboard.views import VIEWS
 
     plugins = {each.command: each.view for each in WINDOWS if each.command.startswith("rqt_")}
     name = plugin.rpartition("/")[0] or plugin
     for known, view in plugins.items():
-        # rqt also accepts a part of the plugin's name.
+        # rqt also accepts part of a plugin's name.
         if name.lower().replace(".", "/").split("/")[0] == known:
             return view
     if name in VIEWS:

@@ -62,7 +62,8 @@ from minirospy.client.params import (
     search_param,
     set_param,
 )
-from minirospy.client.services import Service, ServiceProxy, wait_for_service
+from minirospy.client.service import Service
+from minirospy.client.service_proxy import ServiceProxy, wait_for_service
 from minirospy.client.session import current_session
 from minirospy.client.startup import init_node
 from minirospy.client.time import Duration, Rate, Time, Timer, get_rostime, get_time, is_wallclock, sleep
@@ -155,8 +156,7 @@ __all__ = [
     "wait_for_service",
 ]
 
-# Do this before the first message is imported: if ROS 2 is sourced, ROS 2's packages with the same names are first on
-# the path.
+# Do this before the first message is imported: if ROS 2 is sourced, its packages of the same names come first on the path.
 prefer_ros1()
 find_packages_named_like_scripts()
 
@@ -179,7 +179,7 @@ def on_shutdown(h: Callable[[], object]) -> None:
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; the hooks run in this thread."""
     current_session().lifecycle.signal_shutdown(reason)
-    # Do not notify the calling thread again: anything it does from now on is clean-up, which may sleep.
+    # Do not notify the calling thread again: from now on it only cleans up, and may sleep.
     current_session().poll_shutdown()
 
 
@@ -203,7 +203,7 @@ def get_node_uri() -> str | None:
 
 
 def is_shutdown_requested() -> bool:
-    """Return whether a shutdown has started. While the shutdown hooks run, is_shutdown() still returns False."""
+    """Return whether a shutdown has started. is_shutdown() still returns False while the shutdown hooks run."""
     return current_session().lifecycle.is_shutdown_requested
 
 
@@ -224,7 +224,7 @@ def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
-    """Remap ``name`` and return it as a global name, resolved relative to this node or the node ``caller_id``."""
+    """Remap ``name`` and return it as a global name, resolved relative to this node or to the node ``caller_id``."""
     return current_session().resolve(name and str(name), caller_id)
 
 

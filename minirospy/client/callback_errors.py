@@ -14,7 +14,7 @@ from types import TracebackType
 
 __all__ = ["CallbackErrors"]
 
-_SECONDS = 10.0  # seconds between two lines about the same error
+_SECONDS = 10.0  # minimum seconds between log lines about the same error
 
 _log = logging.getLogger("rosout")
 
@@ -39,11 +39,10 @@ class CallbackErrors:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Create the log. ``clock()`` returns the time in seconds."""
         self._clock = clock
-        # Keys are the error's type, the callback's name, the file and the line. A program raises errors at few
-        # locations, so the table stays small.
+        # Keyed by the error's type, the callback's name, the file and the line.
+        # The table stays small, because a program raises errors in few places.
         self._known: dict[tuple[type[BaseException], str, str, int], _Repeated] = {}
-        # Use a reentrant lock: :meth:`close` may run in a signal handler that interrupts :meth:`log` in the same
-        # thread.
+        # Use a reentrant lock: a signal handler that interrupts :meth:`log` may call :meth:`close` in the same thread.
         self._lock = threading.RLock()
 
     def log(self, callback: object, error: BaseException) -> None:

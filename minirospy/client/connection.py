@@ -1,4 +1,4 @@
-"""A topic's links, as programs read them from ``impl.connections``. They have the attributes of rospy's transports.
+"""A topic's links, which programs read from ``impl.connections``. They have the attributes of rospy's transports.
 
 Source: http://docs.ros.org/en/noetic/api/rospy/html/rospy.impl.transport-module.html (class Transport).
 """

@@ -17,7 +17,7 @@ class Deferral:
     """
 
     def __init__(self) -> None:
-        # True while a signal, recorded by the signal handler, is pending until the main thread dispatches it
+        # True if the signal handler has recorded a signal that the main thread has not dispatched yet
         self.pending = False
         # Dispatches the pending signal; called in the main thread
         self.dispatch: Callable[[], object] = lambda: None
@@ -38,13 +38,13 @@ class Deferral:
             self.poll()
 
     def poll(self) -> None:
-        """Dispatch a pending signal, if called in the main thread outside of a critical section."""
+        """Dispatch a pending signal if this is the main thread and it is outside of a critical section."""
         if self.pending and not self._depth and is_main_thread():
             self.dispatch()
 
     @contextlib.contextmanager
     def lifted(self) -> Iterator[None]:
-        """Leave the critical section for the duration of a block that runs the user's code."""
+        """Leave the critical section for a block that runs the user's code."""
         depth = int(is_main_thread())
         self._depth -= depth
         try:
@@ -54,5 +54,5 @@ class Deferral:
 
 
 def is_main_thread() -> bool:
-    """Return whether the calling thread is the main thread, which signals interrupt."""
+    """Return whether the calling thread is the main thread, the only one that signals interrupt."""
     return threading.current_thread() is threading.main_thread()

@@ -21,13 +21,13 @@ def report_waiting(*, is_leaving: bool) -> None:
     """
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
-    # The terminal may have been closed.
+    # The terminal may already be closed.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
 
 
 def report_interrupt(reason: str) -> None:
-    """Print that the main thread is interrupted, its position in the program, and the reason for the shutdown."""
+    """Print that the main thread is being interrupted, where it is in the program, and the reason for the shutdown."""
     main = threading.main_thread()
     place = _place(sys._current_frames().get(main.ident or 0))
     at = f" at {place}" if place else ""
@@ -40,7 +40,7 @@ def report_interrupt(reason: str) -> None:
 
 
 def _what_runs() -> str:
-    """Return the thread or process that delays this process's exit, and its position in the program."""
+    """Return the thread or process that delays this process's exit, and where it is in the program."""
     main = threading.main_thread()
     threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]
     frames = sys._current_frames()
@@ -57,12 +57,11 @@ def _what_runs() -> str:
 
 
 def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
-    """If an expected error is not caught, let the program or thread exit with status 0 and without a traceback."""
+    """Let the program or thread exit with status 0 and without a traceback if an expected error is not caught."""
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_interrupt(error: BaseException | None) -> bool:
-        # An interrupted wait may raise RuntimeError, because its lock was not acquired; check the error that caused
-        # it.
+        # An interrupted wait may raise RuntimeError, because it did not acquire its lock. Check the error that caused it.
         while isinstance(error, RuntimeError):
             error = error.__context__
         return error is not None and is_expected(error)
@@ -70,7 +69,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if is_interrupt(error):
             if sys.flags.inspect:
-                # An interactive session follows after `python -i PROGRAM`.
+                # `python -i PROGRAM` continues with an interactive session.
                 return
             raise SystemExit(0)
         hooks[0](kind, error, trace)

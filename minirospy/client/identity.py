@@ -30,8 +30,8 @@ class Identity:
 
     def __init__(self, previous: Identity | None = None) -> None:
         """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
-        # Dict from resolved names, and from __name and similar keys, to their new values; empty before init_node.
-        # Programs may change this dict and `mappings`
+        # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node.
+        # Programs may change this dict and `mappings`.
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
         # The namespace set by the program, or None
@@ -50,7 +50,7 @@ class Identity:
 
     @property
     def arguments(self) -> names.Arguments:
-        """The command line: the one passed to init_node, or before that, the process's own."""
+        """The command line that was passed to init_node; before init_node, the process's own."""
         if self._arguments is None:
             self._arguments = names.parse_arguments(sys.argv)
         return self._arguments
@@ -99,7 +99,7 @@ class Identity:
         """Return ``name`` as a global name, resolved relative to this node or the node ``caller_id``."""
         node_name = caller_id or self.name
         if name and names.is_private(name):
-            # As in rospy, keep a slash after `~`, so that `~/x` resolves to `/x`.
+            # As in rospy, keep a slash after `~`: `~/x` resolves to `/x`.
             resolved = names.join(node_name, names.canonicalize(name)[1:])
         else:
             resolved = names.resolve(name, node_name)
@@ -168,7 +168,7 @@ def private_parameters(arguments: names.Arguments) -> dict[str, object]:
 
 
 def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
-    """Warn, as rospy does, that a name is not a legal graph name; the master may refuse it later."""
+    """Warn, as rospy does, about an illegal graph name; the master may refuse the name later."""
     if not names.is_legal_name(name):
         warnings.warn(
             f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",

@@ -67,7 +67,7 @@ class Lifecycle:
 
         This is a lock and not a flag, because a signal handler may run between a test and an assignment.
         """
-        # Set after the shutdown hooks have run, so that every blocking call returns
+        # Set once the shutdown hooks have run; every blocking call then returns
         self.shutting_down = SignalSafeEvent()
         self.left = SignalSafeEvent()  # set when the node has left the graph
         self.reason: object = None  # the reason passed with the shutdown request
@@ -76,7 +76,7 @@ class Lifecycle:
         # Called after ``hooks``, including those that a hook has added
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
-        """Called to unblock blocking calls, after is_shutdown() has become true and before the node leaves the graph."""
+        """called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls"""
 
         self.has_waited = False  # True after a thread has waited or slept in a rospy call
         self.deferral = Deferral()
@@ -92,7 +92,7 @@ class Lifecycle:
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        # Without the deferral, a signal dispatched in between could shut the node down without this hook.
+        # Without the deferral, a signal dispatched in between could shut the node down without calling this hook.
         with self.deferral, self._lock:
             if not self.is_shutdown():
                 (self.hooks if hooks is None else hooks).append(hook)
@@ -105,8 +105,8 @@ class Lifecycle:
         Return False, without waiting, if a shutdown is already in progress.
         """
         with self.deferral:
-            # Enter the deferral before claiming the shutdown. Otherwise a second signal right after the claim would
-            # leave the shutdown claimed but never performed.
+            # Enter the deferral before claiming the shutdown.
+            # Otherwise a second signal right after the claim would leave the shutdown claimed but never performed.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)
@@ -131,7 +131,7 @@ class Lifecycle:
         return True
 
     def interrupting(self, interrupt: Callable[[], object]) -> contextlib.AbstractContextManager[None]:
-        """Call ``interrupt`` if the node shuts down during a block, to unblock calls made in the block.
+        """Call ``interrupt`` if the node shuts down during a block, so that blocking calls in the block return.
 
         A signal handler may call ``interrupt`` at any point in the main thread, so the events that it sets are
         SignalSafeEvents.
@@ -196,7 +196,7 @@ class Lifecycle:
         return ROSInterruptException(text)
 
     def is_interrupt(self, error: BaseException) -> bool:
-        """Return whether an error that terminates a thread is the interrupt that was raised in that thread."""
+        """Return whether the error that ended a thread is the interrupt that was raised in that thread."""
         if isinstance(error, KeyboardInterrupt) and self.machine.signals:
             return True
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
@@ -217,8 +217,7 @@ class Lifecycle:
             with self.deferral.lifted():
                 hook()
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
-            # A KeyboardInterrupt here is the second Ctrl-C. Ignore write errors, because the terminal may have been
-            # closed.
+            # A KeyboardInterrupt here is the second Ctrl-C. Ignore write errors, because the terminal may be closed.
             if type(error) is not KeyboardInterrupt:
                 with contextlib.suppress(OSError, ValueError):
                     traceback.print_exc()

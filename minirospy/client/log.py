@@ -139,7 +139,7 @@ def _log_function(level: int, name: str) -> LogFunction:
 
 
 class _CallSites:
-    """Records the time and text of each call site's last message.
+    """The time and text of the last message from each call site.
 
     A call site is one call expression, even if it calls several functions.
     """
@@ -162,7 +162,7 @@ class _CallSites:
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
-        # Log again if simulated time has jumped back.
+        # If simulated time has jumped back, log again.
         due = before is None or now - before > pause or now < before
         if due:
             self._times[place] = now
@@ -203,7 +203,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         if not logger.isEnabledFor(level):
             return
         frame = sys._getframe(1)
-        # With a period of 0 always log, or, if ``identical`` is set, only log a changed message.
+        # With a period of 0, log every message; if ``identical`` is set, only changed messages.
         due = places.is_due(frame, period) if period else not identical
         if identical:
             due = places.is_new(frame, msg) or due
@@ -221,7 +221,7 @@ def _named(function: _F, name: str, doc: str) -> _F:
 
 
 def _place(frame: FrameType) -> tuple[str, int, int]:
-    """Return the location of a call site; two calls on one line have different locations."""
+    """Return the location of a call site. Two calls on the same line have different locations."""
     return frame.f_code.co_filename, frame.f_lineno, frame.f_lasti
 
 

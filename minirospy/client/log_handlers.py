@@ -74,11 +74,11 @@ class RosStreamHandler(DeferringHandler):
                 stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             stream.flush()
         except RuntimeError:
-            # Writing fails if a signal handler logs while it interrupts another write.
+            # Writing fails if a signal handler logs while it is interrupting another write.
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # There is no terminal, or it was closed. Neither is the program's fault.
+            # There is no terminal, or it has been closed; neither is the program's fault.
             pass
 
 
@@ -97,7 +97,7 @@ class RosOutHandler(DeferringHandler):
         self._busy = threading.local()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Publish one record, unless the publishing code itself logged it."""
+        """Publish one record, unless it comes from the publishing code itself."""
         session = current_session()
         node = session.node
         if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():
@@ -124,7 +124,7 @@ class RosOutHandler(DeferringHandler):
 
 
 def check_message(record: logging.LogRecord) -> str:
-    """Return the record's text. If its arguments do not match its message, return a text that names the fault."""
+    """Return the record's text. If its arguments do not match its format string, return a text that names the error."""
     try:
         return record.getMessage()
     except Exception as error:  # noqa: BLE001 - also what a program's own __str__() raises

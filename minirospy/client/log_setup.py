@@ -52,7 +52,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     except OSError:
         _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
 
-    # A user's configuration file uses this, and so do programs that look for their log file.
+    # A user's logging configuration file refers to this, and programs use it to find their log file.
     os.environ["ROS_LOG_FILENAME"] = str(path)
     if not configured_by_file(session.identity.environment.home):
         _rosout.setLevel(logging.INFO)
@@ -66,8 +66,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    # rospy logs its own warnings with the program's logger, so the program's log level may hide them. Behave the same
-    # here.
+    # rospy logs its own warnings with the program's logger, so the program's log level may hide them. Do the same.
     terminal.addFilter(lambda record: _rosout.isEnabledFor(record.levelno))
     _add_handler(session, ours, terminal)
     if path.parent.parent == session.identity.environment.log_dir:
@@ -97,11 +96,11 @@ def _add_handler(session: Session, logger: logging.Logger, handler: logging.Hand
 
 
 def _offer_logger_services() -> None:
-    """Offer the services that list the node's loggers and set their log levels."""
+    """Offer the services that list the node's loggers and set their levels."""
     from roscpp.msg import Logger
     from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
 
-    from minirospy.client.services import Service
+    from minirospy.client.service import Service
 
     def get_loggers(request: object) -> GetLoggersResponse:
         levels = logger_levels(sorted(logging.root.manager.loggerDict))
@@ -143,11 +142,11 @@ def configured_by_file(home: Path) -> bool:
 
 
 def _log_to_file(session: Session, path: Path) -> None:
-    """Write all loggers' output to the node's log file, as rospy does. Prevent duplicate lines on the terminal."""
+    """Write all loggers' output to the node's log file, as rospy does, without duplicating lines on the terminal."""
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):
-        """A handler with the class name that programs written for rospy expect among the root logger's handlers."""
+        """A handler whose class name is the one that programs written for rospy look for among the root logger's handlers."""
 
     try:
         file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
@@ -159,8 +158,8 @@ def _log_to_file(session: Session, path: Path) -> None:
     root = logging.root
     if not root.handlers:
         root.setLevel(logging.INFO)
-    # Keep handlers that the program added to the root logger earlier (basicConfig), although rospy removes them, but
-    # filter them so that rosout lines are not printed on the terminal twice.
+    # Keep handlers that the program has added to the root logger (basicConfig), although rospy removes them.
+    # Filter them so that rosout lines do not appear on the terminal twice.
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)
@@ -172,9 +171,9 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 
 
 def _link_latest(folder: Path) -> None:
-    """Create the link ``latest`` next to a run's folder, pointing to the folder."""
+    """Create the link ``latest`` next to a run's folder, pointing to that folder."""
     link = folder.parent / "latest"
-    # The file system does not support links, or another node created the link first.
+    # The file system does not support links, or another node was faster.
     with contextlib.suppress(OSError, NotImplementedError):
         if link.is_symlink():
             if link.resolve() == folder.resolve():

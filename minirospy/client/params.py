@@ -37,7 +37,7 @@ _T = TypeVar("_T")
 
 
 class Unspecified:
-    """The type of the sentinel that means "no default given", because None is a valid default."""
+    """The type of the sentinel for "no default given"; None cannot be used, because it is a valid default."""
 
 
 UNSPECIFIED = Unspecified()
@@ -101,7 +101,7 @@ def set_param(param_name: str, param_value: object) -> None:
     except ROSException:
         check_sendable(param_value)
         raise
-    # The master notifies other nodes, but not the one that sets the parameter.
+    # The master notifies other nodes, but not the node that sets the parameter.
     current_session().parameter_changed(name)
 
 
@@ -211,14 +211,13 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
 
 
 def as_xmlrpc_client(value: object) -> object:
-    """Wrap bytes and dates in a value in xmlrpc.client's classes, as Python's own client does."""
+    """Wrap bytes and dates in a value in xmlrpc.client's classes, as Python's own XML-RPC client does."""
     if isinstance(value, dict):
         return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):
         return [as_xmlrpc_client(item) for item in value]
     if isinstance(value, bytes) or _is_date(value):
-        # Imported here, because http.client and the modules that it imports take longer to load than the rest of this
-        # module.
+        # Imported here, because http.client and its imports load slower than the rest of this module.
         import xmlrpc.client
 
         return xmlrpc.client.Binary(value) if isinstance(value, bytes) else xmlrpc.client.DateTime(value)

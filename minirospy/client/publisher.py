@@ -44,7 +44,7 @@ _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
 class SubscribeListener:
-    """Receives notifications when subscribers connect and disconnect; override the methods you need."""
+    """Notified when subscribers connect and disconnect. Override the methods that you need."""
 
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
@@ -116,7 +116,7 @@ class Publisher(Topic[_M_co]):
         else:
             state.check_initialized()
             if len(args) == 1 and isinstance(args[0], AnyMsg):
-                # As in rospy, do not check the bytes against the type.
+                # As in rospy, the bytes are not checked against the type.
                 state.publish(args[0])
             else:
                 state.publish(args_kwds_to_message(self.data_class, args, kwds))
@@ -143,7 +143,7 @@ class PublishedTopic(SharedTopic):
         self._deferral = session.lifecycle.deferral
         self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Message]] = set()
-        # Notified when subscribers connect and disconnect; a program may add and remove listeners
+        # Notified when subscribers connect and disconnect. A program may add and remove listeners
         self.subscriber_listeners: list[SubscribeListener] = []
         self._events: InOrder | None = None
         self._waiting: list[Callable[[], None]] = []
@@ -186,8 +186,7 @@ class PublishedTopic(SharedTopic):
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Set this before registering, because a subscriber may connect immediately, and publish() must also work
-            # before the master's response.
+            # Set this before registering: a subscriber may connect, and publish() must work, before the master responds.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
@@ -195,8 +194,7 @@ class PublishedTopic(SharedTopic):
     def leave(self, handle: Publisher[Message]) -> None:
         with self._session.lock:
             self._handles.discard(handle)
-            # After a fork, or after the process became another node, the session's table no longer contains this
-            # topic.
+            # After a fork, or after init_node has created another node, the session's table no longer contains this topic.
             if self._handles or self._session.published.get(self.resolved_name) is not self:
                 return
             del self._session.published[self.resolved_name]
@@ -263,7 +261,7 @@ class PublishedTopic(SharedTopic):
             self._log_unheard()
 
     def forget_subscribers(self) -> None:
-        """Stop publishing to the current subscribers, because in a fork they are connected to the parent process."""
+        """Stop publishing to the current subscribers: in a fork, these are connected to the parent process."""
         self.publication.links = ()
         self._registered = False
 
@@ -366,7 +364,7 @@ class PublishedTopic(SharedTopic):
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 
-        # Read the attribute in the worker, because it may be a property that runs the user's code.
+        # Read the attribute in the worker: it may be a property that runs the user's code.
         for listener in list(self.subscriber_listeners):
             if is_up:
                 self._events.start(
@@ -384,12 +382,15 @@ def _notify(listener: SubscribeListener, event: str, *args: object) -> None:
 
 
 def _is_listener(value: object) -> bool:
-    """Return whether an object has a SubscribeListener method. Programs need not derive from the class."""
+    """Return whether an object has any SubscribeListener method. Programs need not derive from the class."""
     return any(hasattr(value, name) for name in ("peer_subscribe", "peer_unsubscribe"))
 
 
 def _not_a_listener(value: object) -> str:
-    """Return the warning about an argument that is not a listener. Given that argument, rospy would reject every subscriber."""
+    """Return the warning for an argument that is not a listener.
+
+    With such an argument, rospy would reject every subscriber.
+    """
     text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
     if isinstance(value, int):
         return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"

@@ -23,9 +23,9 @@ from minirospy.core.graph.parameter_cache import ParameterCache
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
-    # Only for type checking: a program without a node does not import asyncio.
+    # For type checking only: a program without a node does not import asyncio.
     from minirospy.client.publisher import PublishedTopic
-    from minirospy.client.services import Service
+    from minirospy.client.service import Service
     from minirospy.client.subscriber import SubscribedTopic
     from minirospy.runtime.node.node import Node
     from minirospy.runtime.transport.loop import LoopThread
@@ -34,7 +34,9 @@ __all__ = ["Session", "current_session", "replace_session", "replace_session_in_
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
-"""Time limit for a call to the master. It is long because many nodes that start together on a small computer delay each other."""
+"""Time limit for a call to the master, in seconds. It is long because many nodes that start together delay each other on a
+small computer.
+"""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
@@ -58,7 +60,7 @@ class Session:
         self.clock: Clock = previous.clock if previous else WallClock()
         # Notified whenever the simulated time changes
         self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
-        # True if the time is available: after init_node, or once a program without a node has set it
+        # True once the time is available: after init_node, or once a program without a node has set the time
         self.has_time: bool = bool(previous and previous.has_time)
 
         self.published: dict[str, PublishedTopic] = {}
@@ -70,7 +72,7 @@ class Session:
         )
         """Functions to call with the name and the value of each parameter that the master reports as changed."""
         self.on_replaced: list[Callable[[], object]] = previous.on_replaced if previous else []
-        """Functions to call in the next init_node; each one removes something that this session installed in the process."""
+        """Functions for the next init_node to call; each one removes something that this session installed in the process."""
         # The arguments of init_node; None before it is called
         self.init_arguments: tuple[object, ...] | None = None
         self.node: Node | None = None  # set when init_node is done
@@ -114,7 +116,7 @@ class Session:
         from minirospy.runtime.transport.loop import LoopThread
 
         with self.lifecycle.deferral:
-            # Defer Ctrl-C, because asyncio's loops do not shut down properly if interrupted while starting.
+            # Defer Ctrl-C: asyncio's loops do not shut down properly if they are interrupted while starting.
             self._loop = LoopThread()
         self._opened = Node(
             self.name,
@@ -182,7 +184,7 @@ class Session:
         assert self._loop is not None
         loop = self._loop
         with self.lifecycle.deferral:
-            # Defer a shutdown: it would wait for the loop to close, which needs a lock that this thread holds here.
+            # Defer a shutdown: it would wait for the loop to close, which needs a lock that this thread holds.
             wait = self._or_interrupted(lambda: loop.start(coroutine))
         return lambda: self._or_interrupted(lambda: wait(None))
 
@@ -208,7 +210,7 @@ class Session:
         Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
         """
         if self._installs_signals:
-            # A fork keeps the default signal handling until it polls.
+            # Until it polls, a fork keeps the default signal handling.
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()
@@ -231,9 +233,9 @@ class Session:
         self.signals.flush_at_exit()
 
     def _warn_of_missing_spin(self) -> None:
-        """Log a warning if the program ends without an error right after it has subscribed, before any message has arrived."""
+        """Log a warning if the program ends without an error right after subscribing, before any message has arrived."""
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
-        # A program that polls or has waited ends intentionally, and so does an interactive session.
+        # A program that polls or has waited ends on purpose, and so does an interactive session.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if (
@@ -249,7 +251,7 @@ class Session:
             )
 
     def abandon_in_fork(self) -> None:
-        """In a fork, drop the references to the node, its sockets and its locks, because they belong to the parent."""
+        """In a fork, drop the references to the node, its sockets and its locks, which belong to the parent."""
         self.is_abandoned = True
         for published in self.published.values():
             published.forget_subscribers()
@@ -265,7 +267,7 @@ class Session:
         """Leave the graph. Waits for the master's responses, within Node.close()'s time limits."""
         if self._opened and self._loop:
             try:
-                # After a signal the watchdog prints the reason for waiting.
+                # After a signal, the watchdog prints what the process is waiting for.
                 self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
@@ -299,7 +301,7 @@ class Session:
                 flush=True,
             )
         if not self.lifecycle.is_shutdown_requested:
-            # Called after the hooks, when is_shutdown() has become true.
+            # Called after the hooks, once is_shutdown() has become true.
             self.lifecycle.interrupts.append(self.signals.interrupt_later)
         self.lifecycle.signal_shutdown(reason)
 
@@ -309,7 +311,7 @@ class Session:
             listener(key, value)
 
     def _forget_parameters(self) -> None:
-        """Discard all cached parameters, because the master has restarted and the node is no longer subscribed to them."""
+        """Discard all cached parameters: the master has restarted, and no longer knows the node's subscriptions to them."""
         if self.node:
             keys = list(self.node.parameters)
             self.node.parameters.clear()

@@ -10,12 +10,12 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-# seconds for the main thread to start the hooks, and again for it to detect that is_shutdown() is true
+# seconds for the main thread to start the hooks, and then again for it to see that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
-# Seconds for the main thread to exit by itself after a request from another process. No user is waiting at the
-# terminal, so the times are longer than after a signal. A main thread that polls is_shutdown() may be in a long
-# iteration of its loop.
+# Seconds for the main thread to exit by itself after a request from another process.
+# This is longer than after a signal, because no user is waiting at the terminal.
+# A main thread that polls is_shutdown() may be in a long iteration of its loop.
 _REQUEST_GRACE_SECONDS = 2.0
 _REQUEST_GRACE_OF_POLLS_SECONDS = 5.0
 
@@ -24,8 +24,8 @@ class Phase(enum.IntEnum):
     """The phase that the shutdown has reached."""
 
     RUNNING = 0
-    HOOKS = 1  # is_shutdown() still returns False
-    DOWN = 2  # is_shutdown() returns True, blocking calls are interrupted
+    HOOKS = 1  # the hooks run; is_shutdown() still returns False
+    DOWN = 2  # is_shutdown() returns True, and blocking calls are interrupted
     LEAVING = 3  # the node waits for the master to unregister it
     LEFT = 4  # the master has unregistered the node
 
@@ -42,12 +42,12 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """How far a thread in the program has been notified of the shutdown."""
+    """States whether, and how, a thread of the program has been notified of the shutdown."""
 
     NONE = 0  # the thread has never called is_shutdown()
     POLLS = 1
     CUT_SHORT = 2  # the thread polls, but has not polled since the shutdown interrupted its sleep
-    NOTIFIED = 3  # notified by is_shutdown() or an exception: anything the thread does now is clean-up
+    NOTIFIED = 3  # notified by is_shutdown() or an exception; whatever the thread does now is clean-up
 
 
 class ThreadState:
@@ -74,7 +74,7 @@ class ShutdownMachine:
         self.signals = 0
         self.is_requested = False  # True if another process requested the shutdown in progress
         self._signalled = 0.0
-        # The earliest time at which the main thread could see that is_shutdown() is true
+        # The earliest time at which the main thread can see that is_shutdown() is true
         self._free: float | None = None
         self._done: set[Action] = set()
 
@@ -89,7 +89,7 @@ class ShutdownMachine:
 
         is_leaving = self.phase is Phase.LEAVING
         if is_leaving and self.runs_in_main:
-            # The main thread is running the shutdown and not the program's code, so do not raise an exception in it.
+            # The main thread is running the shutdown, not the program's code, so do not raise an exception in it.
             return [Action.STOP_LEAVING]
         self._done.add(Action.INTERRUPT)
         return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
@@ -122,15 +122,15 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread will exit without an exception, because it has exited or has been notified."""
-        # Trust a main thread that polls to exit by itself. Do not rely on this after a request from another process,
-        # because no user can press Ctrl-C again.
+        """Return whether the main thread needs no exception to exit, because it has exited or has been notified."""
+        # Trust a main thread that polls to exit by itself.
+        # After a request from another process, do not: no user is there to press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 
     @property
     def _grace(self) -> float:
-        """Return for how many seconds the main thread may run before it is interrupted."""
+        """Return how many seconds the main thread may run before it is interrupted."""
         if self.main.awareness > Awareness.NONE:
             return _REQUEST_GRACE_OF_POLLS_SECONDS
         return _GRACE_SECONDS if self.signals else _REQUEST_GRACE_SECONDS

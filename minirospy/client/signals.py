@@ -27,12 +27,12 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _EXIT_STATUS = 130
 
 _DEFER_SECONDS = 0.05
-"""Seconds to wait for the main thread to reach its next rospy call, at which the hooks cannot interrupt a half-finished
-operation.
+"""Seconds to wait for the main thread to reach its next rospy call; running the hooks there does not interrupt a
+half-finished operation.
 """
 
 _TICK_SECONDS = 0.01
-# Maximum seconds counted for one tick, so that time during which the process or the machine was suspended is excluded
+# Maximum seconds counted per tick. This excludes time for which the process or the machine was suspended
 _MAX_STEP = 0.05
 
 
@@ -55,8 +55,9 @@ class SignalWatchdog:
         # Dict from signal number to the previous handler
         self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
         self._number = int(signal.SIGINT)
-        self._interrupt: Action | None = None  # action for which the main thread must raise an exception
-        self._is_nudge = False  # True if a nudge has been sent but has not reached the handler yet
+        # the action for which the main thread must raise an exception
+        self._interrupt: Action | None = None
+        self._is_nudge = False  # True if a nudge was sent that has not reached the handler yet
         self._nudging = threading.Lock()
         self._sending: socket.socket | None = None
         self._arrived = self._handled = self._nudges = 0
@@ -67,14 +68,14 @@ class SignalWatchdog:
         return self._sending is not None
 
     def install(self) -> None:
-        """Let the signals shut the node down. No effect outside of the main thread, because only that can install handlers."""
+        """Let the signals shut the node down. No effect outside of the main thread, the only one that can install handlers."""
         if threading.current_thread() is not threading.main_thread():
             return
 
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # If SIGHUP is ignored because of nohup, leave it ignored.
+            # If SIGHUP is ignored because of nohup, let it stay ignored.
             if handler != self.on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
                 signal.signal(number, self.on_signal)
@@ -85,7 +86,7 @@ class SignalWatchdog:
             _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
-            # Restore the previous file descriptor, which belongs to an event loop that was installed first.
+            # Restore the previous file descriptor: it belongs to an event loop that installed it first.
             signal.set_wakeup_fd(previous)
 
     def release(self) -> None:
@@ -102,7 +103,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while the node still handles Ctrl-C. After this, the system handles a third Ctrl-C."""
+        """Flush the program's output while the node still handles Ctrl-C. From then on, the system handles a third Ctrl-C."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:
@@ -128,8 +129,7 @@ class SignalWatchdog:
         self._deferral.pending = True
         self._handled += 1
         if self._sending is not None:
-            # Wake the watchdog even if an event loop has replaced the file descriptor. Send 0, which is not a signal
-            # number.
+            # Wake the watchdog, even if an event loop has replaced the file descriptor. Send 0, which is not a signal number.
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
 
@@ -148,14 +148,14 @@ class SignalWatchdog:
         action, self._interrupt = self._interrupt, None
         if action is Action.KEYBOARD_INTERRUPT:
             raise KeyboardInterrupt
-        # If the main thread has been notified in the meantime, the exception would interrupt the program's clean-up.
+        # If the main thread has been notified in the meantime, an exception would interrupt the program's clean-up.
         if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
             raise self._lifecycle.interrupted("the program was signalled to end")
 
     # --- watchdog thread
 
     def _watch(self, receiving: socket.socket) -> None:
-        """Pass signals and timeouts to the state machine and perform the actions it returns, until :meth:`release`."""
+        """Until :meth:`release`, pass signals and timeouts to the state machine and perform the actions that it returns."""
         machine, deferral = self._machine, self._deferral
         now = deferred_at = 0.0
         with receiving, contextlib.suppress(ConnectionError):
@@ -216,8 +216,8 @@ class SignalWatchdog:
         self._number = int(signal.SIGINT)
         handler = signal.getsignal(self._number)
         if hasattr(sys, "ps1") or not callable(handler):
-            # Do not interrupt an interactive session, because the user would lose its variables. Do not send a signal
-            # that is ignored, or that would terminate the process.
+            # Do not interrupt an interactive session: the user would lose its variables.
+            # Do not send a signal that is ignored or that would terminate the process.
             self._machine.drop_request()
             return
 
@@ -226,15 +226,15 @@ class SignalWatchdog:
             self._interrupt = Action.INTERRUPT
             self._nudge()
         else:
-            # The program, or a library such as IPython, has replaced the handler, so let that handler decide what to
-            # do.
+            # The program, or a library such as IPython, has replaced the handler; let that one decide what to do.
             _send_to_main(self._number)
 
     def _nudge(self) -> None:
         """Run the handler in the main thread, interrupting its system call, if any."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
-                # Send only one nudge at a time: the handler counts signals, but the system merges undelivered ones.
+                # Do not send a second nudge before the first has arrived.
+                # The handler counts signals, but the system merges undelivered ones.
                 return
             self._nudges += 1
             self._is_nudge = True

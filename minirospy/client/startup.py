@@ -103,7 +103,10 @@ def _check_name(name: str) -> None:
 
 
 def _is_repeated(session: Session, arguments: tuple[object, ...]) -> bool:
-    """Return whether init_node was called before with the same arguments. Raise ROSException if they were different."""
+    """Return whether init_node was called before with the same arguments.
+
+    Raise ROSException if the arguments were different.
+    """
     if session.init_arguments is None:
         return False
     if session.init_arguments != arguments:
@@ -137,8 +140,7 @@ def _install_process_hooks() -> None:
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []
 
-        # Python drops a signal that reaches the child before it is set up, so that Pool.terminate() would wait
-        # forever.
+        # Python drops a signal that reaches the child before the child is set up; Pool.terminate() would then wait forever.
         def block_signals() -> None:
             mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
 
@@ -159,8 +161,7 @@ def _leave_with_child_process() -> None:
     """
     process, util = (sys.modules.get(f"multiprocessing.{name}") for name in ("process", "util"))
     if process and util and process.parent_process() is not None:
-        # Use a high priority so that, as with atexit, the node leaves the graph before the process joins its own
-        # children.
+        # Use a high priority: as with atexit, the node must leave the graph before the process joins its own children.
         util.Finalize(None, lambda: current_session().shut_down_at_exit(), exitpriority=100)
 
 

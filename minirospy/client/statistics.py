@@ -121,7 +121,7 @@ class TopicStatisticsCounter:
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)
             window.last_sequence = sequence
-            # A zero stamp means that the publisher has not set the stamp.
+            # A stamp of zero means that the publisher has not set it.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
 

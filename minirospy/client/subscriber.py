@@ -1,4 +1,4 @@
-"""rospy's Subscriber. It deserializes messages in the worker that has read them.
+"""rospy's Subscriber. It deserializes a message in the worker that received it.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -32,10 +32,10 @@ _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
-# a program that ends sooner after creating its last Subscriber has not waited for messages
+# a program that ends within this time after creating its last Subscriber has not waited for messages
 _NEW_SECONDS = 2.0
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
-"""Topics that are not counted: /statistics itself, and /clock, which provides the times."""
+"""Topics that are not counted: /statistics itself, and /clock, from which the times come."""
 
 
 class Subscriber(Topic[_M_co]):
@@ -83,8 +83,7 @@ class Subscriber(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, queue_size, buff_size, tcp_nodelay)
-            # Read the links after joining: a message on a link that opens in the meantime may be delivered twice, but
-            # is not lost.
+            # Read the links after joining: a message on a link that opens meanwhile may be delivered twice, but is not lost.
             links = state.links
         self.impl = state
 
@@ -287,7 +286,7 @@ class SubscribedTopic(SharedTopic):
             register_with_master("subscription", self.resolved_name, wait)
 
     def _newest(self) -> int:
-        """Return the number of messages to keep, which the Subscriber with the largest queue_size determines."""
+        """Return the number of messages to keep: that of the Subscriber with the largest queue_size."""
         sizes = [handle._newest for handle in self._handles]
         return 0 if 0 in sizes else max(sizes, default=0)
 
@@ -332,7 +331,7 @@ class SubscribedTopic(SharedTopic):
             newest = link.latched
             if newest is not None and newest is not frame:
                 # A newer message has arrived in the meantime, and may have been delivered before this older one.
-                # Deliver it again, so that it comes last.
+                # Deliver the newer one again, so that it comes last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:
@@ -373,12 +372,10 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
             callback.function(message, callback.args)
     except BaseException as error:
         add_numpy_note(error)
-        # As in rospy, sys.exit() has no effect in a link's thread, but exits the program inside the Subscriber()
-        # call.
+        # As in rospy, sys.exit() has no effect in a link's thread, but inside the Subscriber() call it exits the program.
         if is_callers_thread and not isinstance(error, Exception):
             raise
-        # Ignore errors in the callback during a shutdown, because a shutdown hook may have released resources that
-        # the callback uses.
+        # Ignore errors in the callback during a shutdown: a hook may have released resources that the callback uses.
         session = current_session()
         if not session.lifecycle.is_shutdown_requested:
             session.callback_errors.log(callback.function, error)

@@ -1,4 +1,4 @@
-"""TCPROS connections that programs make themselves: the classes of rospy.impl.tcpros_base and tcpros_service.
+"""TCPROS connections for programs that make their own: the classes of rospy.impl.tcpros_base and tcpros_service.
 
 minirospy's own connections are in ``runtime/`` and do not use these classes. Source: http://wiki.ros.org/ROS/TCPROS, and
 the behaviour of rospy.impl.
@@ -159,11 +159,11 @@ class Transport:
         self.id = next(_numbers)
         self.done = False  # set by close()
         self.cleanup_cb: Callable[[Any], object] | None = None
-        # The peer: its URI, and the addresses at both ends of the socket
+        # The peer: its URI, and the addresses of both ends of the socket
         self.endpoint_id = ""
         self.local_endpoint: Any = (0, 0)
         self.remote_endpoint: Any = (0, 0)
-        # The total number of bytes and messages, received and sent
+        # The total number of bytes and messages that were received and sent
         self.stat_bytes = self.stat_num_msg = 0
 
     def fileno(self) -> int | None:
@@ -190,7 +190,7 @@ class Transport:
 
 
 class DeadTransport(Transport):
-    """The statistics of a connection that was closed."""
+    """The statistics of a closed connection."""
 
     def __init__(self, transport: Transport) -> None:
         super().__init__(transport.direction, transport.name)
@@ -246,7 +246,7 @@ class TCPROSTransport(Transport):
         super().__init__(protocol.direction, name)
         self.protocol = protocol
         self.buff_size = protocol.buff_size
-        # The peer's connection header (None until it has been received), and the fields copied from it
+        # The peer's connection header, None until it has been received, and the fields copied from it
         self.header: Mapping[str, str] | None = header
         self.type: str | None = None
         self.md5sum: str | None = None

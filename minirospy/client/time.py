@@ -45,7 +45,7 @@ class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSI
 class Duration(times.Duration):
     """A time span with the fields ``secs`` and ``nsecs``. It may be negative."""
 
-    # Use rospy's module name, so that programs that use real rospy can load pickles from this one, and vice versa.
+    # Use rospy's module name, so that programs that use real rospy can load pickles made here, and vice versa.
     __module__ = "rospy.rostime"
 
     __slots__: list[str] = []
@@ -71,7 +71,7 @@ class Time(times.Time):
 
     @classmethod
     def from_seconds(cls, float_secs: float) -> Time:
-        """Return the time at ``float_secs`` seconds. This is an older name for ``from_sec``."""
+        """Return the time at ``float_secs`` seconds. An older name for ``from_sec``."""
         return cls.from_sec(float_secs)
 
 
@@ -141,7 +141,7 @@ class Rate:
             return
         period = self.sleep_dur.to_nsec()
         started = self.last_time.to_nsec() + period
-        # If the loop is far behind, for example after a pause, skip the missed periods.
+        # If the loop is far behind, for example after a suspension, skip the missed periods.
         now = current_session().clock.now()
         self.last_time = _time(now if now - started > 2 * period else started)
 
@@ -247,12 +247,12 @@ class Timer(threading.Thread):
                 try:
                     self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
                 except SystemExit as error:
-                    # threading reports all other exceptions in a thread, but rospy's timer stops without a message.
+                    # threading reports every exception except this one, and rospy's timer stops silently, so log it.
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:
-                    # If the callback is not a function, it cannot be called again, so stop. During a shutdown, errors
-                    # in the callback are irrelevant.
+                    # A callback that is not a function cannot be called again, so stop.
+                    # During a shutdown, ignore errors in the callback.
                     if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
                         raise
                     session.callback_errors.log(self._callback, error)
@@ -273,7 +273,7 @@ def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
         return
     session = current_session()
     if session.is_fork_without_node and isinstance(session.clock, SimulatedClock):
-        # Only the parent process follows /clock, so the sleep would never return.
+        # Only the parent process follows /clock, so a sleep here would never return.
         raise ROSInitException(session.why_fork_has_no_effect("simulated time"))
     lifecycle = session.lifecycle
     lifecycle.deferral.poll()

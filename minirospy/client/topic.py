@@ -94,7 +94,7 @@ class Topic(Generic[_M_co]):
 
 
 class SharedTopic:
-    """The object shared by one topic's handles in this process: rospy's ``impl``, which user code reads."""
+    """The object that a topic's handles in this process share: rospy's ``impl``, which user code reads."""
 
     _handles: Collection[Topic[Any]]
 
@@ -145,7 +145,7 @@ class SharedTopic:
 
 
 def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> None:
-    """Wait for a registration to finish. If the master refuses it, only log that, as rospy does."""
+    """Wait for a registration to finish. If the master refuses it, only log the refusal, as rospy does."""
     try:
         wait()
     except MasterUnreachableError as error:

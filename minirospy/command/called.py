@@ -1,4 +1,4 @@
-"""Run a command's verb for a program that calls a ROS function such as `_rostopic_cmd_list(argv)`, and raise its errors."""
+"""Run a command's verb for a program that calls a ROS function such as `_rostopic_cmd_list(argv)`; raise its errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from minirospy.command.verbs import Family
 
 __all__ = ["Raised", "call_verb"]
 
-_MAIN_ADDS = "ERROR: "  # the prefix that the main functions of ROS print before an exception's text
+_MAIN_ADDS = "ERROR: "  # the prefix that ROS's main functions print before an exception's text
 _NO_NETWORK = (
     "Network communication failed"  # the message that the main functions of ROS print for a socket error
 )

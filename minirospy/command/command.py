@@ -68,7 +68,7 @@ _IN_ARCHIVE = (
 )
 
 INTERRUPTED = 130
-"""The shell's exit status for a program terminated by SIGINT, so that `catkin_make && roslaunch ...` stops."""
+"""The exit status that shells use for a program terminated by SIGINT. It stops `catkin_make && roslaunch ...`."""
 
 
 class RosText(NamedTuple):
@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error whose ROS message depends on the command as well as on the error. ``ros`` is that message; it is printed first."""
+    """An error whose ROS message depends on the command, too. ``ros`` is that message; it is printed first."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -90,15 +90,15 @@ class WordedError(MinirospyError):
 
 
 Wording = Mapping[str, RosText]
-"""Dict from the kind of a NotFoundError, ``no answer from`` + the kind of a NodeUnreachableError, or ``master``, to ROS's
-message.
+"""ROS's messages, keyed by the kind of a NotFoundError, ``no answer from`` + the kind of a NodeUnreachableError, or
+``master``.
 """
 
 NO_MASTER = RosText(f"ERROR: {MasterUnreachableError.ros_text}")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return ROS's message for an error. The text is empty if ROS has no message."""
+    """Return ROS's message for an error, with an empty text if ROS has none."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):
@@ -153,11 +153,11 @@ def run(
         wrong = error.object[error.start : error.end]
         return complain(name, UsageError(f"the argument {wrong!r} is not UTF-8 text"), 2)
     except BrokenPipeError:
-        # The program that reads stdout (`| head`) has exited.
+        # The program that reads stdout, such as `| head`, has exited.
         _flush()
         return 0
     except OSError as error:
-        # The cause may be a full disk or missing permissions: print the file's name and the system's message.
+        # The cause may be a full disk or missing permissions, so print the file's name and the system's message.
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
@@ -220,7 +220,7 @@ def _open_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if type(stream) is io.TextIOWrapper and stream.isatty():
-            # Do not execute control sequences in strings from robots when they are shown on a terminal.
+            # Do not let the terminal execute control sequences in strings from robots.
             setattr(sys, name, SafeTerminal.around(stream))
 
 
@@ -230,7 +230,7 @@ def warn(what: str, name: str = "") -> None:
 
     why = why_illegal(name) if name else ""
     sys.stdout.flush()
-    # Use a single write, because other threads may print at the same time.
+    # Use a single write, because other threads may be printing.
     print(escaped(f"WARNING: {what}{why and f'; {why}'}\n", "\n"), end="", file=sys.stderr)
 
 
@@ -279,7 +279,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
         host=special.get("__hostname") or special.get("__ip", ""),
         namespace=special.get("__ns", ""),
     )
-    # Raise KeyboardInterrupt on SIGTERM, as on Ctrl-C.
+    # Raise KeyboardInterrupt on SIGTERM, too, as for Ctrl-C.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with ToolNode(environment, tool, name=special.get("__name", ""), ros_time=ros_time) as node:
@@ -313,7 +313,7 @@ def _has_terminal() -> bool:
 
 
 def _flush() -> None:
-    """Flush stdout. If that fails, discard the output, so that the interpreter's own flush at exit does not fail as well."""
+    """Flush stdout. If that fails, discard the output, so that the interpreter's own flush at exit does not fail, too."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -55,7 +55,7 @@ def ask_for(
         answer = ask(_question(field)).strip()
         while answer:
             try:
-                # Try the value on another message first, so that ``message`` never contains an invalid value.
+                # Try the value on another message first, so that ``message`` never holds an invalid value.
                 values = _nested(field.path, _value(field, answer))
                 check(fill(type(message)(), [values]))
             except (MessageException, ValueTextError) as error:

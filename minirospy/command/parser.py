@@ -186,7 +186,7 @@ class Parser(argparse.ArgumentParser):
         return f"Usage: {self.ros_usage}"
 
     def _check_options(self, args: Sequence[str] | None) -> None:
-        """Report an unknown long option before a missing argument, because the option may have consumed the argument."""
+        """Report an unknown long option before a missing argument: the option may have consumed the argument."""
         if any(action.nargs == argparse.REMAINDER for action in self._actions):
             return  # the remaining words are another program's options
         for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
@@ -277,7 +277,10 @@ class AssignmentParser(Parser):
 
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the other arguments, and a dict of the assigned values. Drops special names such as __ns, which nodes read."""
+    """Return the other arguments and a dict of the assigned values.
+
+    Drop special names such as __ns, which nodes read themselves.
+    """
     return [word for word in words if ":=" not in word], names.parse_launch_arguments(words)
 
 

@@ -67,7 +67,7 @@ class Verb(NamedTuple):
 
 
 def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB") -> Verb:
-    """Return a verb whose module is imported when the verb is used, so that the family's other verbs start without it."""
+    """Return a verb whose module is imported when the verb is used. The family's other verbs start without that import."""
 
     def verb() -> Verb:
         found: Verb = getattr(import_module(module), attribute)

@@ -1,4 +1,4 @@
-"""Estimates a peer's clock offset from its replies, and measures message delays. Pure. Times are in nanoseconds."""
+"""Estimates a peer's clock offset from its replies, and measures the delays of messages. Pure. Times are in nanoseconds."""
 
 from __future__ import annotations
 

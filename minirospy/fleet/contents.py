@@ -1,4 +1,4 @@
-"""The contents of the fleet as announced by liveliness tokens: robots, their gateways, topics and services. Pure.
+"""The fleet's contents, announced by liveliness tokens: robots, their gateways, topics and services. Pure.
 
 Tokens arrive and disappear one by one and in any order, so a robot's other tokens may arrive before its claim. Tokens
 that exceed the limits, or do not match the formats in :mod:`minirospy.fleet.keys`, are ignored and counted.
@@ -21,13 +21,13 @@ __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused"
 
 MAX_GATEWAYS = 5_000
 MAX_NAMES = 2_000  # maximum number of topics, and separately of services, that a gateway may announce
-# maximum number of topics and services, in total over all gateways; they take some 100 MiB
+# maximum number of topics and services of all gateways together; they take some 100 MiB
 MAX_TOKENS = 200_000
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that is visible to other gateways. ``duplicates`` are other claims to its name; they are ignored."""
+    """A robot that is shown to other gateways. ``duplicates`` are further claims to its name; they are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]
@@ -67,7 +67,7 @@ class FleetContents:
         """
         self.holders = Holders(clock)
         self.waiting: tuple[Refused, ...] = ()
-        """The gateways that :meth:`robots` left out because another gateway holds their name."""
+        """The gateways that :meth:`robots` omitted because another gateway holds their name."""
         self.refused = 0  # number of ignored tokens
         self.refusal = ""  # why the most recent token was ignored
         self._count = 0
@@ -90,7 +90,7 @@ class FleetContents:
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
             if gateway.claim not in (None, token):
-                # A gateway declares only one claim while it runs, so a second, different claim is from another peer.
+                # A gateway declares only one claim while it runs, so a different second claim comes from another peer.
                 return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
             changed = gateway.claim is None
             if changed:
@@ -99,7 +99,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway whose only name was rejected, because nothing would remove the gateway.
+        # Do not store a gateway whose only name was rejected: nothing would remove it.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed
@@ -114,8 +114,7 @@ class FleetContents:
         if gateway is None:
             return False
 
-        # If a topic's flags change, the new token arrives before the old one is removed, so remove only an equal
-        # token.
+        # If a topic's flags change, the new token arrives before the old one is removed. Remove a token only if it is equal.
         if isinstance(token, Claim):
             if gateway.claim != token:
                 return False

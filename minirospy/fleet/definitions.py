@@ -25,9 +25,9 @@ __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
 ANSWER_SECONDS = 10.0
-# maximum characters in all cached definitions together; those of ROS's own packages have 3 million
+# maximum total number of characters of all cached definitions; those of ROS's own packages have 3 million
 MAX_CHARACTERS = 64 << 20
-# maximum number of concurrent queries, in total and to one gateway; an unanswered query times out after ANSWER_SECONDS
+# maximum number of concurrent queries, in total and per gateway; a query without a reply times out after ANSWER_SECONDS
 MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
@@ -41,7 +41,7 @@ def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
 
 
 class Definitions:
-    """Caches the types that this gateway knows. Generates no message classes, because messages stay serialized."""
+    """Caches the types that this gateway knows. It generates no message classes, because messages stay serialized."""
 
     def __init__(self, node: Node, network: FleetNetwork) -> None:
         self.texts = TypeTexts(node)
@@ -91,7 +91,7 @@ class Definitions:
         """
         text = await self.text(name, md5sum)
         if not text and gateway and md5sum != _NO_FIELDS:
-            # Query each gateway separately, so that a gateway that does not respond delays only its own topics.
+            # Query each gateway separately, so that one that does not respond delays only its own topics.
             key = name, md5sum, gateway
             task = self._finding.get(key)
             if task is None:
@@ -121,8 +121,7 @@ class Definitions:
         if share is None:
             share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
         try:
-            # Acquire the gateway's own share first, so that a gateway that does not respond cannot occupy all query
-            # slots.
+            # Acquire the gateway's own share first, so that one that does not respond cannot occupy all query slots.
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]

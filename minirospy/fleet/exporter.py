@@ -42,7 +42,9 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 MAX_WANTED, MAX_READERS = 10_000, 1_000
-"""Maximum number of topics that readers may request, and of readers per topic. Both are limited because peers choose them."""
+"""Maximum number of topics that readers may request, and of readers per topic. Limits what a peer can make this process
+allocate.
+"""
 
 
 class Exporter:
@@ -60,7 +62,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """Create the exporter. ``hidden`` contains the names of imported robots, whose topics are not announced again."""
+        """Create the exporter. ``hidden`` contains the names of the imported robots; their topics are not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -133,7 +135,7 @@ class Exporter:
     def _announce(self) -> None:
         keys = {topic_key(each) for each in self.graph.topics.values()}
         keys |= {service_key(each) for each in self.graph.services.values()}
-        # Declare new tokens before removing old ones, so that a topic whose flags have changed always has a token.
+        # Declare new tokens before removing old ones, so that a topic always has a token even while its flags change.
         for key in keys - self._tokens.keys():
             self._tokens[key] = self._network.declare_token(key)
         for key in self._tokens.keys() - keys:
@@ -191,7 +193,7 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Use a copy: closing awaits the master, and concurrent calls of this method may change both tables.
+        # Iterate over a copy: closing awaits the master, and concurrent calls of this method may change both tables.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
@@ -224,7 +226,7 @@ class Exporter:
     # --- messages, service calls and queries from other gateways
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for messages that arrive on a topic, or None if the topic has no local subscribers."""
+        """Return the publisher for messages received for a topic, or None if the topic has no local subscribers."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:

@@ -17,10 +17,10 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Flow(Generic[_T]):
-    """The queued messages of one flow: at most ``most`` messages and ``most_bytes`` bytes. A single message may be larger."""
+    """The queue of one flow: at most ``max_waiting`` messages and ``max_bytes`` bytes. A single message may be larger."""
 
-    most: int
-    most_bytes: int
+    max_waiting: int
+    max_bytes: int
     passed: int = 0
     passed_bytes: int = 0
     dropped: int = 0
@@ -42,8 +42,8 @@ class FlowQueue(Generic[_T]):
         flow.waiting.append((size, item))
         flow.waiting_bytes += size
         dropped = 0
-        while len(flow.waiting) > flow.most or (
-            flow.waiting_bytes > flow.most_bytes and len(flow.waiting) > 1
+        while len(flow.waiting) > flow.max_waiting or (
+            flow.waiting_bytes > flow.max_bytes and len(flow.waiting) > 1
         ):
             flow.waiting_bytes -= flow.waiting.popleft()[0]
             dropped += 1

@@ -33,7 +33,7 @@ class _Text(NamedTuple):
 
 
 class _Array(NamedTuple):
-    """An array; ``steps`` describe one element. ``length`` is None for an array of variable length."""
+    """An array; ``steps`` describe one element. ``length`` is None if the array's length is variable."""
 
     length: int | None
     steps: tuple[_Step, ...]
@@ -133,7 +133,7 @@ def _has_frame(step: _Step) -> bool:
 
 
 def _trimmed(steps: tuple[_Step, ...]) -> tuple[_Step, ...]:
-    """Return the steps up to the last frame id, because the rest of a message is copied unchanged."""
+    """Return the steps up to the last frame id; the rest of a message is copied unchanged."""
     last = max((number for number, step in enumerate(steps) if _has_frame(step)), default=-1)
     return steps[: last + 1]
 
@@ -168,7 +168,7 @@ def _run(
                 case ():
                     pass
                 case inner:
-                    # Each element is at least four bytes long, because it starts with a four-byte length.
+                    # Each element has at least four bytes, because it starts with a four-byte length.
                     if count * 4 > len(data) - at or count > _MAX_ELEMENTS:
                         raise DeserializationError(f"an array of {count} elements is longer than the message")
                     for _ in range(count):

@@ -271,7 +271,7 @@ class Gateway:
         return text.encode()
 
     def _spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
-        """Run a coroutine as a task until :meth:`close`; log its exception."""
+        """Run a coroutine as a task until :meth:`close`; log its exceptions."""
 
         async def guarded() -> None:
             try:

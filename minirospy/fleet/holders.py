@@ -15,7 +15,7 @@ from minirospy.fleet.keys import Claim, is_machine
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
 HOLD_SECONDS = 10.0  # Zenoh's default lease time, after which it closes a silent link
-# maximum number of names to hold for robots that have left; limited because peers choose the names
+# maximum number of names to hold for robots that have left; limited because the peers choose the names
 MAX_HOLDS = 5_000
 
 
@@ -23,7 +23,7 @@ MAX_HOLDS = 5_000
 class _Hold:
     claim: Claim
     left: float | None = None
-    """When the gateway left, in seconds of the clock; None while it is present."""
+    """The time at which the gateway left, in seconds of the clock; None while it is present."""
 
 
 class Holders:
@@ -38,14 +38,14 @@ class Holders:
         self._given_up: set[Claim] = set()
 
     def give_up(self, claim: Claim) -> None:
-        """Release a claim whose gateway does not respond, so that another gateway on its machine may take the name.
+        """Release a claim whose gateway does not respond. Another gateway on its machine may then take the name.
 
         The gateway's token may still exist.
         """
         self._given_up.add(claim)
 
     def holder(self, name: str) -> Claim | None:
-        """Return the claim that holds a name, even if its gateway has just left."""
+        """Return the claim that holds a name, even if its gateway has just left the fleet."""
         hold = self._holds.get(name)
         return hold.claim if hold else None
 
@@ -93,7 +93,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return the seconds until the first of these names becomes free, or None if no holder has left."""
+        """Return the seconds until the first of these names is released, or None if no holder has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names

@@ -51,7 +51,7 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MAX_MESSAGE = 256 << 20
 _MAX_OFFERS = 10
-# maximum number of concurrent registrations, because each uses its own connection to the master
+# maximum number of concurrent registrations; each uses its own connection to the master
 MAX_REGISTERING = 50
 
 
@@ -75,7 +75,7 @@ class Shared:
 
 
 class ImportedTopic:
-    """One topic of one robot. Runs on the loop, except that messages are handled in other threads."""
+    """One topic of one robot. Runs on the loop, except that other threads handle its messages."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
         """Create the topic. ``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
@@ -179,7 +179,7 @@ class ImportedTopic:
                 self._advertise(interface)
             elif token.is_subscribed:
                 self._subscribe()
-            # Limit the concurrent calls: a thousand robots need 8,000, and the master handles them one by one.
+            # Limit the concurrent calls: a thousand robots need 8,000, which the master handles one by one.
             handle = self._publisher or self._subscription
             if handle is not None:
                 await handle.wait_until_registered()
@@ -205,7 +205,7 @@ class ImportedTopic:
     # --- from the robot
 
     def _links_changed(self) -> None:
-        """Request the topic from the robot while local nodes other than this gateway subscribe to it."""
+        """Request the topic from the robot while local nodes (other than this gateway) subscribe to it."""
         publisher = self._publisher
         if publisher is None or self._is_closed:
             return
@@ -223,7 +223,7 @@ class ImportedTopic:
         shared, token = self._shared, self.token
         ends = token.robot, token.gateway
         network = shared.network
-        # Declare the token last, because the robot starts sending as soon as the token appears.
+        # Declare the token last: the robot starts sending as soon as it appears.
         self._wanted = [
             network.subscribe(out_key(*ends, token.md5sum, token.topic), self._arrived),
             network.subscribe(replay_key(*ends, token.md5sum, token.topic, shared.gateway), self._arrived),
@@ -239,8 +239,8 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # Forget the local copy, which may become outdated: the robot resends its latched message to the next
-            # subscriber.
+            # Forget the local copy, which may become outdated.
+            # The robot resends its latched message to the next subscriber.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
@@ -264,8 +264,8 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart when the robot reopens the topic, so a jump back or a huge jump does not mean lost
-            # messages.
+            # The numbers restart when the robot reopens the topic.
+            # A step back or a huge step forward therefore does not mean lost messages.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()
@@ -300,7 +300,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # Clear all attributes before the await: during it, the topic may be subscribed to again, with a new outflow.
+        # Clear all attributes before the await: while it runs, the topic may be subscribed to again, with a new outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None
@@ -312,7 +312,7 @@ class ImportedTopic:
             await subscription.close()
 
     def _offer(self) -> None:
-        """Offer the topic to the robot while local nodes other than this gateway publish it."""
+        """Offer the topic to the robot while local nodes (other than this gateway) publish it."""
         subscription = self._subscription
         if subscription is None:
             return

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["MACHINES", "ImportedRobot", "Importer"]
 
 MACHINES = "/fleet/machines"
-"""The parameter that maps robots to the machines the operator has chosen; set by `minirospy fleet takeover`."""
+"""The parameter that holds the operator's choice of machines, keyed by robot; set by `minirospy fleet takeover`."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
@@ -46,17 +46,16 @@ _MAX_PING = 64  # maximum size in bytes of a reply to a ping; a valid reply has 
 _CALL_SECONDS = 3600.0
 # seconds for a name's holder to reply when another gateway on the same machine claims the name
 CHALLENGE_SECONDS = 2.0
-# return memory to the system after this many names have been removed (some 4 MB), and after this many seconds,
-# because links close late
+# Return memory to the system after removing this many names (some 4 MB), and this many seconds later, because links close late
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names that one robot may use, out of _MAX_IMPORTED
-# maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
+# maximum number of a robot's names to close concurrently; each needs a task and a call to the master
 MAX_CONCURRENT_NAMES = 100
 MAX_LISTED = 5  # maximum number of robots named in one log line
 LINES = 5  # maximum number of log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
 _MAX_CONCURRENT_ROBOTS = 20  # maximum number of robots to remove concurrently
-# maximum number of names to register, because the master accepts at most 10,000 per node
+# maximum number of names to register; the master accepts at most 10,000 per node
 _MAX_IMPORTED = 9_000
 
 
@@ -125,8 +124,8 @@ class Importer:
         self._comings = RateLimitedLogger(_log, LINES)
         self._rivals = RateLimitedLogger(_log, LINES)
         self._waiting: tuple[Refused, ...] = ()
-        """The gateways that were rejected at the last refresh; stored so that each is logged once."""
-        self._removed = 0  # names removed since memory was last returned to the system
+        """The gateways rejected at the last refresh; kept so that each is logged only once."""
+        self._removed = 0  # number of names removed since memory was last returned to the system
         self._trimming: asyncio.TimerHandle | None = None
         self._machines: dict[str, str] = {}
         """The machines on which robots were last shown, keyed by robot name."""
@@ -231,7 +230,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # This pause leaves time for other tasks while a thousand robots join.
+            # This pause lets other tasks run while a thousand robots join.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -250,7 +249,7 @@ class Importer:
                 left.append(name)
         self._report_names(left, "left")
         for first in range(0, len(gone), _MAX_CONCURRENT_ROBOTS):
-            # With return_exceptions, a failure does not affect the other robots.
+            # return_exceptions keeps one robot's failure from affecting the others.
             for error in await asyncio.gather(
                 *map(self._remove, gone[first : first + _MAX_CONCURRENT_ROBOTS]), return_exceptions=True
             ):
@@ -304,7 +303,7 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log each gateway whose name is held by another gateway, once per gateway.
+        """Log each gateway whose name is taken by another gateway, once per gateway.
 
         If both run on the same machine, challenge the holder instead.
         """
@@ -410,7 +409,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Schedule the return of removed names' memory to the system. Links close late, so wait first."""
+        """Schedule returning the memory of removed names to the system. Links close late, so wait before that."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()
@@ -436,8 +435,8 @@ class Importer:
             answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
             leaving = asyncio.ensure_future(left.wait())
             try:
-                # Stop waiting as soon as the robot has left: Zenoh ends a query when the robot's token disappears,
-                # which may take minutes.
+                # Stop waiting as soon as the robot has left.
+                # Zenoh ends a query when the robot's token disappears, which can take minutes.
                 await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
                 if not answering.done():
                     raise ServiceException(f"robot [{token.robot}] has left during the call")
@@ -467,7 +466,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph, or None if it is not needed: no robot both publishes and subscribes to a topic."""
+        """Return the local graph, or None if no robot both publishes and subscribes to a topic: it is not needed then."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node.call_master)
         return None

@@ -177,8 +177,8 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher.wait_for_expected()
-        # Publish buffered messages first. Until then, the receiver's thread passes new messages to `keep`, which runs
-        # on this loop.
+        # Publish buffered messages first.
+        # Until that is done, the receiver's thread passes new messages to `keep`, which runs on this loop.
         for body in self._held:
             self._put(publisher, body)
         self._held.clear()

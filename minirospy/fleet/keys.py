@@ -66,10 +66,10 @@ __all__ = [
 ]
 
 ROOT = "@minirospy/1"
-"""The first chunk starts with ``@``, so that ``**`` does not match it. The second is the version of this key scheme."""
+"""The first chunk starts with ``@``, so that ``**`` does not match it. The second one is the version of this key scheme."""
 
 UNKNOWN_MD5 = "-"
-"""Stands for an unknown md5sum: the topic has no publishers, and its type is not installed."""
+"""Represents an unknown md5sum: the topic has no publishers, and its type is not installed."""
 
 _MAX_NAME = 256
 _ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)

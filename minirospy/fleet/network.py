@@ -62,10 +62,9 @@ _T = TypeVar("_T")
 
 # maximum number of bytes in a query or a reply, such as a service's response or a definition
 MAX_TEXT = 16 << 20
-# maximum number of replies to a query; limited because peers choose the number, and a fleet has at most 5,000
-# gateways
+# maximum number of replies to a query; limited because the peers choose it, and a fleet has at most 5,000 gateways
 MAX_REPLIES = 10_000
-# fraction of the timeout; a query that ends sooner than this without replies has lost its link
+# fraction of the timeout; a query that ends sooner without replies has lost its link
 EARLY_SHARE = 0.9
 RETRY_SECONDS = 1.0
 LINGER_SECONDS = 2.0
@@ -102,7 +101,7 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # A single thread preserves the order of calls, so that peers see declarations in the order they were made.
+        # A single thread keeps the calls in order, so that peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(MAX_QUERIES)
@@ -162,7 +161,7 @@ class FleetNetwork:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # If the link is broken, undeclaring fails, but the peer detects the loss itself.
+        # Undeclaring fails on a broken link, but the peer detects the loss by itself.
         with contextlib.suppress(self._zenoh.ZError):
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
@@ -298,7 +297,7 @@ class FleetNetwork:
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # Each peer replies to a query with wildcards under the peer's own key.
+        # A peer replies to a query with wildcards under its own key.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -369,8 +368,7 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
-                    # By default, Zenoh withholds all replies until the last one has arrived or the timeout has
-                    # expired.
+                    # By default, Zenoh withholds all replies until the last one has arrived or the timeout has expired.
                     "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,
@@ -404,13 +402,13 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in its own thread. By default, Zenoh starts a thread for each handler."""
+        """Return a handler that Zenoh calls in its own thread; otherwise Zenoh would start a thread per handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        # Check the limit here: in a burst, all tasks are created before the first one runs.
+        # Check the limit here, because all tasks of a burst are created before the first one runs.
         is_full = len(share.tasks) >= share.limit
         refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
         task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
@@ -457,14 +455,14 @@ class FleetNetwork:
 
 @dataclass(eq=False)
 class _Share:
-    """The queries of one kind that are handled concurrently, and their limit."""
+    """The queries of one kind that are being handled, and the maximum number."""
 
     limit: int
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Deferred:
-    """A Zenoh entity that is declared in the background, and later undeclared."""
+    """A Zenoh entity that is declared, and later undeclared, in the background."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]

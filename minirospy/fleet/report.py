@@ -38,7 +38,7 @@ def parse_answer(data: bytes) -> Json:
 
 
 def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
-    """Return whether a JSON value is nested at most ``levels`` deep. The JSON encoder recurses once per level."""
+    """Return whether a JSON value is nested at most ``levels`` deep; the JSON encoder recurses once per level."""
     if isinstance(value, dict):
         value = list(value.values())
     return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))

@@ -47,7 +47,7 @@ If a bridge exits, a silent bridge needs up to three periods to resume its beaco
 s to detect the loss.
 """
 MAX_RESOURCES = 9_000
-"""Maximum number of remote resources to track, because the master accepts at most 10,000 names per node."""
+"""Maximum number of remote resources to track; the master accepts at most 10,000 names per node."""
 
 _ROOT = "ros1_discovery_info"
 _KINDS = ("pub", "sub", "srv", "cl")
@@ -196,11 +196,11 @@ class Beacons:
             is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
             if is_received:
-                # Decide at random whether to stop, so that about half of the bridges that send this beacon continue.
+                # Decide at random whether to stop, so that about half of the bridges that send this beacon go on.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
             elif beacon.is_silent and not beacon.is_resuming:
-                # Resume after a random delay, so that the silent bridges do not all start at the same time.
+                # Resume after a random delay, so that the silent bridges do not all resume at the same time.
                 beacon.is_resuming = True
                 beacon.due = now + self._random() * PERIOD
             else:

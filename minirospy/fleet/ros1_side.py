@@ -50,8 +50,8 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""Each gateway that uses zenoh-bridge-ros1's keys subscribes to this topic first, so that gateways on the same master detect
-each other.
+"""Each gateway that uses zenoh-bridge-ros1's keys subscribes to this topic first. That is how gateways on the same master
+detect each other.
 """
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
 _BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default names of zenoh-bridge-ros1's own nodes
@@ -85,8 +85,8 @@ class Ros1Side:
 
         ``hidden`` contains the names of robots whose topics are imported; ``namespace`` is the keys' namespace.
         """
-        # Exclude /rosout_agg, which repeats /rosout: if both were forwarded, each log message would return to its own
-        # master.
+        # Exclude /rosout_agg, which repeats /rosout.
+        # If both were forwarded, each log message would come back to its own master.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace
@@ -165,8 +165,7 @@ class Ros1Side:
         Raise MasterUnreachableError or RpcError if the call to the master fails.
         """
         changed = await self.graph.look()
-        # Open topics and services before announcing them, because a bridge calls and sends as soon as it receives a
-        # beacon.
+        # Open topics and services before announcing them: a bridge calls and sends as soon as it receives a beacon.
         await self._adjust()
         self._announce()
         return changed
@@ -246,7 +245,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was paused; beacons sent during the pause have not been delivered yet.
+                    # The process was suspended. Beacons sent in the meantime have not been delivered yet.
                     self.sightings.extend(late, now)
                 has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:
@@ -302,7 +301,7 @@ class Ros1Side:
             key = data_key(token.type, token.md5sum, token.service, self.namespace)
             self._answered[token] = self._network.answer(key, self._answerer(token), from_others=True)
 
-        # A master has one service per name, so a service of a local node takes precedence.
+        # A master keeps one provider per service name, so a local node's service takes precedence over a remote one.
         there = {each.name: each for each in reversed(remote) if each.kind == "srv"}
         for name, (resource, offered) in list(self.services.items()):
             if there.get(name) != resource or name in self.graph.service_names:

@@ -51,7 +51,7 @@ class Shared:
 
 
 class Ros1Topic:
-    """One topic with one type. Runs on the loop, except that messages are handled in other threads."""
+    """One topic with one type. Runs on the loop, except that other threads handle its messages."""
 
     def __init__(self, shared: Shared, topic: SharedTopic) -> None:
         self.token = topic.token
@@ -68,7 +68,7 @@ class Ros1Topic:
         self._is_closed = False
 
     async def update(self, topic: SharedTopic) -> None:
-        """Open and close handles for a change in the topic's local or remote use."""
+        """Open and close handles after a change in the topic's local or remote use."""
         before, self._topic = self._topic, topic
         self.token = topic.token
         if topic.is_wanted and not before.is_wanted and self.outbound:
@@ -112,7 +112,7 @@ class Ros1Topic:
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Let Zenoh report readers, because silent bridges and third-party programs send no beacons.
+        # Let Zenoh report the readers, because silent bridges and third-party programs send no beacons.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:

@@ -60,7 +60,7 @@ _BULK_TYPES = {
 }
 
 
-# seconds without a command before a zero velocity is published; commands closer together form a stream
+# seconds without a command before zero velocity is published; more frequent commands form a stream
 STOP_SECONDS = 0.5
 
 
@@ -78,7 +78,7 @@ class GatewayRules:
     rates: Sequence[tuple[str, float]] = ()
     priorities: Sequence[tuple[str, Priority]] = ()
     has_frames: bool = False
-    # seconds without a command before a zero velocity is published; 0 disables this
+    # seconds without a command before zero velocity is published; 0 disables this
     stop_seconds: float = STOP_SECONDS
 
     def rate(self, topic: str) -> float:
@@ -102,7 +102,7 @@ class Export:
 
 
 class Throttle:
-    """Limits messages to a rate in Hz, evenly spaced; 0 means unlimited."""
+    """Limits messages to a rate in Hz, evenly spaced; 0 means no limit."""
 
     def __init__(self, hertz: float) -> None:
         self._period = 1.0 / hertz if hertz else 0.0
@@ -112,8 +112,9 @@ class Throttle:
         """Return whether a message may be sent at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time, not to the current time: otherwise a limit of 10 Hz would pass only 7.5 of
-        # 30 messages per second. After a pause, restart from the current time.
+        # Add the period to the due time instead of the current time.
+        # Otherwise a limit of 10 Hz would pass only 7.5 of 30 messages per second.
+        # After a pause, start again from the current time.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period

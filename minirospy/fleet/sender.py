@@ -1,4 +1,4 @@
-"""Queues with threads that pass messages to and from Zenoh, so that neither direction waits for the event loop."""
+"""Queues with threads that pass messages to and from Zenoh, so that the event loop delays neither direction."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ The least recently used publisher is dropped.
 
 
 class _Worker:
-    """A thread that processes a queue; started when the queue is not empty."""
+    """A thread that processes a queue. It is started when something is queued."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -84,7 +84,7 @@ class Outflow:
 
     @property
     def dropped(self) -> int:
-        """Return the number of messages dropped in favour of newer ones because the network was too slow."""
+        """Return the number of messages that newer ones have replaced because the network was too slow."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:

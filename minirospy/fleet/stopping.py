@@ -120,7 +120,7 @@ class CommandStream:
             self._last, self._rest = now, rest
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
-                # Arm the guard before publishing, so that every published command can be stopped.
+                # Arm the guard before publishing, so that every published command is followed by a stop.
                 self.guard.arm(self._silent, self._deadline)
             else:
                 self.guard.disarm(self._silent)

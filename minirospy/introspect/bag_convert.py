@@ -39,9 +39,8 @@ def convert(source: str, target: str, *, compression: str, force: bool, step: Ca
     """Write a bag's or MCAP file's messages to ``target``, an MCAP file if its name ends in .mcap.
 
     Return the number of messages. ``step`` is called with the number of message bytes processed so far. ``force``:
-    overwrite an
-    existing file. An incomplete file is removed. Raise UsageError if ``target`` exists, BagError if the source is
-    invalid, or OSError if a file cannot be read or written.
+    overwrite an existing file. An incomplete file is removed. Raise UsageError if ``target`` exists, BagError if the
+    source is invalid, or OSError if a file cannot be read or written.
     """
     check(source, target, compression=compression, force=force)
 

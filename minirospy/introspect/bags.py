@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 Progress = Callable[[int], object]
-"""A function that is called repeatedly with the number of bytes processed so far."""
+"""A function to call repeatedly with the number of bytes processed so far."""
 
 _WHOLE_NAMESPACE = {"eval", "exec", "locals", "vars", "globals", "dir"}
 
@@ -166,7 +166,7 @@ class Expression:
         self.text = text
         names = {each.id for each in ast.walk(tree) if isinstance(each, ast.Name)}
         self.needs_message = "m" in names or bool(names & _WHOLE_NAMESPACE)
-        """True if the expression uses the message; if False, messages are not deserialized."""
+        """True if the expression uses the message. If False, messages are not deserialized."""
 
     def __call__(self, topic: str, message: Message | None, time: Time) -> object:
         """Evaluate the expression and return its value. Raise ValueTextError if the evaluation fails."""
@@ -195,7 +195,7 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Write the messages for which ``keep`` is truthy to a new bag; call ``on_shown`` with each value of ``show``.
+    """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.
@@ -274,7 +274,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if an output bag's name has an MCAP file's extension."""
+    """Raise UsageError if the name of an output bag has an MCAP file's extension."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -308,7 +308,7 @@ def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
 
 @contextlib.contextmanager
 def naming_full_disk(path: str) -> Iterator[None]:
-    """Add the name of the output file to an OSError for a full disk or an exceeded quota."""
+    """If an OSError means a full disk or an exceeded quota, add the output file's name to it."""
     try:
         yield
     except OSError as error:

@@ -34,17 +34,17 @@ class Filter:
             raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
 
     def __call__(self, message: Message, topic: str) -> bool:
-        """Return whether the expression's value is truthy. Raise UsageError if the expression cannot be evaluated."""
+        """Return whether the expression's value is true. Raise UsageError if the expression cannot be evaluated."""
         try:
             # eval is safe here: the code is the user's own, on the user's own machine, as in ROS.
             return bool(eval(self._code, {"m": message, "topic": topic}))
-        # the user's expression may raise any exception, which is reported to the user
+        # the user's expression may raise any exception; report it to the user
         except Exception as error:
             raise UsageError(f"filter [{self._expression}]: {type(error).__name__}: {error}") from error
 
 
 class Echo:
-    """Formats a topic's messages, or one of their fields, as output lines, each ending with a line feed.
+    """Formats a topic's messages, or one of their fields, as output lines that end with a line feed.
 
     ``plot``: print comma-separated values, with a header line first. ``strings`` and ``arrays``: show fields of these
     kinds. ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns
@@ -100,7 +100,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return the output for a message. Raise IndexError if the path's index is beyond the end of the array."""
+        """Return the output for a message. Raise IndexError if the path's index is past the end of the array."""
         value = field_value(message, self._steps, self._report)
         return self._row(value, received) if self._plot else self._block(value)
 
@@ -130,7 +130,7 @@ class Echo:
         if self._is_shown_whole(value):
             return strify_message(value, fixed_numeric_width=self._width) + "\n---\n"
 
-        # ROS prints a char[] field as bytes, and fails on uint8[].
+        # ROS prints a char[] field as bytes and fails on uint8[].
         if isinstance(value, bytes) and not self._type.startswith("char"):
             value = list(value)
         if not (self._strings and self._arrays):
@@ -173,7 +173,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A placeholder is a string, whatever the field's type, but a field is printed according to its declared type.
+    # A placeholder is always a string, but a field is printed according to its declared type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

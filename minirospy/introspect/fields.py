@@ -40,7 +40,7 @@ def parse_path(path: str) -> tuple[Step, ...]:
 
 
 Report = Callable[[NotFoundError | IndexError], object]
-"""A function that receives the error for each element of a slice that lacks the rest of the path."""
+"""A function that receives the error for each element of a slice that does not have the rest of the path."""
 
 
 def field_value(message: object, steps: tuple[Step, ...], report: Report | None = None) -> object:

@@ -38,7 +38,7 @@ class NodeAddress(NamedTuple):
 
 
 class Graph:
-    """A connection to a master, with ``tool`` as caller_id. Names are resolved in ``namespace``, then remapped.
+    """A connection to a master, with ``tool`` as caller_id. Names are resolved in ``namespace`` and then remapped.
 
     A context manager. Every call raises MasterUnreachableError if no master responds.
     """
@@ -103,7 +103,7 @@ class Graph:
         return self._uris[node]
 
     def addresses(self, nodes: Iterable[str]) -> list[NodeAddress]:
-        """Return each node with its URI, which is None if the master does not know the node."""
+        """Return each node with its URI, or None if the master does not know the node."""
         return [NodeAddress(node, self.node_uri(node)) for node in nodes]
 
 
@@ -119,7 +119,7 @@ def why_illegal(name: str) -> str:
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Return whether a global name is ``namespace`` or is below it. Every name is below the root namespace."""
+    """Return whether a global name equals ``namespace`` or is below it. Every name is below the root namespace."""
     return namespace in ("", "/") or name == namespace or name.startswith(namespace.rstrip("/") + "/")
 
 

@@ -58,7 +58,7 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """Return the types that match ``name``. If it includes a package, that is ``name`` itself, else all types with that name.
+        """Return the types that match ``name``: ``name`` itself if it includes a package, else all types with that name.
 
         Raise NotFoundError with similar names if no type matches.
         """
@@ -99,7 +99,7 @@ class Interfaces:
         raise NotFoundError("service type", type_, self.all())
 
     def _names(self, package: str) -> list[str]:
-        """Return the sorted names of a package's types, from its files. One action file defines seven messages."""
+        """Return the sorted names of a package's types, from its files. An action file defines seven messages."""
         folder = self._catalogue.packages[package]
         ending = self._kind.value
         names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}

@@ -44,13 +44,13 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
     """Set a logger's level. Raise the same exceptions as :func:`logger_level`."""
-    # A node accepts any logger name, so check first that the logger exists.
+    # A node accepts any logger name, so first check that the logger exists.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
 
 def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Message:
-    """Call one of a node's own services and return the response."""
+    """Call one of a node's own services; return the response."""
     name = find_node(graph, node).name
     try:
         return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))

@@ -24,14 +24,14 @@ _M = TypeVar("_M", bound="Message")
 
 
 _HINTS = {
-    # YAML may parse such values as another type: an unquoted 5 as a number, 1e-3 as a string.
+    # YAML may parse such values as other types: an unquoted 5 as a number, 1e-3 as a string.
     "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
 
 
 class Received(NamedTuple):
-    """A received message: its bytes, its publisher's connection header, and the receive time (since the epoch)."""
+    """A received message: its bytes, its publisher's connection header, and its receive time (since the epoch)."""
 
     body: bytes
     header: Header
@@ -58,7 +58,7 @@ class MessageClasses:
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
             if len(self._classes) >= _MAX_CLASSES:
-                # Normal use never needs this many types, so a publisher is sending made-up type names.
+                # Normal use never involves this many types, so a publisher must be sending made-up type names.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
@@ -96,7 +96,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
     """
     from minirospy.core.idl.message import fill_message_args
 
-    # Without values the message keeps its defaults.
+    # If there are no values, the message keeps its defaults.
     try:
         fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
     except (MessageException, ValueError, TypeError, AttributeError) as error:
@@ -130,7 +130,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """Return a one-line error that the user's ``values`` do not fit the message. It lists the message's fields."""
+    """Return a one-line error that the user's ``values`` do not fit the message, with a list of the message's fields."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

@@ -13,10 +13,10 @@ from minirospy.base.errors import MinirospyError, ServiceException
 __all__ = ["MAX_CONCURRENT", "NodeQueries"]
 
 MAX_CONCURRENT = 64
-"""Maximum number of concurrent first queries; a node that hangs occupies only one of them."""
+"""Maximum number of concurrent first queries. A node that hangs occupies only one of them."""
 
 _MAX_CONCURRENT_RETRIES = 32
-"""Maximum number of concurrent retries; limited separately, so that retries do not delay first queries."""
+"""Maximum number of concurrent retries. It is separate, so that retries do not delay first queries."""
 QUERY_SECONDS = 5.0
 AGAIN_SECONDS = 10.0  # seconds before a node that did not respond is queried again
 REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
@@ -89,7 +89,7 @@ class NodeQueries(Generic[_Key, _Found]):
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Clear the tasks here, because done callbacks of tasks that have just finished run only after this.
+        # Clear the tasks here: the done callbacks of tasks that have just finished run only later.
         self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
@@ -104,7 +104,7 @@ class NodeQueries(Generic[_Key, _Found]):
             self._reporter.report(error)
             self._failed(key)
         else:
-            # If the key is absent now, it must be queried again when it returns.
+            # If the key is absent now, it has to be queried again when it returns.
             if key in self._present:
                 self.found[key] = found
                 return True

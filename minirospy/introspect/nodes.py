@@ -80,7 +80,7 @@ class Connections(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """The nodes that a node receives messages from, and those that it sends to, according to the master."""
+    """The nodes from which a node receives messages, and those to which it sends, according to the master."""
 
     senders: list[str]
     receivers: list[str]
@@ -103,7 +103,7 @@ def node_hosts(graph: Graph) -> dict[str, str]:
 
 
 def nodes_on(graph: Graph, machine: str) -> list[str]:
-    """Return the nodes on a machine, by its name or address. Raise NotFoundError if there is none."""
+    """Return the nodes on a machine, given its name or address. Raise NotFoundError if there are none."""
     hosts = node_hosts(graph)
     found = [node for node, host in hosts.items() if _is_same_host(host, machine)]
     if not found:
@@ -138,7 +138,7 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 def node_detail(graph: Graph, name: str) -> NodeDetail:
     """Return the master's information about a node (global name). Raise NotFoundError if the node is not registered."""
     state = graph.state()
-    # Use the types that publishers registered: rosnode prints "unknown type" for a topic without publishers.
+    # Use the types that publishers registered. rosnode prints "unknown type" for a topic without publishers.
     types = dict(graph.master.get_published_topics())
 
     def topics(table: Mapping[str, list[str]]) -> list[TypedName]:
@@ -179,7 +179,7 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             if isinstance(error.__cause__, TimeoutError):
                 raise NodeUnreachableError(node.name, error.uri, error.why) from error
         except RpcError:
-            pass  # a node that exits immediately may not finish sending its response
+            pass  # a node that exits immediately may not get to send its whole response
 
 
 def is_unknown_host(error: NodeUnreachableError) -> bool:
@@ -221,8 +221,8 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     # Use the node's name as the caller_id: the master removes only the caller's own registrations.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # Topics are unregistered by the node's URI, services by their own URI. If the node's name is still registered
-        # with this URI after the services were looked up, none of the services can belong to a newer node.
+        # Topics are unregistered by the node's URI, services by their own URI.
+        # If the node's name still has this URI after the services were looked up, none of them belongs to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:
@@ -237,7 +237,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether nothing listens at a node's address, or another process does.
+    """Return whether nothing listens at a node's address any more, or another process does.
 
     Return False for a node that does not respond in time, because it may be alive.
     """
@@ -245,8 +245,7 @@ def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
         try:
             return bool(slave.call("getName") != node.name)
         except RpcUnreachable as error:
-            # EOFError means that a different server, such as a TCPROS server, now uses the port and closed the
-            # connection.
+            # EOFError: another server, such as a TCPROS server, now uses the port and has closed the connection.
             return isinstance(error.__cause__, ConnectionError | EOFError)
         except RpcProtocolError:
             return True

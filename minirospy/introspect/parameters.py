@@ -62,7 +62,7 @@ def get_parameter(graph: Graph, name: str) -> object:
 
 
 def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
-    """Set a parameter. As in rosparam, a dictionary sets each of its entries and leaves other entries unchanged.
+    """Set a parameter. As in rosparam, a dictionary sets each of its entries and leaves all others unchanged.
 
     Return the individual parameters that were set. Raise ValueTextError if a value cannot be stored as a parameter.
     """

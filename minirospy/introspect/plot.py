@@ -33,7 +33,7 @@ def plot_row(
 
 
 def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -> Iterator[_Cell]:
-    # Use plain ``if`` statements, the most frequent first, because this runs for every value in every message.
+    # Use plain ``if`` statements, most frequent case first, because this runs for every value of every message.
     if isinstance(value, bool):
         yield _Cell(name, str(int(value)))
     elif isinstance(value, int | float):
@@ -41,7 +41,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     elif isinstance(value, str):
         yield _Cell(name, value)
     elif value is None:
-        # An element that lacks the rest of a path such as points[:]/x[0] keeps its column, which is empty.
+        # An element that does not have the rest of a path such as points[:]/x[0] keeps its column, which stays empty.
         yield _Cell(name, "")
     elif hasattr(value, "to_nsec"):
         # Subtract the origin only from points in time, not from durations.
@@ -52,7 +52,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     else:
         for field in getattr(value, "__slots__", ()):
             inner = getattr(value, field)
-            # As in ROS, fields that are messages are left out, but not the value that the path itself selects.
+            # As in ROS, omit fields that are messages, unless the path itself selects them.
             if (strings and arrays) or not _is_left_out(inner, strings, arrays):
                 yield from _cells(f"{name}.{field}", inner, strings, arrays, origin)
 

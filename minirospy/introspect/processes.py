@@ -12,7 +12,7 @@ __all__ = ["ProcessLoad", "ProcessLoads"]
 
 
 class ProcessLoad(NamedTuple):
-    """CPU use in percent of one core since the previous call (None at the first call), and resident memory in bytes."""
+    """CPU use in percent of one core since the previous call (None at the first one), and resident memory in bytes."""
 
     cpu: float | None
     memory: int
@@ -26,13 +26,13 @@ class ProcessLoads:
         self.known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
-        """Return a dict from process id to load, without processes that have exited or that this user may not inspect."""
+        """Return a dict from process id to load, omitting processes that have exited or that this user may not inspect."""
         before, self.known = self.known, {}
         found = {}
         for pid in set(pids):
             with contextlib.suppress(psutil.Error, ValueError):
                 process = before.get(pid)
-                # Another process may have reused the id of an exited process.
+                # The id of an exited process may have been reused.
                 is_new = process is None or not process.is_running()
                 if process is None or is_new:
                     process = psutil.Process(pid)

@@ -95,10 +95,10 @@ def _flow(value: object) -> str:
 
 
 def _wrapped(line: str) -> str:
-    """Wrap a line that is too wide, as YAML libraries do: before the first word that starts after the last column."""
+    """Wrap a line that is too wide as YAML libraries do: before the first word that starts after the last column."""
     if len(line) <= _COLUMNS:
         return line
-    # A dash before a key counts as indentation, but a dash before a brace does not.
+    # A dash before a key counts as indentation; a dash before a brace does not.
     start = re.match(r" *(?:- (?=\w))?", line)
     indent = start.end() if start else 0
     column, depth, text = 0, 0, []

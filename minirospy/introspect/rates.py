@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Maximum number of messages in a window that has no limit, to bound the memory use of a long measurement."""
+"""Maximum number of messages in a window without a limit; it bounds the memory of a long measurement."""
 
 
 _NOTHING = "no new messages"
@@ -69,7 +69,7 @@ class RateWindow:
         if self._last is not None and time >= self._last:
             self._pauses.append(time - self._last)
         elif self._last is not None:
-            # The clock was set back: earlier measurements cannot be compared with later ones.
+            # The clock was set back, so earlier measurements cannot be compared with later ones.
             self._pauses.clear()
         self._last = time
 
@@ -142,7 +142,7 @@ def delay_text(report: Spread | None) -> str:
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return the text that `rostopic bw` prints once a second: two lines for a single topic, a table for several, "" for none."""
+    """Return the text that `rostopic bw` prints each second: two lines for one topic, a table for several, "" for none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Format a number of bytes, in the unit that suits ``rate``."""
+    """Format a number of bytes in the unit that suits ``rate``."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

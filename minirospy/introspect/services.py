@@ -47,7 +47,7 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and the nodes that provide it. The last one registered receives the calls."""
+    """A service and its providers. The one registered last receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
@@ -107,7 +107,7 @@ def find_services_of_type(graph: Graph, type_: str) -> list[str]:
 
 
 def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object]) -> None:
-    """Wait until a service is registered and responds. Call ``on_waiting`` once if the service is not available yet."""
+    """Wait until a service is registered and responds. Call ``on_waiting`` once if it is not available yet."""
     if _probed_type(graph, service):
         return
     on_waiting()
@@ -188,7 +188,7 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return an error's message without its number (`Connection refused`). For a timeout, return the likely cause."""
+    """Return an error's message without its number (`Connection refused`) or, for a timeout, the likely cause."""
     if isinstance(error, TimeoutError):
         return f"timed out; {SUSPENDED}"
     return getattr(error, "strerror", None) or str(error)

@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the current graph. ``call(method, *arguments)`` calls the master; this function passes on its exceptions."""
+    """Return the current graph. ``call(method, *arguments)`` calls the master; its exceptions are passed on."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

@@ -74,7 +74,7 @@ class ToolNode:
             if ros_time:
                 self._follow_clock(environment.master_uri)
         except BaseException:
-            # Ctrl-C may interrupt the start after the node's servers were opened: close them.
+            # Ctrl-C may interrupt the start after the node's servers were opened, so close them.
             self.close()
             raise
 
@@ -196,7 +196,7 @@ class _Listeners:
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
         self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
         self._lock = threading.Lock()
-        # Dict from publisher's name to its last message, for latched publishers.
+        # The last message of each latched publisher, by name.
         self._latched: dict[str, tuple[bytes, Header]] = {}
 
     def add(self, function: Callable[[Frame, Header], None]) -> None:
@@ -209,7 +209,7 @@ class _Listeners:
 
     def deliver(self, body: Frame, header: Header) -> None:
         """Call all functions with a new message. Runs in a worker."""
-        # A function that is being added gets this message either from here or from add(), but not from both.
+        # A function that is being added gets this message either here or in add(), but not in both.
         with self._lock:
             functions = self._functions
             if header.get("latching") == "1":
@@ -237,13 +237,13 @@ class Inbox:
             return
 
     def close(self) -> None:
-        """Make the reader stop once it has read the queued messages."""
+        """Make the reader stop after reading the queued messages."""
         if not self._closed.is_set():
             self._closed.set()
             try:
                 self._messages.put_nowait(None)
             except queue.Full:
-                pass  # the queue is full: the reader checks the flag after it has read the queued messages
+                pass  # the queue is full: the reader checks the flag after reading the queued messages
 
     def __iter__(self) -> Iterator[Received]:
         while True:

@@ -81,7 +81,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
     found: dict[Edge, tuple[float, float]] = {}
     for key, now in after.counts.items():
         then = before.counts.get(key)
-        # roscpp's counters are 32-bit numbers: skip counters that have wrapped around.
+        # roscpp's counters have 32 bits: skip counters that have wrapped around.
         if then is None or now.messages < then.messages or now.bytes < then.bytes:
             continue
         hz, size = found.get(key[2], (0.0, 0.0))
@@ -153,7 +153,7 @@ def _topics(
 
 
 def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
-    """Return a node's counters for each outbound connection, or {} if the rows are not in the documented format."""
+    """Return a node's counters per outbound connection, or {} if the rows do not have the documented format."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
     }
@@ -163,7 +163,8 @@ def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Count
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # rospy's rows have messages and connected; roscpp's have bytes of messages, messages and connected.
+                # rospy's rows end with messages and connected.
+                # roscpp's end with bytes of messages, messages and connected.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

@@ -68,7 +68,7 @@ def topic_text(detail: TopicDetail) -> str:
 
 
 def _direction(direction: str, info: str) -> str:
-    """Return ``outbound (port - host:port) [socket]``. The numbers are taken from the text that nodes send."""
+    """Return ``outbound (port - host:port) [socket]``. The numbers come from the description that nodes send."""
     import re
 
     match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)

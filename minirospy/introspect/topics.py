@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""Shown for a topic of unknown type: it only has subscribers to any type, so no node has declared its type."""
+"""Shown for a topic of unknown type: no node has declared a type, because all its subscribers accept any type."""
 
 _ANY = "*"
 
@@ -132,7 +132,7 @@ def find_topic(graph: Graph, name: str) -> TopicField | None:
     types = {topic: type_ for topic, type_ in graph.master.get_topic_types().items() if type_ != _ANY}
     if name in types:
         return TopicField(name, types[name], "")
-    # `/a/b[0]` can be an element of the field b of /a, but not of the topic /a/b.
+    # `/a/b[0]` may be an element of the field b of /a, but not one of the topic /a/b.
     holders = [topic for topic in types if name.startswith(topic + "/")]
     if not holders:
         return None

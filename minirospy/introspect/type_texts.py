@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 MAX_NAMES = 2_000
-"""Maximum number of cached types, including types that are not installed: a peer may send any number of names."""
+"""Maximum number of types to cache, including those that are not installed: a peer may send any number of names."""
 _MAX_CONCURRENT = 32  # maximum number of publishers queried concurrently
 
 
@@ -49,7 +49,7 @@ def type_of_text(name: str, text: str) -> InterfaceType | None:
 
 
 class TypeTexts:
-    """Message types, keyed by topic. Importing a type's module takes milliseconds, so each one is imported once, in a worker."""
+    """Message types by topic. Importing a type's module takes milliseconds, so a worker imports each one, once."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -89,7 +89,7 @@ class TypeTexts:
         loop = asyncio.get_running_loop()
         found = await loop.run_in_executor(None, installed_type, name)
         while len(self._installed) >= MAX_NAMES:
-            # Remove the oldest entry: dictionaries preserve insertion order.
+            # Remove the oldest entry, which comes first because dictionaries preserve insertion order.
             del self._installed[next(iter(self._installed))]
         self._installed[name] = found
         return found
@@ -99,7 +99,7 @@ class TypeTexts:
             with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
                 header = await self.header_of(topic, publisher)
                 text = header.get("message_definition", "")
-                # An empty definition is valid only for a message without fields, whose md5sum this is.
+                # An empty definition is valid only for a message without fields, which has this md5sum.
                 if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":
                     return InterfaceType(header["type"], header["md5sum"], text)
         return None

@@ -40,7 +40,7 @@ _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
 _MAX_ANGLE_LENGTH = 200
-_MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer that an error message shows
+_MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer to show in an error message
 
 
 def parse_value(text: str) -> object:
@@ -61,7 +61,7 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # An argument that is not UTF-8 is a usage error. The command reports it.
+            # An argument that is not UTF-8 is a usage error, which the command reports.
             raise error.__cause__ from None
         accepted = _accepted_by_ros(text, error)
         if len(accepted) != 1:
@@ -106,7 +106,7 @@ def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
     """Like :func:`parse_documents`, but yield each value as soon as its document is complete.
 
-    An example that needs this is `rostopic echo /a | rostopic pub /b TYPE`.
+    For example, `rostopic echo /a | rostopic pub /b TYPE` needs this.
     """
     text: list[str] = []
     for line in lines:
@@ -144,7 +144,7 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object, indent: str = "") -> str:
-    """Format a value for people, like `rosparam get -p`. Strings are unquoted, so the output may not be valid YAML.
+    """Format a value for people, like `rosparam get -p`. Strings are not quoted, so the output may not be valid YAML.
 
     ``indent`` is put before the entries of a dictionary.
     """
@@ -180,7 +180,7 @@ def check_parameter(value: object, name: str) -> None:
 
 
 def _is_digits(text: str) -> bool:
-    """Return whether a string is at most nine ASCII digits.
+    """Return whether a string consists of at most nine ASCII digits.
 
     Uses no regular expression, because compiling one slows the start.
     """
@@ -188,7 +188,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML parses a word as a string: it has only letters, digits, / and _, and no special meaning."""
+    """Return whether YAML parses a word as a string: it consists of letters, digits, / and _, and has no special meaning."""
     return (
         len(word) > 1
         and word.isascii()
@@ -256,7 +256,7 @@ def arithmetic(text: str) -> float:
     import operator
 
     if len(text) > _MAX_ANGLE_LENGTH:
-        # Longer strings may exceed limits of Python's parser, which then raises other errors.
+        # Longer strings may exceed limits of Python's parser, which raises different errors then.
         raise ValueError(f"more than {_MAX_ANGLE_LENGTH} characters")
     binary = {
         ast.Add: operator.add,
@@ -265,7 +265,7 @@ def arithmetic(text: str) -> float:
         ast.Div: operator.truediv,
         ast.FloorDiv: operator.floordiv,
         ast.Mod: operator.mod,
-        # Of floats, so that 9**9**9 is an error, not an integer that fills the memory.
+        # Compute with floats, so that 9**9**9 is an error instead of an integer that fills the memory.
         ast.Pow: math.pow,
     }
 

@@ -4,7 +4,7 @@ Each module re-exports names from the module of the same name in this package.
 
 The names that `import rosgraph.masterapi` provides are in `ros/rosgraph/rosgraph/masterapi.py`; the module in `overlay/`
 re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. In real ROS, a star
-import also brings names from other modules (`os`, `rospy`: passed_on.py); the module in `overlay/` finds these names when a
+import also brings names from other modules (`os`, `rospy`: passed_on.json); the module in `overlay/` finds these names when a
 program first uses them. The build writes `overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it
 again. This module reads the sources without importing them.
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
@@ -20,14 +21,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.core.idl.own_packages import own_definitions
-from minirospy.ros.passed_on import PASSED_ON
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
-__all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_overlay"]
+__all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "read_passed_on", "write_overlay"]
 
 PACKAGE = Path(__file__).parents[1]
+_PASSED_ON = PACKAGE / "ros" / "passed_on.json"  # written by tests/referee/compare_surface.py
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
-"""Maps Python modules that belong to no ROS package to their folders."""
+"""Folders of the Python modules that belong to no ROS package, keyed by module."""
 _NAMED_OTHERWISE = {
     "camera_info_manager_py": ("camera_info_manager",),
     "python_orocos_kdl": ("PyKDL",),
@@ -45,7 +46,7 @@ _INTERNAL = {
     "message_filters": "stamps",
     "rosauth": "authentication",
     "rosbag": "exceptions internals opening private readers records",
-    "rospy": "live passing",
+    "rospy": "live",
     "rostopic": "echo rates",
     "smach_ros": "callbacks pickled",
     "sound_play": "node players programs tones",
@@ -55,6 +56,11 @@ _INTERNAL = {
     "urdf_parser_py": "joints links",
 }
 """Modules that ROS's Python modules do not have. Do not add entries: put a new module next to the Python module's folder."""
+_WITHOUT_STANDARD_LIBRARY = {
+    *("PyKDL", "angles", "camera_calibration_parsers", "cv_bridge"),
+    *("genmsg", "genpy", "image_geometry", "sensor_msgs"),
+}
+"""Packages that in real ROS import no XML, XML-RPC or logging handlers. Programs that use only messages start faster."""
 _GENERATED = "generated from minirospy/"  # marks generated modules, in their docstrings
 _METADATA = "rospy-1.17.0.egg-info"  # programs query rospy's version through importlib.metadata
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
@@ -82,7 +88,9 @@ class _Source(NamedTuple):
     imported: dict[str, Origin]
     """Names bound by imports, including imports for type checkers only."""
     passed_on: frozenset[str]
-    """Names that an import binds in the form ``x as x``, and the functions ``__getattr__`` and ``__dir__``."""
+    """Names that an import binds in the form ``x as x``, and the functions ``__getattr__`` and ``__dir__`` if the module has
+    them.
+    """
 
 
 def write_overlay(folder: Path) -> list[str]:
@@ -150,7 +158,7 @@ def exported(source: Path) -> dict[str, Origin]:
 
 
 def _origin(asked: Origin) -> Origin:
-    """Return the place that defines a name, following modules that only re-export it."""
+    """Return the place that defines a name. Follow modules that only re-export the name."""
     source = _source_of(asked.module)
     if source is None:
         return asked
@@ -159,8 +167,8 @@ def _origin(asked: Origin) -> Origin:
         return asked
     module = _by_source().get(f"{inner.module}.{inner.name}")
     if module is not None:
-        # If the name is a module that the overlay also has, use the overlay's module, so that `rosgraph.names` is the
-        # module that `import rosgraph.names` returns.
+        # If the overlay has a module of this name, too, use that one.
+        # `rosgraph.names` must be the module that `import rosgraph.names` returns.
         parent, _, name = module[0].rpartition(".")
         is_kept = asked.name == name or asked.module == inner.module
         return Origin(parent or name, name if parent else "") if is_kept else inner
@@ -176,9 +184,7 @@ def _text(name: str, source: Path) -> str:
     passed_on = _passed_on(name, listed(source))
     is_package = source.name == "__init__.py" and name not in _ALSO
     later = {**(_submodules(name) if is_package else {}), **passed_on}
-    hook = names_here.pop("__getattr__", None) if later else None
-    if hook:
-        names_here["_find_more"] = hook
+    assert not (later and "__getattr__" in names_here), f"{where}: overlay/ needs a __getattr__ of its own"
     for bound, (module, imported) in names_here.items():
         if imported:
             by_module.setdefault(module, []).append(f"{imported} as {bound}")
@@ -188,7 +194,7 @@ def _text(name: str, source: Path) -> str:
         lines += [f"from {module} import (", *_wrapped(names), ")"]
     if public is not None:
         lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
-    if is_package and "." not in name:
+    if is_package and "." not in name and name not in _WITHOUT_STANDARD_LIBRARY:
         lines += [
             *([""] if lines[-1] else []),
             "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
@@ -202,7 +208,7 @@ def _text(name: str, source: Path) -> str:
             *_wrapped(f'"{each}"' for each in passed_on),
             "]",
         ]
-        lines += _text_of_later(name, later, starred if passed_on else [], has_hook=hook is not None)
+        lines += _text_of_later(name, later, starred if passed_on else [])
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -214,11 +220,22 @@ def listed(source: Path) -> list[str]:
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
     """Map the names that a star import brings from other modules to their `MODULE` or `MODULE:NAME`."""
     found = {}
-    for place, names in PASSED_ON.get(module, {}).items():
+    for place, names in read_passed_on().get(module, {}).items():
         for each in names.split():
             name, _, there = each.partition("=")
             found[name] = ":".join(filter(None, (place, there or name)))
     return {name: found[name] for name in sorted(found.keys() - set(own))}
+
+
+@functools.cache
+def read_passed_on() -> dict[str, dict[str, str]]:
+    """Return the names that star imports bring in real ROS because its modules have no ``__all__``.
+
+    The result maps modules to the modules that define the names ("" if the names are modules themselves), and these to the
+    names, separated by spaces: NAME, or NAME=NAME_THERE.
+    """
+    table: dict[str, dict[str, str]] = json.loads(_PASSED_ON.read_text(encoding="utf-8"))
+    return table
 
 
 def _submodules(package: str) -> dict[str, str]:
@@ -234,9 +251,8 @@ def _submodules(package: str) -> dict[str, str]:
     return {name: f"{package}.{name}" for name in sorted(names)}
 
 
-def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, has_hook: bool) -> list[str]:
+def _text_of_later(module: str, names: dict[str, str], starred: list[str]) -> list[str]:
     """Return source lines that look up these names at first use. Type checkers and editors do not see such names."""
-    missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
     return [
         "",
         "import typing as _typing",
@@ -252,7 +268,7 @@ def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, ha
         "    def __getattr__(name):",
         "        if name in _LATER:",
         "            return _import_passed_on(globals(), name, _LATER[name])",
-        f"        {'return _find_more(name)' if has_hook else missing}",
+        f"        raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")",
     ]
 
 

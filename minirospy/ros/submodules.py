@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
 
-__all__ = ["import_passed_on", "offer_standard_library", "on_first_use"]
+__all__ = ["import_passed_on", "offer_standard_library"]
 
 _STANDARD_LIBRARY = {
     "email": (
@@ -37,17 +37,6 @@ _LARGE = {"http", "logging"}
 """Packages that are slow to import: their submodules are offered only if the packages have already been imported."""
 
 
-def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
-    """Return a ``__getattr__`` (PEP 562) for ``package`` that imports these submodules on first use."""
-
-    def find(name: str) -> ModuleType:
-        if name in names:
-            return import_module(f"{package}.{name}")
-        raise AttributeError(f"module {package!r} has no attribute {name!r}")
-
-    return find
-
-
 def import_passed_on(namespace: dict[str, object], name: str, place: str) -> object:
     """Import ``place`` (`MODULE` or `MODULE:NAME`), store it as ``name`` in ``namespace``, and return it."""
     module, _, inner = place.partition(":")
@@ -66,4 +55,15 @@ def offer_standard_library() -> None:
         if package in _LARGE and package not in sys.modules:
             continue
         attributes = vars(import_module(package))
-        attributes.setdefault("__getattr__", on_first_use(package, *names))
+        attributes.setdefault("__getattr__", _on_first_use(package, *names))
+
+
+def _on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
+    """Return a ``__getattr__`` (PEP 562) for ``package`` that imports these submodules on first use."""
+
+    def find(name: str) -> ModuleType:
+        if name in names:
+            return import_module(f"{package}.{name}")
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return find

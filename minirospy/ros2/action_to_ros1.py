@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 SERVER_SECONDS = 5.0
-"""Timeout in seconds for a ROS 1 server to connect, and to list a new goal in its statuses."""
+"""Timeout in seconds for a ROS 1 server to connect and to list a new goal in its statuses."""
 MAX_GOALS = 1_000
 """Maximum number of goals forwarded concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5
@@ -110,8 +110,8 @@ class GoalsToRos1:
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """Close the action. Running goals are aborted; a goal whose result has already arrived finishes with that result."""
-        # A result that has already arrived is processed in the next loop iteration.
+        """Close the action. Running goals are aborted, except that a goal whose result has already arrived finishes with it."""
+        # A result that has already arrived is processed in the loop's next iteration.
         await asyncio.sleep(0)
         self._is_closed = True
         for goal in list(self._goals.values()):
@@ -120,7 +120,7 @@ class GoalsToRos1:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._server:
-            # close() blocks until known results have been sent.
+            # close() blocks until all known results have been sent.
             await self._loop.run_in_executor(None, self._server.close)
         for end in (*self._subscriptions, self._goal, self._cancel):
             await end.close()
@@ -137,7 +137,7 @@ class GoalsToRos1:
         if self._is_closed:
             accepted.set_exception(BridgeError("it is not bridged any more"))
             return
-        # Count both goals that are being accepted and running goals.
+        # Count the goals that are being accepted, as well as the running ones.
         if len(self._tasks) + len(self._goals) >= MAX_GOALS:
             accepted.set_exception(BridgeError(f"the bridge passes on {MAX_GOALS} goals already"))
             return
@@ -177,7 +177,7 @@ class GoalsToRos1:
         return goal if is_accepted else None
 
     async def _connected(self) -> None:
-        """Wait until the server is connected in both directions, because a goal sent before that would be lost."""
+        """Wait until the server is connected in both directions; a goal sent before that would be lost."""
         await self._heard.wait()
         for publisher in (self._goal, self._cancel):
             await publisher.wait_for_subscribers()
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Feedback arrives on a separate connection, so first process the feedback that has already arrived.
+        # Feedback arrives on a separate connection, so process the feedback that has already arrived first.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

@@ -41,13 +41,13 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 REACH_SECONDS = 2.0
-"""Maximum seconds that opening this link, which waits for the server, may delay other links."""
+"""Maximum seconds for which opening this link, which waits for the server, may delay other links."""
 ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
-"""Seconds to delay a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
+"""Delay of a response in seconds: Python's actionlib drops responses that arrive before its send_goal has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
-"""Maximum number of goals sent but not yet accepted. A server's queue holds 10, and further goals would be lost."""
+"""Maximum number of goals sent but not yet accepted. A server's queue holds 10; further goals would be lost."""
 MAX_GOALS = 1_000
 """Maximum number of stored goals, including recently ended ones; further goals are rejected."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
@@ -63,7 +63,7 @@ class _Goal:
         self.ended_at = 0.0
 
     def step(self, event: GoalEvent, text: str = "") -> None:
-        """Apply an event to the goal's state. Ignore an event that the state does not allow."""
+        """Apply an event to the goal's state; ignore an event that the state does not allow."""
         state = SERVER_STEPS[event].get(self.status.state)
         if state is not None:
             self.status = Status(self.status.goal, int(state), text)
@@ -206,7 +206,7 @@ class GoalsToRos2:
             self._result.publish_raw(status_and_body(*self._now(), goal.status, body))
 
     async def _become_ready(self) -> None:
-        """Wait for the server, which may not be connected yet if the action has just been discovered."""
+        """Wait for the server: an action that was just discovered may not be connected yet."""
         end = self._loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready and self._loop.time() < end and not self._ended.is_set():
             await asyncio.sleep(0.02)
@@ -237,12 +237,12 @@ class GoalsToRos2:
         except DeserializationError as error:
             self._misfits.error("feedback of action %s: %s", self._link.action, error)
         except ROSException:
-            return  # the action was closed meanwhile
+            return  # the action was closed in the meantime
 
     async def _publish_statuses(self) -> None:
-        """Publish the statuses of all goals after each change and at regular intervals."""
+        """Publish the statuses of all goals, after each change and at regular intervals."""
         await self._status
-        # Check the flag, because wait_for in Python 3.11 may swallow a cancellation.
+        # Check the flag: in Python 3.11, wait_for may swallow a cancellation.
         while not self._ended.is_set():
             self._changed.clear()
             limit = self._loop.time() - _KEPT_SECONDS

@@ -49,16 +49,16 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
-"""Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain returns it."""
+"""Connection header field that marks publishers of data from ROS 2, so that no bridge to the same domain sends it back."""
 _MIN_REFRESH_INTERVAL = 0.25
 QUERY_SECONDS = 3.0
-"""Timeout in seconds, after which topics are bridged even if publishers have not responded."""
+"""Seconds to wait for publishers' responses; after that, topics are bridged without them."""
 JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
 _ROS1_QUEUE = 1000
-"""Queue size in messages, enough to survive a pause on a busy machine, except for images."""
+"""Queue size in messages, except for images; long enough for a pause on a busy machine."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Ros2Bridge:
         return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
-        """Wait until ``condition()`` is truthy after a refresh."""
+        """Wait until ``condition()`` is true after a refresh."""
         while not condition():
             await self._changed.wait()
 
@@ -204,8 +204,7 @@ class Ros2Bridge:
     async def _watch(self) -> None:
         pause = _MIN_REFRESH_INTERVAL
         is_reported = False
-        # Check the flag, because wait_for in Python 3.11, used by the methods called here, may swallow a
-        # cancellation.
+        # Check the flag: in Python 3.11, wait_for, which these methods call, may swallow a cancellation.
         while not self._is_closed:
             await asyncio.sleep(pause)
             changed = False
@@ -238,7 +237,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """Query the definitions, and latching, of new ROS 1 publishers on topics with ROS 2 subscribers."""
+        """Query new ROS 1 publishers on topics with ROS 2 subscribers for their definitions and whether they latch."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()
@@ -326,7 +325,7 @@ class PassingToRos2(TopicPassing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait until the existing subscribers are connected; they would miss messages published before that."""
+        """Wait until the existing subscribers are connected; they would miss messages published earlier."""
         loop = asyncio.get_running_loop()
         end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
@@ -379,12 +378,12 @@ class _ToRos1(TopicPassing):
     def _deliver(self, data: bytes) -> None:
         """Pass a message to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets itself."""
         if data[2:4] == self._bridge.header[2:4]:
-            return  # the message was sent by another bridge to the same ROS 1 graph
+            return  # another bridge to the same ROS 1 graph has sent the message
         try:
             self._publisher.publish_raw(bytes(self._with_statics(self._made.to_ros1(data))))
         except DeserializationError as error:
             self._report(error)
         except ROSException:
-            return  # the link was closed meanwhile
+            return  # the link was closed in the meantime
         else:
             self.passed += 1

@@ -112,7 +112,7 @@ _ADDED: dict[tuple[str, str], Fields] = {
     },
     ("visualization_msgs/Marker", "mesh_resource"): {"mesh_file": "visualization_msgs/MeshFile"},
 }
-"""The fields that ROS 2 adds, keyed by message type and the ROS 1 field that precedes them."""
+"""The fields that ROS 2 adds, keyed by message type and by the ROS 1 field after which they follow."""
 _ADDED_AFTER_HUMBLE = {("sensor_msgs/Range", "range")}
 _BOUNDED = {("shape_msgs/SolidPrimitive", "dimensions"): "sequence<double, 3>"}
 _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Duration"}
@@ -238,7 +238,7 @@ class Definitions:
 
     def _fields(self, spec: MessageSpec, ros1: str, name: str, is_humble: bool) -> Fields:
         rule = self._rules.message(ros1)
-        # In newer ROS 1 definitions, BatteryState also has the temperature, so add it only if it is missing.
+        # Newer ROS 1 definitions of BatteryState have the temperature, too, so add it only if it is missing.
         has = {field.name for field in spec.fields}
         found: dict[str, str] = {}
         for field in spec.fields:

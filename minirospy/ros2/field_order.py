@@ -16,7 +16,7 @@ from minirospy.base.errors import DeserializationError
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 
 _COUNT = struct.Struct("<I")
-# number of zero-size elements allowed beyond one element per message byte, as in core/idl/cdr.py
+# number of zero-size elements allowed in addition to one per byte of the message, as in core/idl/cdr.py
 _SPARE = 10_000
 
 
@@ -42,7 +42,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Reordered:
-    """A message whose fields are reordered: the fields in input order, and their indices in output order."""
+    """A message whose fields are reordered: the fields in the input's order, and their indices in the output's order."""
 
     fields: tuple[Node, ...]
     order: tuple[int, ...]
@@ -69,7 +69,7 @@ def reorder(node: Node, data: bytes | memoryview) -> bytes:
         end = _write(node, view, 0, parts)
     except struct.error as error:
         raise DeserializationError("the message ends too early") from error
-    parts.append(view[end:])  # keep trailing data, which the conversion then rejects
+    parts.append(view[end:])  # keep trailing data, which the conversion will reject
     return b"".join(parts)
 
 

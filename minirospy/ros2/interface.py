@@ -50,14 +50,14 @@ class Ros2Handle(Protocol):
 
 
 class Ros2Probe(Protocol):
-    """Probes a client's servers with no-op requests. Methods may be called from any thread."""
+    """Probes a client's servers with requests that have no effect. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request and return a future for its response. After that response, no response to the client is lost."""
+        """Send a request and return a future for its response. Once that has arrived, no response to the client is lost."""
 
     def close(self) -> None: ...
 
@@ -71,10 +71,10 @@ class Reachable(Protocol):
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers, or None if no response can be lost."""
+        """Return the ids of the existing servers, or None if responses cannot be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers, or None if no no-op request exists for them."""
+        """Return a probe of the servers, or None if there is no request without effect for them."""
 
 
 class Ros2Client(Reachable, Protocol):
@@ -119,7 +119,7 @@ class GoalOfRos1(Protocol):
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
-"""Takes a goal and a function for its feedback; returns a future for the accepted goal, or for None if the goal is rejected."""
+"""Takes a goal and a function for its feedback. Returns a future for the accepted goal, or for None if the goal is rejected."""
 
 
 class Ros2Parameters(Protocol):
@@ -167,7 +167,7 @@ class Ros2Side(Protocol):
         """Return the names and namespaces of all nodes except for bridges."""
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of nodes other than this bridge, and their types."""
+        """Return the services of all nodes except this bridge, with their types."""
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""

@@ -139,7 +139,7 @@ class _Pairing:
         for skipped in ros2.fields[place:]:
             items += self._alone(skipped.type, Side.ROS2, around)
         if not ros2.fields:
-            # CDR has no empty structs, so rosidl adds a member.
+            # CDR has no empty structs, so rosidl adds a member to them.
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)
@@ -243,7 +243,7 @@ def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
 
 
 def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
-    """Return ROS 1's fields, with an inlined field replaced by the fields it contains."""
+    """Return ROS 1's fields, replacing an inlined field with the fields it contains."""
     found: list[Field] = []
     for each in spec.fields:
         if each.name != rule.inlined:
@@ -256,7 +256,7 @@ def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, 
 
 
 def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
-    """Return the indices of ROS 1's fields in ROS 2's order. A field missing in ROS 2 stays after its predecessor."""
+    """Return the indices of ROS 1's fields in ROS 2's order. A field that ROS 2 lacks stays after its predecessor."""
     places = {each.name: number for number, each in enumerate(ros2.fields)}
     keys = []
     place = -1
@@ -276,7 +276,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Map ROS 1 fields to their ROS 2 counterparts. Raise TypesDiffer if a required counterpart is missing."""
+    """Return a dict from ROS 1 fields to their ROS 2 counterparts. Raise TypesDiffer if a required one is missing."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}
@@ -318,7 +318,7 @@ _LEVELS_OF_ROS1 = {level: ros1 for ros1, level in _LEVELS_OF_ROS2.items()}
 
 
 def _with_levels(made: Transcoder) -> Transcoder:
-    """Return conversion functions that also map the log level, because ROS 1's levels are bits."""
+    """Return conversion functions that also map the log level, which in ROS 1 is a bit mask."""
 
     def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
         found = bytearray(made.to_cdr(data, header))

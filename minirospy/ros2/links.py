@@ -16,7 +16,7 @@ __all__ = [
 ]  # fmt: skip
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
-"""Prefix of the node names of all bridges, on both sides. Bridges' endpoints are ignored."""
+"""Prefix of all bridges' node names, on both sides. Endpoints of bridges are ignored."""
 
 
 def parse_domain(text: str) -> str:
@@ -27,7 +27,7 @@ def parse_domain(text: str) -> str:
 
 
 class Direction(Enum):
-    """The direction that messages are sent in."""
+    """The direction in which messages are sent."""
 
     TO_ROS2 = "1 -> 2"
     TO_ROS1 = "2 -> 1"
@@ -73,7 +73,7 @@ class Link:
 
 
 def is_bridge(node: str) -> bool:
-    """Return whether a node is a bridge, by its name on either side."""
+    """Return whether a node is a bridge, according to its name on either side."""
     return node.rpartition("/")[2].startswith(BRIDGE_PREFIX)
 
 
@@ -97,8 +97,7 @@ def links(
         readers = [end for end in ros2[topic].subscribers if not is_bridge(end.node)]
 
         if publishers and readers and type_ is not None:
-            # A subscriber with transient local durability receives messages only from a publisher with the same
-            # durability.
+            # A subscriber with transient local durability only receives messages from publishers that have it, too.
             keeps = any(end.is_transient_local for end in readers)
             latched = keeps or any(is_latched(topic, node) for node in publishers)
             found.append(Link(topic, Direction.TO_ROS2, type_, _type_of(readers, type_), latched))
@@ -110,7 +109,7 @@ def links(
                     type_ or ros1_type(_type_of(writers, "")),
                     _type_of(writers, type_ or ""),
                     all(end.is_transient_local for end in writers),
-                    # A reliable subscription receives no messages from a best-effort publisher.
+                    # A reliable subscription receives nothing from a best-effort publisher.
                     all(end.is_reliable for end in writers),
                 )
             )

@@ -125,7 +125,7 @@ def _checked(value: object) -> object:
 
 
 def listed(names: Sequence[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
-    """Return the names and prefixes that a list request selects, up to ``depth`` levels below a prefix (0: all)."""
+    """Return the names and prefixes selected by a list request, up to ``depth`` levels below a prefix (0: no limit)."""
     found = []
     for name in names:
         rests = [name] if not prefixes else []

@@ -157,7 +157,7 @@ class ParameterBridge:
         found: list[str] = []
         for name, namespace in self._side.nodes():
             node = f"{namespace.rstrip('/')}/{name}"
-            # The node has no parameter services, or has just exited.
+            # The node has no parameter services or has just exited.
             with contextlib.suppress(BridgeError):
                 names = await self._waited(functools.partial(self._side.node_parameters().names, node))
                 found += [f"{node}:{each}" for each in names]
@@ -181,7 +181,7 @@ def _text(text: str) -> bytes:
 
 
 def _two(texts: list[str]) -> list[str]:
-    """Return a request's two strings. Raise ValueError if the request has fewer."""
+    """Return the two strings of a request. Raise ValueError if the request has fewer."""
     if len(texts) < 2:
         raise ValueError("the request ends too early")
     return texts

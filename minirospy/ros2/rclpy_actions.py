@@ -136,8 +136,8 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Create the feedback subscription before the client, so that a server that has discovered the client's last
-        # endpoint has also discovered this one.
+        # Create the feedback subscription before the client.
+        # A server that has discovered the client's last endpoint has then discovered the subscription, too.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -217,7 +217,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as rejected in ROS 1, so cancel it.
+                # The caller no longer waits, and in ROS 1 the goal counts as rejected, so cancel it.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -230,14 +230,14 @@ class ActionClient:
             _fail(accepted, error)
 
     def _read_feedback(self) -> None:
-        """Deliver the queued feedback that was sent before the result."""
+        """Deliver the queued feedback, which was sent before the result."""
         handle = self._feedback.handle
         with handle:
             while taken := handle.take_message(self._feedback_class, True):
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The goal's id has 16 bytes, so removing it does not change the alignment of the remaining data.
+        # The goal's id has 16 bytes, so removing it keeps the alignment of the data that follows.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
@@ -319,8 +319,8 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # rclpy's constructor adds the server to the executor, which may call it with a goal, before it creates the
-        # logger.
+        # rclpy's constructor adds the server to the executor before it creates the logger.
+        # In between, the executor may call the server with a goal.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,
@@ -345,13 +345,13 @@ class ActionServer:
         self._calls.end(self._server.destroy)
 
     def _wait_until_sent(self, sent: threading.Event) -> None:
-        """Set the event in the executor's first iteration without pending responses."""
+        """Set the event in the executor's first iteration without responses to send."""
         if self._is_closed:
             return
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # rclpy may complete the response in a task that runs after the bridge's own code.
+            # rclpy may finish the response in a task that runs after the bridge's own code.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:
@@ -370,7 +370,7 @@ class ActionServer:
             accepted = None
         if accepted is None:
             return self._module.GoalResponse.REJECT
-        # Store the goal under its id(): the goal's handle will refer to this object later.
+        # Store the goal under its id(), because the goal's handle will later refer to this object.
         self._goals[id(goal)] = (goal, accepted, feedback)
         return self._module.GoalResponse.ACCEPT
 
@@ -395,7 +395,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # ROS 1 has preempted the goal in favour of another goal, and ROS 2 has no status for that.
+            # ROS 1 has preempted the goal in favour of another one; ROS 2 has no status for that.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

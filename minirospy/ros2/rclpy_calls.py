@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 _REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
-"""Names of response fields that may contain the reason why a call failed."""
+"""Names of response fields that may contain the reason for a failure."""
 
 _DEPTH = 1000  # maximum number of requests or responses queued for the bridge
 
@@ -80,7 +80,7 @@ class RclpyFuture(Protocol):
 
 
 class RclpyHandle(Protocol):
-    """The interface of an rclpy subscription's handle. The handle must be entered as a context manager before use."""
+    """The interface of an rclpy subscription's handle. Enter the handle as a context manager before using it."""
 
     def __enter__(self) -> object: ...
 
@@ -172,13 +172,13 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
-        # In rmw_zenoh, a response takes the same route as its request, so no response is lost.
+        # In rmw_zenoh, a response takes the same route as its request, so responses are not lost.
         rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
         self._loses_responses = not rmw.startswith("rmw_zenoh")
-        # Reentrant, so that a request that is waiting for its response does not block other requests.
+        # Reentrant: a request that waits for its response must not block other requests.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
-            # This is the default QoS for services, but with a longer queue.
+            # The default QoS for services, but with a longer queue.
             "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
         }
 
@@ -204,8 +204,7 @@ class Calls:
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
-            # If another process has a node with the same name, its response would not prove that this node has been
-            # reached.
+            # If another process has a node of the same name, its response would not prove that this node has been reached.
             if {_process(each) for each in self._writers(name)} != {_process(server)}:
                 return None
             names.add(name)
@@ -219,7 +218,7 @@ class Calls:
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy an object in the executor's thread, because that thread may be about to wait on it.
+        """Destroy an object in the executor's thread, which may be about to wait on the object.
 
         May be called from any thread. rclpy's executor fails if an object is destroyed while the executor builds its wait set.
         """
@@ -274,7 +273,7 @@ class Client:
     def call(self, request: bytes) -> Future[bytes]:
         """Send a request and return a future for the response, both as CDR. May be called from any thread."""
         answered: Future[bytes] = Future()
-        # Send in the executor's thread, so that no response arrives before its request is recorded.
+        # Send in the executor's thread, so that the request is recorded before its response can arrive.
         self._calls.executor.create_task(self._send, request, answered)
         return answered
 
@@ -313,7 +312,7 @@ class Client:
 
 
 class ParameterProbe:
-    """Probes nodes through their parameter services, by requesting no parameters, which has no effect."""
+    """Probes nodes through their parameter services by requesting no parameters, which has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients
@@ -387,7 +386,7 @@ class Server:
         fields = response.get_fields_and_field_types()
         text = next((name for name in _REASONS if fields.get(name) == "string"), "")
         if fields.get("success") != "boolean" or not text:
-            # Send nothing, because a response of zeros would look like a valid response.
+            # Send nothing: a response of zeros would look like a valid one.
             raise NotAnsweredError
         setattr(response, text, reason)
         return response

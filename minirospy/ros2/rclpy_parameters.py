@@ -169,8 +169,7 @@ class NodeParameters:
             request = type_.Request()
             empty = self._calls.serialize(request)
             try:
-                # Repeat the request, because responses are lost until the node has discovered the client (see
-                # reach.py).
+                # Repeat the request: responses are lost until the node has discovered the client (see reach.py).
                 data = _first(lambda: client.call(empty), end)
                 if fields:
                     for name, value in fields.items():

@@ -1,4 +1,4 @@
-"""Waits until ROS 2 servers have discovered the bridge's client; until then, responses may be lost. Runs on the node's loop.
+"""Waits until ROS 2 servers have discovered the bridge's client. Responses may be lost before that. Runs on the node's loop.
 
 A client may discover a server before the server discovers the client's endpoints. Until it does, rmw_fastrtps and
 rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified of its discovery, but a response
@@ -24,7 +24,7 @@ _LOOK_SECONDS = 0.02
 AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
 MAX_SECONDS = 10.0
-"""Maximum seconds to wait. After that, requests are sent even if a busy server has not responded."""
+"""Maximum seconds to wait. After that, requests are sent even if a busy server has not responded to a probe."""
 
 
 class Reach:
@@ -45,7 +45,7 @@ class Reach:
             self._reaching = asyncio.ensure_future(self._reach())
 
     async def wait(self, seconds: float = math.inf) -> None:
-        """Wait until responses from the current servers can arrive, or for ``seconds``.
+        """Wait until the current servers can send responses, for at most ``seconds``.
 
         Wait for ten seconds at most, so that unresponsive servers do not delay every request.
         """
@@ -53,7 +53,7 @@ class Reach:
         if servers is None or (self._reached is not None and servers <= self._reached):
             return
         self.start()
-        # Do not block queued calls while their link is being closed.
+        # Do not hold up queued calls while their link is being closed.
         if self._is_closed or self._reaching is None:
             return
         seconds = min(seconds, MAX_SECONDS)
@@ -79,7 +79,7 @@ class Reach:
                 return
 
     async def _has_reached(self, servers: frozenset[bytes]) -> bool:
-        """Wait until the servers have responded to a probe, if they can be probed.
+        """Wait until the servers respond to a probe; do nothing if they do not support probing.
 
         Return False if a server disappears first.
         """
@@ -99,14 +99,14 @@ class Reach:
             probe = self._client.probe()
             if probe:
                 return probe
-            # A server's node may become known later than the server, so try again.
+            # A server's node may become known after the server, so try again.
             await asyncio.sleep(_LOOK_SECONDS)
         return None
 
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = AGAIN_SECONDS
-    # Stop if a server's node has exited, because the node's services will never become ready again.
+    # Stop if a server's node has exited: its services will never become ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)

@@ -51,7 +51,7 @@ class Rules:
     actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
-        """Return the rule for a message type, or an empty rule if no rule exists."""
+        """Return the rule for a message type, or an empty one if there is none."""
         return self.messages.get(ros1_type, _NO_RULE)
 
     def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ BUILT_IN = Rules(
             ),
             "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
             "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
-            # Fields added by ROS 2. They are empty in messages from ROS 1, and dropped in messages to ROS 1.
+            # Fields added by ROS 2. They are empty in messages from ROS 1, and are dropped from messages to ROS 1.
             "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
             "sensor_msgs/Range": _only(ros2=("variance",)),
             "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),
@@ -165,7 +165,7 @@ _KEYS = {
 
 
 def parse_rules(text: str, where: str) -> Rules:
-    """Parse a file of rules. Raise BridgeError, with the error and the rule's number, if a rule is invalid."""
+    """Parse a file of rules. If a rule is invalid, raise BridgeError with the error and the rule's number."""
     try:
         loaded = safe_load(text)
     except yaml.YAMLError as error:

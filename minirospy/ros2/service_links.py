@@ -11,7 +11,7 @@ __all__ = ["ServiceLink", "is_bridged_type", "service_links"]
 
 _OF_EVERY_NODE = {"roscpp/GetLoggers", "roscpp/SetLoggerLevel"}
 _PACKAGES_OF_EVERY_NODE = {"rcl_interfaces", "type_description_interfaces"}
-"""Packages of services that every ROS 2 node provides for ROS 2's tools. They are not offered in ROS 1."""
+"""Packages of services that every ROS 2 node provides for ROS 2's tools. These are not offered in ROS 1."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class ServiceLink:
 
 
 def is_bridged_type(type_: str) -> bool:
-    """Return whether services of a type (``pkg/Name``, on either side) are meant for nodes, not for tools."""
+    """Return whether services of a type (``pkg/Name``, on either side) are for nodes rather than for tools."""
     return type_ not in _OF_EVERY_NODE and type_.partition("/")[0] not in _PACKAGES_OF_EVERY_NODE
 
 
 def is_hidden(name: str) -> bool:
-    """Return whether a ROS 2 name is hidden: one of its parts starts with an underscore, as in actions' services."""
+    """Return whether a ROS 2 name is hidden: a part starts with an underscore, as in the services of actions."""
     return "/_" in name
 
 

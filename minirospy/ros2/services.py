@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
 QUERY_SECONDS = 1.0
-"""Timeout in seconds, after which only services with known types are bridged."""
+"""Seconds to wait for types; after that, only the services with known types are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
 """Maximum number of concurrent calls from a ROS 2 service to ROS 1; further calls fail with an error."""
 _MAX_UNDER_WAY = 8
-"""Maximum number of concurrent requests to a ROS 2 server. Its queue holds 10, and further requests would be lost."""
+"""Maximum number of concurrent requests to a ROS 2 server. Its queue holds 10; further requests would be lost."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class ServiceBridge:
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Query a server's connection header, because the ROS 1 master does not know service types."""
+        """Query a server for its connection header, because the ROS 1 master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # Make running calls fail with an error.
+        # Make the running calls fail with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -262,7 +262,10 @@ class _InRos1:
         return answered.result()
 
     async def _becomes_ready(self) -> bool:
-        """Wait for the server; return whether it is connected. If the service was just discovered, this may take a moment."""
+        """Wait for the server; return whether it is connected.
+
+        This may take a moment for a service that was just discovered.
+        """
         loop = asyncio.get_running_loop()
         end = loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready:
@@ -319,7 +322,7 @@ class _InRos2:
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
-        """Forward a request. Set the response or error in ``answered``, a future that belongs to another thread."""
+        """Forward a request. Put the response or error into ``answered``, a future that belongs to another thread."""
         try:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:

@@ -39,7 +39,7 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Maximum number of messages read per executor callback, because a callback costs more than reading a message."""
+"""Maximum number of messages to read per executor callback; a callback costs more than reading a message."""
 
 
 # --- the parts of rclpy used here (untyped, because rclpy may not be installed)
@@ -174,7 +174,7 @@ class RclpySide:
         return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a reliable publisher, which is compatible with every subscriber.
+        """Return a reliable publisher; such a publisher is compatible with every subscriber.
 
         Raise TypesDiffer if the type is not installed.
         """
@@ -205,8 +205,8 @@ class RclpySide:
         return [(str(name), str(space)) for name, space in found if not name.startswith(BRIDGE_PREFIX)]
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of nodes other than this bridge, and their types."""
-        # The list also contains services that have clients but no server.
+        """Return the services of all nodes except this bridge, with their types."""
+        # The list also contains services that have only clients.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
             own = tuple(self._served)
@@ -215,7 +215,7 @@ class RclpySide:
                 for name, type_ in named.items()
                 if self._node.count_services(name) > own.count(name)
             }
-        # Before ROS 2 Jazzy, each node must be queried.
+        # Before ROS 2 Jazzy, every node must be queried.
         offered: dict[str, str] = {}
         for name, namespace in self.nodes():
             # The node has just exited.
@@ -288,7 +288,7 @@ class RclpySide:
             except NotAnsweredError:
                 continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
-                # Only this callback failed: continue with the other callbacks.
+                # Only this callback has failed, so go on with the others.
                 _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
@@ -386,7 +386,7 @@ class TopicSubscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message and those queued after it: the executor itself delivers one message at a time, slowly."""
+        """Deliver a message and those queued behind it; the executor would deliver one per iteration, which is slow."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:
@@ -405,7 +405,7 @@ class TopicSubscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
-    # Check the name, because it comes from a remote node, and importing an arbitrary module would execute it.
+    # Check the name: it comes from a remote node, and importing an arbitrary module would execute it.
     if not (_PACKAGE.fullmatch(package) and _NAME.fullmatch(name) and _is_interface_package(package)):
         return None
     try:

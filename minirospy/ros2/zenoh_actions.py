@@ -42,7 +42,7 @@ _ACCEPTED, _EXECUTING, _CANCELING = 1, 2, 3
 """Statuses of a goal that has not ended, from action_msgs/GoalStatus; 0 means unknown."""
 _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
 """Error codes from action_msgs/srv/CancelGoal."""
-_KEPT_SECONDS = 60.0  # seconds to store a goal's result after the goal has ended
+_KEPT_SECONDS = 60.0  # seconds for which to store a goal's result after the goal has ended
 _MAX_GOALS = 2_000
 CLOSE_SECONDS = 1.0
 
@@ -192,7 +192,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as rejected in ROS 1, so cancel it.
+                # The caller no longer waits, and in ROS 1 the goal counts as rejected, so cancel it.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -265,7 +265,7 @@ class _Goal:
 
 
 class ZenohActionServer:
-    """An action that the bridge offers in ROS 2. Runs in a single thread, so that all messages are sent in order."""
+    """An action that the bridge offers in ROS 2. Runs in a single thread, so that messages are sent in order."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType, accept: Accept) -> None:
         self._name = ends.send_goal.name.removesuffix("/_action/send_goal")
@@ -287,8 +287,7 @@ class ZenohActionServer:
     def close(self) -> None:
         """Close the action after sending known results. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The first call may submit responses for goals that have just ended; the second call waits for these
-            # responses.
+            # The first call may submit responses for goals that have just ended; the second one waits for these.
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
         for server in self._servers:
@@ -334,7 +333,7 @@ class ZenohActionServer:
             answered.set_result(self._decision(None))
             return
         goal.stamp, goal.status = time.time_ns(), _ACCEPTED
-        # The response is sent before any message that is submitted later.
+        # The response is sent before any message submitted later.
         answered.set_result(self._decision(goal))
         self._submit(lambda: self._start(goal))
         goal.there.ended.add_done_callback(lambda end: self._submit(lambda: self._end(goal, end)))
@@ -364,7 +363,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # ROS 1 has preempted the goal in favour of another goal, and ROS 2 has no status for that.
+            # ROS 1 has preempted the goal in favour of another one; ROS 2 has no status for that.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

@@ -31,7 +31,7 @@ __all__ = ["MAX_UNDER_WAY", "ZenohClient", "ZenohServer"]
 _log = logging.getLogger(__name__)
 
 MAX_BYTES = 64 << 20
-# maximum number of requests to a service that await a response, or whose response has not been written
+# maximum number of requests to a service that await a response or whose response has not been written
 MAX_UNDER_WAY = 200
 _MAX_OF_ACTION = 2_000
 """Maximum number of pending requests to an action.
@@ -39,8 +39,8 @@ _MAX_OF_ACTION = 2_000
 This limit exceeds the number of goals, because a request for a result waits until its goal has ended.
 """
 _MAX_SECONDS = 10_000_000
-"""Timeout in seconds; practically unlimited, because the bridge has its own timeouts and long goals must not time out in
-Zenoh.
+"""Timeout in seconds; practically unlimited, because the bridge has timeouts of its own, and Zenoh must not time out long
+goals.
 """
 
 
@@ -50,8 +50,7 @@ class ZenohClient:
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
-        # Send requests in a thread: on a slow network, sending blocks for seconds, which must not block the event
-        # loop.
+        # Send requests in a thread: on a slow network, sending may block for seconds, which would block the event loop.
         self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 
@@ -143,7 +142,7 @@ class ZenohServer:
         self._under_way = 0
         self._lock = threading.Lock()
         self._most = MAX_UNDER_WAY if thread is None else _MAX_OF_ACTION
-        # Send replies in a thread, because sending may block on a slow network.
+        # Send replies in a thread: sending may block on a slow network.
         self._replies = thread or concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
         self._own = None if thread else self._replies
         handler = node.handler(self._arrived)
@@ -193,7 +192,7 @@ class ZenohServer:
         answered.add_done_callback(finished)
 
     def _finish(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
-        # Count a response until it is written, because responses that wait for a slow network use memory.
+        # Count a response until it has been written: responses that wait for a slow network use memory.
         try:
             self._reply(query, back, answered)
         finally:
@@ -206,11 +205,10 @@ class ZenohServer:
             reason = " ".join(str(error).split())
             _log.error("service [%s] of ROS 1: %s", self._end.name, reason)
             if self._response != ["bool", "string"]:
-                # Send an error, because a response of zeros would look like a valid response.
+                # Send an error: a response of zeros would look like a valid one.
                 self._refuse(query, reason)
                 return
-            # The response consists of a bool and a string, as for SetBool and Trigger: send success as false, then
-            # the reason.
+            # The response is a bool and a string, as for SetBool and Trigger: send false for success, then the reason.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

@@ -53,7 +53,7 @@ class Qos:
     depth: int = 10
 
     def __str__(self) -> str:
-        """Return the QoS as written in a token, which lists only the differences from rmw_zenoh's default."""
+        """Return the QoS in a token's format, which lists only the differences from rmw_zenoh's default."""
         depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
         return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
 
@@ -125,7 +125,7 @@ def parse_token(key: str) -> Entity | None:
     head = (domain, session, int(id), Kind(kind), node, namespace.replace("%", "/"))
     if kind == Kind.NODE.value:
         return Entity(*head)
-    # Ignore further parts, which newer versions may append.
+    # Ignore additional parts, which newer versions may append.
     if len(rest) < 4:
         return None
     name, found, qos = rest[0].replace("%", "/"), _DDS_NAME.fullmatch(rest[1]), _parse_qos(rest[3])
@@ -159,7 +159,7 @@ def gid_of(token: str) -> bytes:
 
 def xxh3_128(data: bytes) -> bytes:
     """Return the 128-bit XXH3 hash in rmw_zenoh's byte order, little-endian."""
-    # The extra `fleet` installs xxhash; without it, the rest of this module works.
+    # The extra `fleet` installs xxhash. The rest of this module works without it.
     import xxhash
 
     return xxhash.xxh3_128_intdigest(data).to_bytes(16, "little")
@@ -181,7 +181,7 @@ def reply_attachment(data: bytes, time: int) -> bytes:
 
     Raise ValueError if ``data`` is invalid.
     """
-    # Other versions of rmw_zenoh may send the id without its length; return the attachment in the same format.
+    # Other versions of rmw_zenoh may send the id without its length; reply in the format of the request.
     if len(data) not in (_ATTACHMENT.size, _ATTACHMENT.size - 1):
         raise ValueError("this is not an attachment of rmw_zenoh")
     return data[: _TIME.start] + struct.pack("<q", time) + data[_TIME.stop :]

@@ -117,17 +117,17 @@ class ZenohNode:
         if self._is_closed:
             return
         self._is_closed = True
-        # If the link is broken, undeclaring fails, but the peer detects the loss itself.
+        # Undeclaring fails on a broken link, but the peer detects the loss by itself.
         with contextlib.suppress(self.zenoh.ZError):
             self.session.close()
 
     def handler(self, function: Callable[..., object], ended: Callable[[], object] | None = None) -> object:
-        """Return a handler that Zenoh calls in its own thread. By default, Zenoh starts a thread for each handler."""
+        """Return a handler that Zenoh calls in its own thread; otherwise Zenoh would start a thread per handler."""
         return self.zenoh.handlers.Callback(function, ended, indirect=False)
 
     def _opened(self, options: NetworkOptions) -> Session:
         config = configured(options)
-        # Enable time stamps: messages stored for late subscribers need them.
+        # Enable time stamps, which the messages stored for late subscribers need.
         config.insert_json5("timestamping/enabled", "true")
         try:
             session: Session = self.zenoh.open(config)

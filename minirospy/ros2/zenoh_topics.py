@@ -32,24 +32,23 @@ class ZenohPublisher(Handle):
 
     @property
     def subscribers(self) -> int:
-        """Return the number of subscribers, or 0 until subscribers in other sessions are connected."""
+        """Return the number of subscribers; it is 0 until subscribers in other sessions are connected."""
         found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
         count = len([each for each in found if each.key == self._end.key])
-        # A transient local publisher stores its messages, so none is lost.
+        # A transient local publisher stores its messages, so none of them is lost.
         is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
         return count if is_ready else 0
 
     def publish(self, data: bytes) -> None:
         """Send a message; drop it if the network is too slow."""
-        # The session may have been closed.
+        # The session may already be closed.
         with contextlib.suppress(self._fault):
             self._outlet.put(data, attachment=self.attachment())
 
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
-    # Count only remote subscribers, because the bridge's own subscription to the topic ignores this session's
-    # messages.
+    # Count only remote subscribers: the bridge's own subscription to the topic ignores this session's messages.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)
@@ -78,7 +77,7 @@ def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) ->
             _log.exception("a message of ROS 2 could not be passed on")
 
     handler = node.handler(arrived)
-    # Do not receive the bridge's own messages.
+    # Do not receive messages from the bridge itself.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         declared = node.session.declare_subscriber(end.key, handler, allowed_origin=remote)

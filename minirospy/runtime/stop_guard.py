@@ -1,4 +1,4 @@
-"""A thread that stops actuators when commands for them stop arriving; a blocked event loop does not delay it.
+"""A thread that stops actuators when their commands stop arriving, even if the event loop is blocked.
 
 A call that holds Python's global interpreter lock (GIL) does delay the thread, so the servers limit the input of one call.
 """
@@ -17,7 +17,9 @@ __all__ = ["StopGuard"]
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-"""A function that stops an actuator. It is called in the guard's thread, and must check whether a command has arrived since."""
+"""A function that stops an actuator. It runs in the guard's thread, and must check whether a command has arrived in the
+meantime.
+"""
 
 
 class StopGuard:
@@ -30,7 +32,7 @@ class StopGuard:
         self.deadlines: dict[Stop, float] = {}
         self.thread: threading.Thread | None = None
         self._next = 0.0
-        # The deadline that the thread is waiting for.
+        # The deadline for which the thread is waiting.
 
     def arm(self, stop: Stop, deadline: float) -> None:
         """Call ``stop`` at ``deadline``, in seconds of the clock. This replaces the previous deadline of ``stop``.
@@ -66,7 +68,7 @@ class StopGuard:
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until deadlines have passed; return their functions, or [] if there are no deadlines."""
+        """Wait until any deadlines have passed; return their functions, or [] if there are no deadlines."""
         with self._changed:
             while self.deadlines:
                 now = self._clock()

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from minirospy.base.errors import BridgeError
 
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 TOKEN_PROTOCOL = "minirospy.token."
-"""Prefix of a sub-protocol that carries a token, because a page cannot set a WebSocket's headers."""
+"""Prefix of a sub-protocol that carries a token: a page cannot set a WebSocket's headers, but it can choose sub-protocols."""
 
 DESKTOP_ORIGINS = ("file://", "lichtblick://*", "foxglove://*", "app://*", "vscode-webview://*")
 APP_ORIGINS = (
@@ -40,7 +40,7 @@ APP_ORIGINS = (
     "https://studio.foxglove.dev",
     "https://lichtblick-suite.github.io",
 )
-"""Origins of the front ends' pages; browsers send these origins only for those pages."""
+"""Origins of the front ends' pages. A browser sends these origins only for those pages."""
 
 _LOCAL_NAMES = ("localhost",)
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{8,200}")
@@ -63,7 +63,7 @@ class Refusal(NamedTuple):
 
 
 class Credentials(NamedTuple):
-    """The parts of a request that identify its sender: Host, Origin and Authorization headers, sub-protocols, and path."""
+    """The parts of a request that identify its sender: Host, Origin and Authorization headers, sub-protocols and path."""
 
     host: str
     origin: str | None
@@ -187,13 +187,8 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def without_token(target: str) -> str:
-    """Return a request's path without the query, which may contain a token, for use in logs."""
-    return unquote(urlsplit(target).path)[:200]
-
-
 def header_items(headers: Mapping[str, str], name: str) -> list[str]:
-    """Return the items in a header whose value is a list."""
+    """Return the items of a header whose value is a comma-separated list."""
     return [item.strip() for item in headers.get(name, "").split(",") if item.strip()]
 
 

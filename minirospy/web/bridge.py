@@ -151,7 +151,10 @@ class Bridge:
         tls: ssl.SSLContext | None,
         public: Mapping[str, HttpHandler],
     ) -> Listener:
-        """Return a protocol's listener. Raise BridgeError if the port is in use, unless ``retry_delay`` is set."""
+        """Create a protocol's listener and return it.
+
+        Raise BridgeError if the port is in use, unless ``retry_delay`` is set.
+        """
         listener = Listener(
             endpoints,
             self.options.access,
@@ -258,7 +261,7 @@ class Bridge:
         exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")
 
     async def _report(self) -> None:
-        """Publish the clients' status as diagnostics, every second while there are clients."""
+        """Publish the clients' status as diagnostics, once a second while any client is connected."""
         from diagnostic_msgs.msg import DiagnosticArray
 
         publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)

@@ -40,7 +40,7 @@ Above this limit, only the newest message per topic is queued.
 """
 
 _QUERY_SECONDS = 2.0
-"""Timeout in seconds, after which the graph is reported without the service types that are still unknown."""
+"""Seconds to wait for service types; after that, report the graph without the types that are still unknown."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,7 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # Dict from the id of a publisher's connection header, which is a single object per connection, to its last
-        # message.
+        # The last message of each publisher, keyed by the id of its connection header, which is one object per connection.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
 
@@ -94,7 +93,7 @@ class SharedTopic:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # If the topic is being unsubscribed, its connections still exist and do not deliver latched messages again.
+        # If the topic is being unsubscribed, its connections are still open and do not deliver the latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -140,7 +139,7 @@ class Publication:
 
     @property
     def has_joined(self) -> bool:
-        """Return whether the subscribers that the master listed when the topic was advertised are all connected."""
+        """Return whether all subscribers that the master listed at registration have connected."""
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
@@ -239,7 +238,7 @@ class SharedGraph:
         )
 
     def now(self) -> int:
-        """Return the time for messages in nanoseconds: the time from ``clock`` if it is set, else the node's time."""
+        """Return the time for messages, in nanoseconds: ``clock``'s time if it is set, else the node's."""
         if self._clock:
             return self._clock()
         now = self.node.now()
@@ -267,7 +266,7 @@ class SharedGraph:
         self._refresh_soon.set()
 
     def unwatch(self, listener: GraphListener) -> None:
-        """Stop calling ``listener``; without listeners, the graph is not polled."""
+        """Stop calling ``listener``. Without listeners, the graph is not polled."""
         with contextlib.suppress(ValueError):
             self._listeners.remove(listener)
         if not self._listeners and self._watching:
@@ -275,7 +274,7 @@ class SharedGraph:
             self._watching = None
 
     def refresh_soon(self) -> None:
-        """Refresh the graph soon, because it has changed."""
+        """Refresh the graph soon, because something in it has changed."""
         self._refresh_soon.set()
 
     async def look(self) -> None:
@@ -300,8 +299,7 @@ class SharedGraph:
         pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
-        # Check the task, because asyncio.wait_for before Python 3.12 may lose a cancellation that coincides with the
-        # event.
+        # Check the task: before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the event.
         task = asyncio.current_task()
         while self._watching is task:
             self._refresh_soon.clear()

@@ -1,4 +1,4 @@
-"""Parse clients' JSON within limits, because `[]` fifty million times would use gigabytes and block all clients. Pure.
+"""Parse clients' JSON within limits, because fifty million `[]` would use gigabytes and block all clients. Pure.
 
 The standard library's parser holds Python's global interpreter lock (GIL) until it has parsed the whole string, and so
 blocks all threads of the process. Large strings are parsed in pieces instead, by :func:`load_json_in_pieces` in a separate
@@ -34,10 +34,10 @@ MAX_QUICK_CHARACTERS = 64 * 1024
 # Maximum characters in a string with few values, such as a base64 image, that is parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
-PIECE_NUMBERS = 32 * 1024  # maximum characters of numbers that one call parses
+PIECE_NUMBERS = 32 * 1024  # maximum number of characters, all numbers, to parse per call
 
-_PIECE_VALUES = 1000  # maximum values of a list that one call encodes: 1 ms for floats
-_PIECE_CHARACTERS = 64 * 1024  # maximum characters of a string that one call encodes
+_PIECE_VALUES = 1000  # maximum number of values of a list to encode per call: 1 ms for floats
+_PIECE_CHARACTERS = 64 * 1024  # maximum number of characters of a string to encode per call
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
@@ -65,14 +65,13 @@ def size_in_memory(data: bytes | bytearray) -> int:
 
 
 def width_of(text: str) -> int:
-    """Return the number of bytes per character that a str uses in memory: 1, 2 or 4."""
+    """Return the number of bytes per character (1, 2 or 4) that Python uses for a str in memory."""
     if text.isascii():
         return 1
     if len(text) == 1:
-        # Do not use sys.getsizeof() of a single-character string, because from Python 3.12 on it includes the
-        # string's UTF-8 copy.
+        # Do not use sys.getsizeof() of a single-character string: since Python 3.12 it includes the string's UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
-    # For longer strings, such a UTF-8 copy can only make this value too large.
+    # In longer strings, the UTF-8 copy is also counted, so the result is at worst too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 
@@ -138,7 +137,7 @@ def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object,
         mark = _MARKS.search(text, at, at + PIECE_NUMBERS)
         if mark and mark[0] == "]":
             return values + _numbers(text, at, mark.start()), mark.end()
-        # Parse numbers up to the next value that is not a number, or the end of the piece.
+        # Parse numbers up to the next value that is not a number, or up to the end of the piece.
         comma = text.rfind(",", at, mark.start() if mark else at + PIECE_NUMBERS)
         if comma >= 0:
             values += _numbers(text, at, comma)
@@ -239,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return a value's encoding cost, where 1 is the time for a number. Stop counting early if the value is large."""
+    """Return the cost of encoding a value, where 1 is the cost of a number. Stop counting early if the value is large."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

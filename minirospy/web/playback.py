@@ -32,11 +32,11 @@ class PlayerPlayback:
         self._did_seek = False
 
     def now(self) -> int:
-        """Return the bag's current time, used as messages' timestamp."""
+        """Return the bag's current time, which messages use as their timestamp."""
         return self._player.state().time
 
     def state(self) -> PlaybackState:
-        """Return the player's state, with the id of the request that it answers. Each id is returned once."""
+        """Return the player's state, with the id of the request that it answers. An id is returned only once."""
         state = self._player.state()
         status = (
             PlaybackStatus.ENDED
@@ -101,7 +101,7 @@ class PlayerBridge:
         self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), reporter))
 
     async def _tick(self, bridge: Bridge) -> None:
-        """Send the bag's time. Send the player's state after each change made by a client or a key."""
+        """Send the bag's time. Also send the player's state if a client or a key has changed it."""
         shown: tuple[object, ...] = ()
         time = -1
         while True:

@@ -33,7 +33,9 @@ __all__ = [
 
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Minimum size in bytes of freed blocks returned to the system. It exceeds camera images, because mapping memory takes time."""
+"""Minimum size, in bytes, of freed blocks that are returned to the system. It exceeds the size of camera images, because
+mapping memory for each image is slow.
+"""
 
 
 class Part(Protocol):
@@ -46,7 +48,7 @@ class Part(Protocol):
 
 _P = TypeVar("_P", bound=Part)
 
-# GIL switch interval in seconds; with Python's default of 5 ms, the loop waits that long after each call
+# GIL switch interval in seconds; with Python's default of 5 ms, the loop could wait that long after each call
 _SWITCH_SECONDS = 0.0005
 
 
@@ -114,8 +116,8 @@ def run(
     """Run a bridge on a node called ``name`` until it is shut down; return the exit status.
 
     ``argv``: remappings, as a launch file passes them (None: the process's own arguments). ``start`` creates the bridge,
-    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for
-    which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time,
+    which would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
     resources that may fail, before the node registers its name, because the master ends a running node with the same
     name.
     """
@@ -149,7 +151,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # If there is no master yet, cancel the wait for the master; otherwise, shut down the node.
+        # If there is no master yet, cancel the wait for it; otherwise, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:

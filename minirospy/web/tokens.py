@@ -1,4 +1,4 @@
-"""The tokens of this user's bridges, in a file that only the user can read. They stay the same across restarts."""
+"""The tokens of this user's bridges, stored in a file that only the user can read, so that they survive restarts."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def read_tokens(home: Path) -> Tokens | None:
 
 
 def _is_own(found: os.stat_result) -> bool:
-    """Return whether a file belongs to this user and is private; other users may have created a file in a shared folder."""
+    """Return whether a file belongs to this user and is private. In a shared folder, another user may have created it."""
     return found.st_uid == os.geteuid() and not stat.S_IMODE(found.st_mode) & 0o077
 
 

@@ -52,7 +52,9 @@ PROVIDED = frozenset(
     tf_conversions urdf urdfdom xacro xmlrpcpp
     """.split()  # noqa: SIM905
 )
-"""Packages without messages that Python packages depend on. minirospy provides their functions, or they need a compiler."""
+"""Packages without messages on which Python packages depend. Either minirospy provides their functions, or they need a
+compiler.
+"""
 
 _KINDS = {".msg": "message", ".srv": "service", ".action": "action"}
 _RELAY = """# Made by catkin_make: {name!r} is in {folder!r}; what was generated for it is here.
@@ -69,8 +71,7 @@ with open(__file__, "rb") as _source:
 """
 
 
-# Use the interpreter that has rospy, unless its path is too long or contains white space. Shebang lines allow
-# neither.
+# Use the interpreter that has rospy, unless its path is too long or contains white space, which shebang lines do not allow.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)
@@ -110,7 +111,7 @@ def find_workspace(start: Path) -> Path:
         if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
             return folder
     for folder in (start, *start.parents):
-        # A folder such as ~ may have an unrelated src; it is then not the workspace of its other subfolders.
+        # A folder such as ~ may have an unrelated src; its other subfolders do not belong to that workspace.
         is_inside = start == folder or start.is_relative_to(folder / "src")
         if is_inside and (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return folder
@@ -225,7 +226,7 @@ def write_set_up(
 
 
 class _Builder:
-    """Builds the packages of one workspace, one after the other."""
+    """Builds the packages of one workspace one by one."""
 
     def __init__(self, workspace: Workspace, plans: Sequence[Plan], outside: Packages) -> None:
         self._workspace = workspace
@@ -241,7 +242,7 @@ class _Builder:
             *(ours / "ros" / "dynamic_reconfigure" / "dynamic_reconfigure").glob("*.py"),
         ]
         made_of = [path for plan in plans for path in (*plan.definitions, *_option_files(plan))]
-        # A package that is left out may have no CMakeLists.txt.
+        # A package that is left out need not have a CMakeLists.txt.
         made_of += [plan.cmake_lists for plan in plans if plan.cmake_lists.is_file()]
         self._key = _key([*made_of, *compiler])
 
@@ -302,7 +303,7 @@ class _Builder:
         try:
             texts = compile_package(self._catalogue, plan.name)
         except DefinitionError as error:
-            # The error for a type that contains itself names the type: replace its name by the type's file.
+            # If a type contains itself, the error names the type: replace that name with the type's file.
             files = {f"{plan.name}/{path.stem}": str(path) for path in plan.definitions}
             raise DefinitionError(files.get(error.file, error.file), error.line, error.text) from error
         modules = {folder / name: text for name, text in texts.items()}
@@ -311,7 +312,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of other workspaces' messages, because a parent workspace may have been rebuilt."""
+        """Return a fingerprint of other workspaces' messages, which change if a parent workspace is rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -321,7 +322,7 @@ class _Builder:
         )
 
     def _finish(self, stamp: Path, outputs: Iterable[Path], outside: list[str]) -> None:
-        """Record the outputs; remove outputs of the previous build that are no longer generated."""
+        """Record the outputs; remove outputs of the previous build that are not generated any more."""
         names = sorted(map(str, outputs))
         self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
         note = {
@@ -361,7 +362,7 @@ class _Builder:
         return tuple(warnings)
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
-        """Check that every type that a package's definitions use exists, in a package that CMakeLists.txt declares."""
+        """Check that every type used in a package's definitions exists, in a package that CMakeLists.txt declares."""
         for name in plan.message_depends:
             if name not in self._folders:
                 raise BuildError(
@@ -374,7 +375,7 @@ class _Builder:
         allowed = {plan.name, *self._closure(plan.message_depends)}
         for file in plan.definitions:
             for spec in self._specs(plan, file):
-                self._check_fields(plan, file, spec, allowed)
+                self._check_fields(file, spec, allowed)
 
         named = set(plan.manifest.depends())
         return tuple(
@@ -391,7 +392,7 @@ class _Builder:
             return [service.request, service.response]
         return list(self._catalogue.action(f"{plan.name}/{file.stem}").messages)
 
-    def _check_fields(self, plan: Plan, file: Path, spec: MessageSpec, allowed: Collection[str]) -> None:
+    def _check_fields(self, file: Path, spec: MessageSpec, allowed: Collection[str]) -> None:
         for field in spec.fields:
             if field.type.is_primitive:
                 continue
@@ -410,7 +411,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages whose messages may be used, directly or indirectly, by messages of the packages in ``names``."""
+        """Return the packages whose messages may be used, directly or indirectly, by the messages of ``names``."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -431,7 +432,7 @@ class _Builder:
 
 
 def _option_files(plan: Plan) -> set[Path]:
-    """Return a package's .cfg files, and the modules next to them, which they may import."""
+    """Return a package's .cfg files and the modules next to them, which they may import."""
     folders = {path.parent for path in plan.options}
     return {*plan.options, *(module for folder in folders for module in folder.glob("*.py"))}
 
@@ -456,7 +457,7 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 
 
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return devel's stub programs, which run the programs in the source folders, as a dict from file to source text.
+    """Return the stub programs of the devel space as a dict from file to source; each runs a source folder's program.
 
     These stubs put the programs from setup.py on PATH, and let real ROS run a program that is not executable itself.
     """
@@ -490,7 +491,7 @@ def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]
 
 
 def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return devel's stub modules, which load the modules in the source folders, as a dict from file to source text."""
+    """Return the stub modules of the devel space as a dict from file to source; each stub loads a source folder's module."""
     if setup is None:
         return {}
     modules = devel / DIST_PACKAGES
@@ -522,7 +523,7 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
 
 
 def _line_of(file: Path, name: str) -> int:
-    """Return the number of the first line in a file that contains a word, or 1 if none does."""
+    """Return the number of the first line in a file that contains a word, or 1 if there is none."""
     word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
     for number, line in enumerate(read_definition(file).split("\n"), 1):
         if word.search(line.split("#", 1)[0]):

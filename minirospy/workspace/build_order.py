@@ -84,7 +84,7 @@ def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[
     backwards: list[str] = []
     for needed, name in pairwise(nodes):
         backwards.append(needed)
-        # Add the packages that lie between these two in the cycle. They are connected by run dependencies only.
+        # Add the packages between these two in the cycle; only run dependencies connect them.
         between = routes[name][needed]
         while between != name:
             backwards.append(between)

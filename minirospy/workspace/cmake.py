@@ -80,7 +80,7 @@ def _nested(commands: Iterator[Statement], where: str, opener: Statement | None)
         if opener and statement.name == _ENDS[opener.name]:
             return tuple(statements)
         if statement.name in _OPENERS:
-            # If a block is open, report that it is not closed; otherwise report a closing command without a block.
+            # If a block is open, report that it is not closed. Otherwise report a closing command without a block.
             line, missing = (
                 (opener.line, _ENDS[opener.name]) if opener else (statement.line, _OPENERS[statement.name])
             )

@@ -23,14 +23,14 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages look for; they are reported as found."""
+"""Optional packages that Python packages look for. They are reported as found."""
 _ROS_2 = re.compile(
     r"(ament|rcl|rosidl)"
 )  # ROS 2 packages that a CMakeLists.txt for both ROS 1 and ROS 2 may look for
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
 _MAX_LOOPS = 100_000  # maximum iterations of a foreach() with RANGE
-# maximum depth of nested files and macros; deeper nesting means that a file includes itself
+# maximum depth of nested files and macros; anything deeper is a file that includes itself
 _MAX_DEPTH = 40
 
 
@@ -79,7 +79,7 @@ def _escaped(text: str) -> str:
 
 
 def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
-    """Substitute a macro's arguments into its commands as text, before variables are expanded, as CMake does."""
+    """Substitute a macro's arguments into its commands as text, as CMake does before it expands variables."""
 
     def value(match: re.Match[str]) -> str:
         given = None if match[1] else values.get(match[2])
@@ -157,7 +157,7 @@ class _Run:
 
     @contextmanager
     def _nested(self, statements: Sequence[Statement], file: Path) -> Iterator[None]:
-        """Enter one nesting level for the duration of the context. Raise BuildError if there are too many levels."""
+        """Enter one nesting level for the context. Raise BuildError if there are too many levels."""
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
@@ -236,7 +236,7 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """Return the items of a loop: words, numbers in a ``RANGE``, or ``IN LISTS`` of variables and ``ITEMS``.
+        """Return the items of a loop: words, the numbers of a ``RANGE``, or ``IN LISTS`` with variables and ``ITEMS``.
 
         Raise ValueError if a ``RANGE`` has more than ``_MAX_LOOPS`` numbers.
         """
@@ -263,7 +263,10 @@ class _Run:
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
-        """Yield the commands of a function or macro. A function gets a new scope; a macro's arguments are not variables."""
+        """Yield the commands of a function or macro.
+
+        A function gets a new scope; a macro's arguments are substituted as text.
+        """
         macro = self._macros[name]
         values = {
             **dict(zip(macro.parameters, arguments, strict=False)),
@@ -273,7 +276,7 @@ class _Run:
             "ARGC": str(len(arguments)),
         }
         if not macro.has_scope:
-            # A macro's commands run as if the caller contained them: return() leaves the caller.
+            # A macro's commands run as if they were in the caller, so return() leaves the caller.
             with self._nested(macro.body, macro.file):
                 yield from self._run(_substituted(macro.body, values), macro.file)
             return
@@ -387,7 +390,7 @@ class _Run:
         found: list[Path] = []
         for pattern in words:
             path = self._folder / pattern
-            # Match below the package's folder, because its path may contain characters that are special in a pattern.
+            # Match below the package's folder: the folder's own path may contain characters that are special in a pattern.
             top = self._folder if path.is_relative_to(self._folder) else Path(path.anchor)
             *folders, last = path.relative_to(top).parts or ("*",)
             if arguments[0] == "GLOB":
@@ -412,12 +415,12 @@ class _Run:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "1"))
 
     def _handle_standard_args(self, arguments: list[str]) -> None:
-        """Report a library found by ``FindNAME.cmake`` or pkg-config as found, because nothing is compiled with it."""
+        """Report a library found by ``FindNAME.cmake`` or pkg-config as found: nothing is compiled with it."""
         for name in arguments[:1]:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "TRUE"))
 
     def _check(self, arguments: list[str]) -> None:
-        """Run ``check_include_files(header NAME)``: report the header as found, because nothing is compiled with it."""
+        """Run ``check_include_files(header NAME)``. Report the header as found: nothing is compiled with it."""
         for name in arguments[1:2]:
             self._known[name] = "1"
 
@@ -468,7 +471,7 @@ def _version(text: str) -> list[int]:
 
 _COMPARE: dict[str, Callable[[str, str], bool]] = {
     "MATCHES": lambda left, right: bool(re.search(right, left)),
-    # Generated files do not exist at this point. CMake returns true for them, so that they are generated.
+    # Generated files do not exist yet. Return true for them, as CMake does, so that they are generated.
     "IS_NEWER_THAN": lambda left, right: True,
     **{
         prefix + name: lambda left, right, read=read, test=test: test(read(left), read(right))  # type: ignore[misc]
@@ -503,8 +506,7 @@ class _Condition:
             "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
             "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
             "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
-            # Targets for generated code exist, other targets do not. Commands and policies are CMake's own, so they
-            # exist.
+            # Only targets for generated code exist. Commands and policies are CMake's own, so they exist.
             "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
             "COMMAND": lambda name: True,
             "POLICY": lambda name: True,
@@ -551,7 +553,7 @@ class _Condition:
             return self._value(left) in _items(self._known.get(self._word().text, ""))
 
         if _TRUE.match(left.text) or _FALSE.match(left.text):
-            # Constants represent themselves, even if a variable with that name exists.
+            # A constant stands for itself, even if a variable has the same name.
             return bool(_TRUE.match(left.text))
         return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
 
@@ -560,7 +562,7 @@ class _Condition:
         return word.text if word.quoted else self._known.get(word.text, word.text)
 
     def _word(self) -> Word:
-        # An empty variable expands to no word at all: `if(${UNSET} STREQUAL "x")`.
+        # An empty variable expands to no word at all, as in `if(${UNSET} STREQUAL "x")`.
         if self._next >= len(self._words) or self._words[self._next] in _OPERATORS:
             return Word("", True)
         self._next += 1

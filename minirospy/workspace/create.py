@@ -63,7 +63,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
     if package.meta:
         return made
     if "roscpp" in package.depends:
-        # The package's C++ headers belong in this folder.
+        # This folder is for the package's C++ headers.
         made.append(folder / "include" / package.name)
     made.append(folder / "src")
 

@@ -62,7 +62,10 @@ class Dependencies:
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Return a dict of all packages, sorted, to the folders that contain a package of that name. The first folder is used."""
+        """Return all packages, sorted, each with the folders that contain a package of that name.
+
+        The first folder is the one used.
+        """
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())
@@ -87,7 +90,7 @@ class Dependencies:
         Raise NotFoundError if it does not exist, ManifestError if it is invalid.
         """
         if name not in self._manifests:
-            # Imported here because `rospack find` does not need it.
+            # Imported here, because `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
 
             self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
@@ -101,7 +104,7 @@ class Dependencies:
         return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies in topological order: each follows those that it depends on.
+        """Return a package's direct and indirect dependencies in topological order: each follows its own dependencies.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """
@@ -180,7 +183,7 @@ class Dependencies:
 def is_metapackage(folder: Path) -> bool:
     """Return whether the package in a folder is a metapackage."""
     try:
-        # Do not parse a file that does not contain this tag.
+        # Do not parse a file that does not contain this tag at all.
         if b"<metapackage" not in (folder / "package.xml").read_bytes():
             return False
         from minirospy.workspace.manifest import read_manifest

@@ -16,7 +16,7 @@ from minirospy.workspace.plan import Download, Plan
 
 __all__ = ["download"]
 
-_TIMEOUT = 30.0  # maximum number of seconds for which a download may receive nothing
+_TIMEOUT = 30.0  # maximum number of seconds without any data from the server
 
 
 def download(plan: Plan, wanted: Iterable[Download]) -> None:
@@ -57,8 +57,8 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file. It appears under its name only once it is complete."""
-    # Imported here, because the import takes as long as a build without downloads.
+    """Download a file; it appears under its own name only once it is complete."""
+    # Imported here: the import takes as long as a build without downloads.
     from http.client import HTTPException
     from urllib.request import Request, urlopen
 

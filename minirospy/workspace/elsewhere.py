@@ -160,7 +160,7 @@ QT_LIBRARIES = (
 MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
-"""Dict from message package to the arguments with which `git clone` gets its ROS 1 version."""
+"""Message packages, each with the arguments with which `git clone` gets its ROS 1 version."""
 
 IMPORTED = frozenset(
     {
@@ -179,7 +179,7 @@ SUBMODULES = {
     "roslaunch.remoteprocess": "roslaunch.parent.ROSLaunchParent starts nodes on other machines by ssh",
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
 }
-"""Dict from submodule of a ROS package that minirospy's package lacks to its replacement. `overlay/` has a module for each."""
+"""Submodules that minirospy's version of a ROS package lacks, with their replacements. `overlay/` has a module for each."""
 
 
 def advice(name: str) -> str:

@@ -77,11 +77,11 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         if source.is_file():
             yield place / (rule.rename or source.name), (source, rule.program)
             continue
-        # As in CMake, install the folder's contents if there is a trailing slash, else the folder itself.
+        # As in CMake, install the contents of the folder if there is a trailing slash, otherwise the folder itself.
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
             below = path.relative_to(source)
-            # A pattern may exclude not only the file itself but also one of its parent folders.
+            # A pattern may exclude a file by its own name or by that of a parent folder.
             parents = [f"/{each.as_posix()}" for each in (below, *below.parents)]
             left_out = any(re.search(pattern, parent) for pattern in rule.excluded for parent in parents)
             if not left_out and (not rule.chosen or any(re.search(each, parents[0]) for each in rule.chosen)):

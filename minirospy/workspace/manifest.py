@@ -217,7 +217,7 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     except XmlError as error:
         raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
-        # If Python does not know the encoding, the error is a LookupError, which has no code.
+        # If Python does not know the encoding, the error is a LookupError without a code.
         code = getattr(error, "code", None)
         why = expat.ErrorString(code) if code is not None else str(error)
         raise ManifestError(str(path), parser.CurrentLineNumber, f"not XML: {why}") from error
@@ -234,7 +234,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Formats 2 and 3 do not contain this tag, but packages use it there.
+    # Formats 2 and 3 do not have this tag, but packages use it there, too.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -259,7 +259,7 @@ _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
-"""Addresses that catkin accepts; catkin exits with an error for any other address."""
+"""Addresses that catkin accepts. catkin exits with an error for all others."""
 
 
 class _Reader:
@@ -389,7 +389,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
-# maximum nested brackets in a condition; the parser recurses three times per nesting level
+# maximum number of nested brackets in a condition; the parser recurses three times per level
 _MAX_BRACKETS = 50
 _COMPARE = {
     "==": str.__eq__,

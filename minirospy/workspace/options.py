@@ -50,7 +50,7 @@ def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
 
 
 def _run(file: Path, plan: Plan, folders: list[Path], modules: Path) -> None:
-    """Run a .cfg file with minirospy's generator, and the messages and modules of its workspace."""
+    """Run a .cfg file with minirospy's generator and with its workspace's messages and modules."""
     base = next(root / "dynamic_reconfigure" for root in built_in_roots())
     path = [str(_OVERLAY), str(modules), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(

@@ -37,7 +37,7 @@ _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
-_SHOWN = 12  # maximum number of programs listed in an error, which fill about one line
+_SHOWN = 12  # maximum number of programs to list in an error: about one line
 
 
 class NotExecutableError(MinirospyError):
@@ -55,7 +55,7 @@ class Packages:
     """The packages that are visible in an environment. A package's name is taken from its package.xml."""
 
     def __init__(self, environment: Environment | None = None) -> None:
-        # Packages do not depend on ROS_MASTER_URI or on the machine's name, so skip both lookups.
+        # Packages do not depend on ROS_MASTER_URI or the machine's name, so skip both look-ups.
         environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
@@ -71,7 +71,7 @@ class Packages:
     def find(self, name: str) -> Path:
         """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
         for root in self.roots:
-            # If a folder's name is the package's name, try that folder before searching.
+            # Before searching, try the folder that has the package's name.
             if package_name(root / name) == name:
                 return root / name
             for folder in self._crawled(root):
@@ -95,7 +95,7 @@ class Packages:
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return a dict from package to the folders that contain a package of that name. The first folder is used."""
+        """Return all packages, each with the folders that contain a package of that name. The first folder is the one used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -129,7 +129,7 @@ class Packages:
         candidates = [path for path in candidates if path.is_file()]
         runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
-            # Ignore the copies of scripts that a build writes to devel.
+            # Ignore the copies of scripts that a build puts into devel.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
             return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
@@ -156,7 +156,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if the file is in another package with the same name, hidden by the found package; otherwise ""."""
+        """Return a hint if another package with the same name, hidden by the one found, has the file; otherwise return ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -169,7 +169,7 @@ class Packages:
 
 
 class CrawlTime(NamedTuple):
-    """The search time for a folder and its subfolders, in seconds, and whether the folder contains a package."""
+    """The time to search a folder and its subfolders, in seconds, and whether the folder contains a package."""
 
     folder: Path
     seconds: float
@@ -177,7 +177,7 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """Measure the search time of a folder and of each subfolder, except for packages."""
+    """Measure the time to search a folder and each of its subfolders, except for packages."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
@@ -230,7 +230,7 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to one of its parent folders, which would make the search infinite."""
+    """Return whether an entry is a link to one of its parent folders; following it would make the search infinite."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
@@ -265,7 +265,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # Programs of a package in /usr/share/PKG are in /usr/lib/PKG, regardless of the sourced workspace.
+        # The programs of a package in /usr/share/PKG are in /usr/lib/PKG, whichever workspace is sourced.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -287,7 +287,7 @@ def _is_program(path: Path) -> bool:
 
 
 def is_python(path: Path) -> bool:
-    """Return whether a file is a Python program, by its name or its first line."""
+    """Return whether a file is a Python program, judging by its name or its first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:

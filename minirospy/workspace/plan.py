@@ -64,7 +64,7 @@ _BEFORE = {
     "catkin_python_setup": ("generate_messages", "generate_dynamic_reconfigure_options"),
     "generate_dynamic_reconfigure_options": ("catkin_package",),
 }
-"""Commands that catkin requires before other commands, although the order has no effect here."""
+"""Commands that catkin requires before certain other commands. The order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
 """Packages that define CMake's message macros; at least one must be found before the macros are used."""
 _CMAKE_VERSION = "3.25.1"  # CMake's version, as seen by CMakeLists.txt files
@@ -162,7 +162,7 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # Raise an error, because the package's name becomes part of folder and module names.
+        # Raise an error: the package's name becomes part of the names of folders and modules.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
@@ -251,7 +251,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn about an error that real catkin reports, but that this build ignores."""
+        """Warn about an error that real catkin reports and this build ignores."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
@@ -307,7 +307,7 @@ class _Collector:
         return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        # Skip commands in a subfolder, which may belong to another project.
+        # Skip the commands in a subfolder, which may belong to another project.
         if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
             raise _error(
                 command,
@@ -383,7 +383,7 @@ class _Collector:
             self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
-        """Check that package.xml names the packages in CATKIN_DEPENDS, both as build and as run dependencies."""
+        """Check that package.xml declares the packages in CATKIN_DEPENDS as both build and run dependencies."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
 
@@ -421,7 +421,7 @@ class _Collector:
             self._properties.setdefault(target, {}).update(zip(words[::2], words[1::2], strict=False))
 
     def _file_name(self, target: str) -> str:
-        """Return the name of the file that a compiled target produces, without ``lib`` and extensions."""
+        """Return the file name of a compiled target's output, without ``lib`` and extensions."""
         properties = self._properties.get(target, {})
         return properties.get("PREFIX", "") + properties.get("OUTPUT_NAME", target)
 
@@ -467,7 +467,7 @@ class _Collector:
         place = given.get("DESTINATION", [])
         kind = next((kind for kind in ("PROGRAMS", "FILES", "DIRECTORY") if kind in command.arguments), None)
         if kind is None or not place:
-            # TARGETS, CODE, SCRIPT and EXPORT apply to compiled targets.
+            # TARGETS, CODE, SCRIPT and EXPORT are for compiled targets.
             return
         chosen, excluded = _patterns(command.arguments)
         self._installs.append(
@@ -489,7 +489,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return two tuples of patterns (``PATTERN x``, ``REGEX x``): those to include, and those followed by ``EXCLUDE``."""
+    """Return two tuples of patterns (``PATTERN x``, ``REGEX x``): those to include, and those marked with ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):

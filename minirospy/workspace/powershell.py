@@ -54,7 +54,7 @@ _OTHERS = """if ($args[0] -ne '--extend') {
 
 
 def quoted(path: object) -> str:
-    """Quote a path as one PowerShell word, in single quotes. A quote inside is doubled."""
+    """Quote a path as one PowerShell word, in single quotes; double any quote inside."""
     return "'" + str(path).replace("'", "''") + "'"
 
 

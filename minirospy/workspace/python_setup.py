@@ -116,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute. An attribute that has not been set is an empty class."""
+    """A module that has every attribute. An attribute that was not set is an empty class."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
@@ -191,7 +191,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # Set the variables that catkin's build sets, because without a sourced setup.bash, none of them is set.
+    # Set the variables that catkin's build sets: without a sourced setup.bash, none of them is set.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield

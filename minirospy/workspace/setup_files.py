@@ -39,7 +39,7 @@ def setup_files(setup: SetUp) -> dict[str, str]:
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
         "setup.sh": _posix(setup, _others_make_way(setup)),
-        # These files work like `setup.sh --extend`: they leave the sourced workspaces active.
+        # These files work like `setup.sh --extend`, which leaves the sourced workspaces active.
         "local_setup.sh": _posix(setup, ""),
         "env.sh": _ENV,
         "setup.fish": _fish(setup),
@@ -76,7 +76,7 @@ _HEAD = "# Made by minirospy: `source` it to work with the packages of this work
 
 _BASH = (
     _HEAD
-    # `return` outside a function succeeds only in a sourced file; $0 may have any value.
+    # Outside a function, `return` succeeds only in a sourced file; $0 may have any value.
     + """if ! (return 0 2>/dev/null); then
   echo "a program sets nothing in your terminal; type: source '$0'" >&2
 fi
@@ -156,7 +156,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return code that removes previously sourced workspaces from the environment and adds this workspace's parents."""
+    """Return code that removes the workspaces sourced earlier from the environment and adds this workspace's parents."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.
@@ -296,7 +296,7 @@ def _fish_base(setup: SetUp) -> str:
 
 
 def _fish_quoted(path: Path) -> str:
-    """Quote a path as one word for fish. Unlike in other shells, two escapes work within fish's single quotes."""
+    """Quote a path as one word for fish, in whose single quotes, unlike other shells', two escapes work."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
@@ -329,7 +329,7 @@ def _bat(setup: SetUp, others: str) -> str:
     text = _BAT.format(
         base=_bat_base(setup), others=others, share=share, functions=setup.functions / "ros.bat"
     )
-    # cmd.exe does not find labels in a file with LF line endings, so use CRLF.
+    # cmd.exe does not find the labels of a file with LF line endings, so use CRLF.
     return text.replace("@DIST_PACKAGES@", DIST_PACKAGES.replace("/", "\\")).replace("\n", "\r\n")
 
 

@@ -28,7 +28,7 @@ class StandIns(NamedTuple):
     modules: dict[str, Path]
 
     def names(self) -> str:
-        """Return the names to show to the user, "" if there are none. Omits packages that only enclose a module."""
+        """Return the names to show to the user, or "" if there are none. Omit packages that only enclose a module."""
         inner = [name for name, path in self.modules.items() if path.name != "__init__.py"]
         return ", ".join([*self.programs, *inner])
 
@@ -49,14 +49,13 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
     for name in plan.compiled:
         if name in there:
             *_, program = packages.find_executable(plan.name, name)
-            # Use only files in minirospy's folder, because a sourced workspace contains the stub from the previous
-            # build.
+            # Use only files in minirospy's folder: a sourced workspace contains the stub from the previous build.
             if Path(program).is_relative_to(folder):
                 yield name, Path(program)
 
 
 def _modules(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the modules that replace extension modules, each after its enclosing packages except the outermost one."""
+    """Yield the modules that replace extension modules, each after its enclosing packages, except for the outermost one."""
     top = _OVERLAY / plan.name
     for path in sorted(top.rglob("*.py")):
         if path.stem in plan.compiled and path.parent.name != "__pycache__":

@@ -27,8 +27,7 @@ def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
 
     Raise DefinitionError if a definition is invalid.
     """
-    # Check first whether there are unlisted messages: most workspaces have none, and then no definition needs to be
-    # read.
+    # First check whether there are unlisted messages: most workspaces have none, so no definition has to be read.
     unlisted = {
         f"{plan.name}/{path.stem}": path
         for plan in plans.values()

@@ -31,7 +31,7 @@ MAX_PORT = 65_535
 _MAX_PORT_DIGITS = 5
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
-"""Zenoh's link protocols. Zenoh reports an error for a protocol that its build lacks."""
+"""Zenoh's link protocols. If a build of Zenoh lacks one, Zenoh reports an error."""
 _HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
@@ -47,7 +47,7 @@ CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
-    """An endpoint in the arguments that can never work."""
+    """Raised for an endpoint in the arguments that can never work."""
 
     def __init__(self, endpoint: str, reason: str) -> None:
         super().__init__(f"[{escaped(endpoint)}] {reason}")
@@ -214,7 +214,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the endpoints' hosts that do not resolve at present.
+    """Return the endpoints' hosts that currently do not resolve.
 
     The hosts may resolve later, for example once mDNS runs. Blocks.
     """
@@ -248,7 +248,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs
     ``needs_hash``: the feature also needs the library xxhash.
     """
     if has_many_links:
-        # Set the variable before the import, because Zenoh reads it only once.
+        # Set the variable before the import: Zenoh reads it only once.
         os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
     line = install_command("minirospy[fleet]", upgrade=True)
     libraries = {"eclipse-zenoh": "zenoh.ext"} | ({"xxhash": "xxhash"} if needs_hash else {})
@@ -304,21 +304,20 @@ def configured(options: NetworkOptions) -> Config:
         put("mode", "router" if listens else "peer" if options.scouts else "client")
     mode = json.loads(config.get_json("mode"))
     put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router keeps retrying. A client without a router fails to open, and the caller opens it
-    # again.
+    # A gateway that loses its router keeps retrying.
+    # A client that has no router fails to open, and its caller tries again.
     for key, value in (
         ("connect/timeout_ms", CONNECT_MS if mode == "client" else -1),
         ("connect/exit_on_failure", mode == "client"),
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
-        # Keep-alive messages per 10 s lease. One fewer than Zenoh's default is enough, because TCP retransmits lost
-        # data.
+        # Keep-alive messages per lease of 10 s. One fewer than Zenoh's default is enough, because TCP retransmits lost data.
         ("transport/link/tx/keep_alive", 3),
-        # Data in the kernel's buffer is sent before any data of higher priority: at 4 Mbit/s this takes some 0.3 s
-        # instead of 1.3 s.
+        # Data in the kernel's buffer is sent before any data of higher priority.
+        # With this size, it takes some 0.3 s at 4 Mbit/s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
-        # Shared memory would pass large messages between local gateways in /dev/shm, which is small in containers.
+        # Shared memory would pass large messages between local gateways through /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),
     ):
         if not is_set(key):
@@ -327,5 +326,5 @@ def configured(options: NetworkOptions) -> Config:
 
 
 def one_line(error: Exception) -> str:
-    # Remove the location in Zenoh's source code, which is useless to the user.
+    # Remove the location in Zenoh's source code, which is of no use to the user.
     return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]

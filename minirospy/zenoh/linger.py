@@ -23,7 +23,7 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 LOOKS = 10
-"""Number of polls that examine a new file descriptor. Zenoh sets SO_LINGER only after it has connected the socket."""
+"""Number of polls in which to examine a new file descriptor: Zenoh sets SO_LINGER only after connecting the socket."""
 
 
 class LingerRemover:
@@ -31,7 +31,7 @@ class LingerRemover:
 
     def __init__(self) -> None:
         self._looks: dict[tuple[int, int], int] = {}
-        """Dict from each open file to the number of polls that have examined it."""
+        """Number of polls that have examined each open file."""
 
     def look(self) -> int:
         """Remove SO_LINGER from new links; return the number of links changed. Does nothing on Windows."""
@@ -41,7 +41,7 @@ class LingerRemover:
         count = 0
         with contextlib.suppress(OSError):
             for name in os.listdir(_OPEN_FILES):
-                # Ignore errors, because other threads open and close files at the same time.
+                # Ignore errors: other threads open and close files at the same time.
                 with contextlib.suppress(OSError):
                     file = os.fstat(int(name))
                     identity = file.st_dev, file.st_ino

@@ -1,4 +1,4 @@
-"""The asyncio API: nodes in one loop communicate with each other, and with nodes of the rospy API, over real sockets."""
+"""The asyncio API: nodes that share a loop communicate with each other and with nodes of the rospy API, over real sockets."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ from minirospy.base.errors import (
 )
 from minirospy.base.times import Duration, Time
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from tests.waiting import until
 
@@ -46,7 +47,7 @@ Main = Callable[[], Coroutine[Any, Any, None]]
 
 
 def run(main: Main) -> None:
-    """Run a test's coroutine in a new loop; assert that no task remains."""
+    """Run a test's coroutine in a new loop; assert that no tasks remain."""
 
     async def bounded() -> None:
         await asyncio.wait_for(main(), SECONDS)
@@ -301,7 +302,7 @@ def test_queue_size_zero_is_refused(master: str) -> None:
 
 
 def test_publish_waits_with_queue_size_none(master: str) -> None:
-    """Send messages of 3 MB to a reader that has stopped. Data counts as written once its socket has accepted it."""
+    """Send messages of 3 MB to a reader that has stopped reading. Data counts as written once its socket has accepted it."""
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -436,7 +437,7 @@ def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFix
 
 
 def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterProxy) -> None:
-    """Several tasks do this before the registration has reached the master, or during the unregistration."""
+    """Several tasks do this before the registration has reached the master and during the unregistration."""
 
     async def main() -> None:
         async with Node("a") as node, Node("b") as other:
@@ -638,7 +639,7 @@ def test_errors_of_a_service_call(master: str, caplog: pytest.LogCaptureFixture)
 
 
 def test_service_is_registered_once_and_can_be_closed(graph: MasterProxy) -> None:
-    """This includes closing it before the master has registered it."""
+    """Also close it before the master has registered it."""
 
     async def main() -> None:
         async with Node("n") as node:
@@ -875,7 +876,7 @@ def test_simulated_time(master: str) -> None:
 def test_silent_clock_is_reported_once(
     master: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 0.0)
 
     async def main() -> None:
         async with Node("n") as setting:
@@ -957,11 +958,12 @@ def test_aio_node_and_rospy_node_exchange_messages(master: str) -> None:
     run(main)
 
 
-def test_unreachable_master_is_an_error(master: str) -> None:
+def test_unreachable_master_is_an_error() -> None:
     async def main() -> None:
-        async with Node("n", master_uri=master) as node:
-            node._environment = node._environment._replace(master_uri="http://localhost:1")
-            node._node.registrations._environment = node._environment
+        master = Master()
+        await master.start()
+        async with Node("n", master_uri=f"http://localhost:{master.port}", rosout=False) as node:
+            await master.close()
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
 

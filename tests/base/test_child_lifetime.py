@@ -1,4 +1,4 @@
-"""Tests when a job object, which kills the children of a killed process, is created and closed."""
+"""Tests when the job object that kills the children of a killed process is created and closed."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], obj
 
 
 def wait_elsewhere(event: SignalSafeEvent) -> None:
-    """Join a thread that waits for the event, as a hook does with a thread that sleeps."""
+    """Join a thread that waits for the event, like a hook that joins a sleeping thread."""
     thread = threading.Thread(target=event.wait, args=(0.001,), daemon=True)
     thread.start()
     thread.join()
@@ -169,11 +169,11 @@ def test_sleep_before_the_first_time_starts_at_it() -> None:
 def test_silent_clock_is_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
     reports: list[str] = []
     clock = SimulatedClock(on_silence=lambda: reports.append("silent"))
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 1000.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 1000.0)
     sleeping = Sleeping(clock, SECOND)
     sleeping.at(0)
     assert reports == []
-    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+    monkeypatch.setattr(clock_module, "SILENT_SECONDS", 0.0)
     sleeping.at(0)
     sleeping.at(0)
     assert reports == ["silent"]

@@ -1,4 +1,4 @@
-"""environment: the meaning of the variables, and rejected values."""
+"""environment: the meaning of the variables, and which values are rejected."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def test_minirospy_local_with_ipv6_binds_its_loopback() -> None:
     ],
 )
 def test_minirospy_local_reaches_a_master_of_this_machine_by_loopback(uri: str, reached: str) -> None:
-    """A master that listens on 127.0.0.1 cannot be reached at the address of this machine's host name."""
+    """A master that listens on 127.0.0.1 cannot be reached at the address to which this machine's host name resolves."""
     environ = {"MINIROSPY_LOCAL": "1", "ROS_MASTER_URI": uri}
     assert Environment.read(environ).master_uri == reached
     assert master_and_namespace(environ)[0] == reached

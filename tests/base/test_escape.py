@@ -1,4 +1,4 @@
-"""Display of untrusted text without terminal control sequences or additional lines."""
+"""Untrusted text is displayed without terminal control sequences or additional lines."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users of Window
 
 @pytest.fixture
 def mine(tmp_path: Path) -> Path:
-    """Return a file of the user in another folder."""
+    """Return a file that belongs to the user, in another folder."""
     path = tmp_path / "mine"
     path.write_text("precious")
     return path
@@ -89,7 +89,7 @@ def test_open_text_empties_or_appends(tmp_path: Path) -> None:
 
 
 def test_read_file_reads_hard_links(tmp_path: Path, mine: Path) -> None:
-    """Backups use hard links, and reading one is harmless."""
+    """Backups use hard links, and reading a hard link is harmless."""
     os.link(mine, tmp_path / "name")
     assert private_files.read_file(tmp_path / "name") == (b"precious", mine.stat().st_mtime)
 
@@ -137,7 +137,7 @@ def test_journal_follows_no_link(
     journal.remove()
 
     assert mine.read_text() == "precious"
-    # A symbolic link is not read, either. A hard link is removed without changing the file.
+    # Symbolic links are not read, either. Removing a hard link does not change the file.
     assert left
     assert not left.recovered.records
 

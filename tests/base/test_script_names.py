@@ -1,4 +1,4 @@
-"""Programs in whose folder a file has the name of a package that they import."""
+"""Programs whose folder contains a file with the name of a package that they import."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from minirospy.ros.rosunit.runner.bare import interrupt_noted
 
 @pytest.fixture
 def control_break(monkeypatch: pytest.MonkeyPatch) -> Iterator[signal.Signals]:
-    """Yield SIGBREAK, or on other systems another signal under that name."""
+    """Yield SIGBREAK or, on other systems, another signal under that name."""
     number: signal.Signals = getattr(signal, "SIGBREAK" if sys.platform == "win32" else "SIGUSR1")
     monkeypatch.setattr(signal, "SIGBREAK", number, raising=False)
     before = signal.signal(number, signal.SIG_DFL)

@@ -91,7 +91,7 @@ def test_words_that_may_have_been_meant(word: str, known: tuple[str, ...], expec
     ("name", "known", "expected"),
     [
         ("/buton_state", "/button_state", True),
-        # A topic of another robot, and another topic with the same prefix: the user waits for this one.
+        # Another robot's topic, and another topic with the same prefix: the user waits for this one.
         ("/robot2/scan", "/robot10/scan", False),
         ("/camera/image", "/camera/image_raw", False),
     ],

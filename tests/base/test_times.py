@@ -81,7 +81,7 @@ def test_whole_factors_are_exact(a: int, factor: int) -> None:
 @given(st.floats(-1e9, 1e9))
 def test_floats_are_cut_off(seconds: float) -> None:
     for value in (Duration(seconds), Duration.from_sec(seconds)):
-        # A float of this size has a resolution of 1e-7 seconds.
+        # A float this large has a resolution of 1e-7 seconds.
         assert abs(Fraction(value.to_nsec()) / BILLION - Fraction(seconds)) <= Fraction(2, 10**9)
         assert abs(value.to_sec() - seconds) < 2e-7
 

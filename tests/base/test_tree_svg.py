@@ -1,4 +1,4 @@
-"""Trees as SVG: the SVG is well-formed, contains each node once, and no name becomes a tag."""
+"""Trees as SVG: the SVG is well-formed and contains each node once, and no name becomes a tag."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def test_watch_prints_a_line_for_each_edge() -> None:
             [sys.executable, "-c", code, "watch", "7", "-n", "2"], stdout=subprocess.PIPE, text=True
         ) as child,
     ):
-        # The test cannot see when the listener is ready, so toggle the pin until it has received enough edges.
+        # The test cannot tell when the listener is ready, so toggle the pin until the listener has received enough edges.
         for number in range(1, 400):
             board.set(7, number % 2)
             try:
@@ -216,8 +216,7 @@ def test_keys_press_buttons_and_move_the_person(
         def type_until(keys: bytes, condition: Callable[[], bool]) -> None:
             os.write(ours, keys)
             while not condition():
-                # Read the output, because the program would block otherwise. The change may reach this process after
-                # it was drawn.
+                # Read the output; otherwise the program would block. The change may reach this process only after it was drawn.
                 if select.select([ours], [], [], 0.05)[0]:
                     os.read(ours, 65536)
 

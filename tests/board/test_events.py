@@ -1,4 +1,4 @@
-"""Which edges are counted, with a clock that the test controls."""
+"""Which edges are counted. The test controls the clock."""
 
 from __future__ import annotations
 

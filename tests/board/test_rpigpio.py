@@ -143,7 +143,7 @@ def _prepare(gpio: Gpio) -> None:
             "Bouncetime must be greater than 0",
         ),
         (
-            # bouncetime is in milliseconds; this value would be plausible in seconds.
+            # bouncetime is in milliseconds; this value would only make sense in seconds.
             lambda g: g.add_event_detect(11, GPIO.RISING, bouncetime=0.2),
             TypeError,
             NO_INTEGER.format("float"),
@@ -429,7 +429,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     wave.set(duty=30)
     wave.start()
     high = [0.0]
-    # A machine that stalls makes some of the pulses longer, but only for a while.
+    # A machine that stalls makes some pulses longer, but only for a while.
     while sorted(high)[len(high) // 2] != pytest.approx(0.015, abs=0.008):
         several = [next(edges) for _ in range(11)]
         high = [after.time - edge.time for edge, after in itertools.pairwise(several) if edge.level]

@@ -36,7 +36,7 @@ class Robot(NamedTuple):
     stopped: list[str]
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish a latched message, which late subscribers receive too."""
+        """Publish a latched message, which late subscribers also receive."""
         buffer = BytesIO()
         message.serialize(buffer)
         body = buffer.getvalue()

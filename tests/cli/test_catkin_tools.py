@@ -14,7 +14,7 @@ Capture = pytest.CaptureFixture[str]
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return sources of a, b and c (a needs c), and a devel folder with parts of a."""
+    """Return a workspace with the sources of a, b and c (a needs c), and with parts of a in its devel folder."""
     for name, more in (("a", "<depend>c</depend>"), ("b", ""), ("c", "")):
         folder = tmp_path / "src" / name
         folder.mkdir(parents=True)

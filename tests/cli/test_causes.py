@@ -89,8 +89,7 @@ def test_suspended_node_is_said_to_be_suspended(master: str, command: Any) -> No
             assert process.stdout is not None
             assert process.stdout.readline() == "up\n"
             process.send_signal(signal.SIGSTOP)
-            # Wait until the process has stopped, because its other threads run until one thread has handled the
-            # signal.
+            # Wait until the process has stopped: its other threads run until one of them has handled the signal.
             os.waitid(os.P_PID, process.pid, os.WSTOPPED)
             echo = [str(Path(sys.executable).parent / "rostopic"), "echo", "/rosout"]
             with subprocess.Popen(echo, stderr=subprocess.PIPE, text=True) as reader:

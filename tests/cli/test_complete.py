@@ -184,7 +184,7 @@ def test_functions_with_many_arguments_take_a_record() -> None:
 
 @pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
 def test_every_verb_and_option_is_completed(typed: str, leaf: Command | Verb) -> None:
-    """A new argument that takes a value must name its completer, or `nothing`."""
+    """A new argument that takes a value must name its completer (``nothing`` for none)."""
     parser = leaf.parser()
     assert tab(f"{typed} -") == [option for action in parser._actions for option in action.option_strings]
     for action in parser._actions:
@@ -341,7 +341,7 @@ def test_quotes_that_are_open_stay(workspace: Path) -> None:
     assert candidates(4, ["rostopic", "pub", '"/t"', "std_msgs/Bool", '"']) == ['"data: false"']
     assert candidates(2, ["rosed", "my_robot", '"my '], one_line=True) == ['"my map.yaml"']
     assert candidates(2, ["rosed", "my_robot", "config/deep/my\\ "]) == ["config/deep/my\\ map.yaml"]
-    # A shell interprets nothing within single quotes, so they are closed before the apostrophe.
+    # A shell interprets nothing inside single quotes, so close them before the apostrophe.
     assert candidates(4, ["rostopic", "pub", "/t", "std_msgs/String", "'"]) == [r"'data: '\'''\'''"]
     words = ["roslaunch", "my_robot", "all.launch"]
     assert candidates(3, [*words, "name:="]) == [r"name:=a\ robot"]
@@ -497,7 +497,7 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
         monkeypatch.setattr(completers, "LIVE_SECONDS", 0.2)
         took: list[float] = []
-        # A call gives up after five seconds; try it up to three times if the machine stalls.
+        # A call gives up after five seconds. Try it up to three times, in case the machine stalls.
         while len(took) < 3 and min(took, default=9.0) > 4:
             start = time.monotonic()
             assert tab("rostopic echo ") == []

@@ -1,4 +1,4 @@
-"""minirospy doctor and roswtf: a graph with a fault, and the lines that report the fault."""
+"""minirospy doctor and roswtf: graphs with a fault, and the lines that report the fault."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Start = Callable[[Sequence[str]], Any]
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Raise the time limits for a busy machine; an address at which nothing listens refuses immediately."""
+    """Raise the time limits for a busy machine. An address without a listener still refuses immediately."""
     connect_within(30.0, monkeypatch)
 
 

@@ -1,4 +1,4 @@
-"""Commands that a script starts with `&`: the shell sets SIGINT to be ignored, but `kill -INT` stops them nevertheless."""
+"""Commands that a script starts with `&`: the shell makes them ignore SIGINT, but `kill -INT` must stop them nevertheless."""
 
 from __future__ import annotations
 

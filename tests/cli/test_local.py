@@ -72,7 +72,7 @@ def listening(process: psutil.Process) -> set[str]:
 
 @pytest.fixture
 def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
-    """Set and return variables that a user's ~/.bashrc may contain for other work."""
+    """Set and return variables that a user's ~/.bashrc may set for other work."""
     monkeypatch.delenv("ROS_HOSTNAME")
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     monkeypatch.setenv("ROS_IP", "192.0.2.7")

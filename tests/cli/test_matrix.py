@@ -124,7 +124,7 @@ ROWS = {
 ELSEWHERE = re.compile(
     r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt|rviz|smach_viewer"
 )
-"""Commands that have their own matrices or tests."""
+"""Commands that have matrices or tests of their own."""
 
 # exit status without a master, if it is not 1; the same as in ROS
 MASTERLESS_STATUS = {"rosservice": 2, "rosgraph": 0}
@@ -174,7 +174,7 @@ class Recorded(io.StringIO):
 
 
 class Terminal(Recorded):
-    """Records the output on a terminal, on which commands print more than ROS does if there is no master."""
+    """Records the output on a terminal, where commands print more than ROS if there is no master."""
 
     def isatty(self) -> bool:
         return True
@@ -256,7 +256,7 @@ def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
             ghost.register_service(service, "rosrpc://localhost:1", "http://localhost:1/")
         ghost.set_param("/text", "日本")
 
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.02)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.02)
     return robot
 
 
@@ -300,7 +300,7 @@ def test_a_typo_in_an_option(lines: list[str]) -> None:
 
 
 def test_an_option_that_no_command_has() -> None:
-    """Every installed command refuses an unknown option."""
+    """Every installed command refuses an option that does not exist."""
     # xacro's errors about options are those of the xacro package.
     for name in scripts().keys() - {"xacro"}:
         result = run(f"{name} --nonsense")
@@ -312,13 +312,13 @@ def test_an_option_that_no_command_has() -> None:
 
 
 def test_a_missing_argument(lines: list[str]) -> None:
-    """Arguments that are not in brackets in the usage are required."""
+    """Arguments that the usage does not put in brackets are required."""
     for line in lines:
         usage = run(f"{line} -h").out.partition("\n\n")[0].partition(line)[2]
         while "[" in usage:
             usage = re.sub(r"\[[^][]*\](\.\.\.)?", "", usage)
 
-        # These arguments are optional although ROS's usage does not put them in brackets.
+        # These arguments are optional, although they are not in brackets in ROS's usage.
         if usage.split() and line not in (
             "minirospy",
             "rosgraph",

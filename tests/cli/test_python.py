@@ -1,4 +1,4 @@
-"""`minirospy python FILE`, which users need if minirospy has a separate environment."""
+"""`minirospy python FILE`, which users need if minirospy is in its own environment."""
 
 from __future__ import annotations
 

@@ -412,7 +412,7 @@ def test_bag_whose_chunk_header_is_damaged_stays_as_it_is(bag: Path, command: Co
 
 
 def test_record_takes_the_size_behind_split(capsys: pytest.CaptureFixture[str]) -> None:
-    """Scripts older than --size use this form; the second error is from a later step."""
+    """Scripts from before --size existed use this form; a later step reports the second error."""
     assert rosbag.main(["record", "/a", "--split", "5", "--lz4", "-j"]) == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -99,7 +99,7 @@ def test_echo(
     echoes = [program(words), program([*words, "/other"]), program([*words, "-l", "info", "/talk"])]
     assert talker.stdin
 
-    # Repeat this until both are subscribed, because earlier log messages do not reach them.
+    # Repeat this until both are subscribed; they do not receive earlier log messages.
     while any(echo.poll() is None for echo in (echoes[0], echoes[2])):
         talker.stdin.write("quiet\n!loud\n")
         talker.stdin.flush()

@@ -87,7 +87,7 @@ def test_killed_session_is_continued(start: Start) -> None:
     assert "journal: recovered 0 nodes and 4 parameters of the master that stopped" in second.said
     assert f"setting /run_id to {run_id}\n" in second.said
     assert master.get_param("/kept") == {"a": [1, 2]}
-    # The registration and address of the killed roscore's /rosout are not listed a second time.
+    # The registration and address of the killed roscore's /rosout are not listed twice.
     assert master.get_system_state().publishers == {"/rosout_agg": ["/rosout"]}
     second.end()
     third = start()
@@ -138,7 +138,7 @@ def test_shutdown_call_is_a_clean_shutdown(start: Start) -> None:
 def test_folders_that_cannot_be_created_are_reported(
     start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """roscore runs without the folders, and prints one line for the logs and one for the journal."""
+    """roscore runs without the folders and prints one line for the logs and one for the journal."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "file"))
     monkeypatch.delenv("ROS_LOG_DIR")
@@ -157,7 +157,7 @@ def test_folders_that_cannot_be_created_are_reported(
     assert f"setting /run_id to {run_id}\n" in core.said
 
     # The /rosout node receives log messages, and continues without its file.
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.2)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
 
@@ -205,7 +205,7 @@ def test_log_folder(start: Start) -> None:
     master.close()
     core.end()
 
-    # The file exists from the start, for `tail -f`, and starts with the same lines as real rosout's.
+    # The file exists from the start, for `tail -f`, and starts with the lines that real rosout writes.
     assert re.fullmatch(r"\n\n[0-9]+\.[0-9]{9}  Node Startup\n", (folder / "rosout.log").read_text())
     log = (folder / "master.log").read_text()
     assert "[minirospy.master][INFO] " in log
@@ -376,7 +376,7 @@ def test_missing_standard_output_does_not_stop_the_master(start: Start) -> None:
 def test_silent_master_at_the_port_is_known_by_its_journal(
     is_held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A master that holds the journal's lock is busy reading its journal, or stopped; any other program is not a master."""
+    """A master that holds the journal's lock is busy reading the journal, or suspended. Any other program is not a master."""
     monkeypatch.setattr(commands, "ANSWER_SECONDS", 0.05)
     path = tmp_path / "journal-1"
     journal = Journal(path, list)
@@ -424,7 +424,7 @@ def test_roscore_next_to_a_suspended_master(start: Start, monkeypatch: pytest.Mo
 def test_a_line_is_one_write(
     stream: str, call: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a buffer (PYTHONUNBUFFERED), a line from one thread could be printed between another line's text and its end."""
+    """Without a buffer (PYTHONUNBUFFERED), one thread's line could be printed in the middle of another's."""
     raw = Writes()
     monkeypatch.setattr(sys, stream, io.TextIOWrapper(raw, "utf-8", write_through=True))
     call("text")

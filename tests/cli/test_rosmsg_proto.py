@@ -29,7 +29,7 @@ def test_fields_left_out_and_empty_arrays(command: Any) -> None:
 
 
 def test_layouts_as_the_real_one_has_them(command: Any) -> None:
-    """Bytes are not a list; after the first wide value, all values are on one line; lines continue past the 80th column."""
+    """Bytes are not a list. After the first wide value, all values are on one line. Lines continue past column 80."""
     image = command("rosmsg_proto", "msg", "sensor_msgs/Image", "-H").out
     assert "  stamp: {secs: 0, nsecs: 0}\n" in image
     assert image.endswith('\nstep: 0\ndata: !!binary ""\n')

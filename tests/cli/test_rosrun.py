@@ -1,4 +1,4 @@
-"""The command rosrun: which program in a package it runs, how, and the errors if there is none."""
+"""The command rosrun: which program of a package it runs and how, and the errors if there is none."""
 
 from __future__ import annotations
 

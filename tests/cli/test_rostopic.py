@@ -150,7 +150,7 @@ def test_echo_waits_for_a_publisher_and_follows_it(robot: Any, program: Start) -
 
 
 def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
-    """`rostopic pub /t type "data: True"` latches the message until Ctrl-C."""
+    """`rostopic pub /t type "data: True"` latches the message, until Ctrl-C."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "data: True"])
     assert pub.stdout is not None
     assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
@@ -164,7 +164,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     waits: list[float] = []
 
     def wait(_: ToolNode, seconds: float) -> bool:
-        # On a busy machine a subscriber may need longer.
+        # On a busy machine, a subscriber may take longer.
         waits.append(seconds)
         wait_until(lambda: len(robot.heard) == len(waits))
         return False
@@ -179,7 +179,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
         assert verbose.out == "publishing and latching [data: False] for 3.0 seconds\n"
     assert waits == [3.0, 3.0]
     assert robot.heard == [b"\x01", b"\x00"]
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     for words in (
         ("geometry_msgs/Point", "1", "-2.5", "-3"),
         ("std_msgs/Float32", "-0.5"),
@@ -191,7 +191,7 @@ def test_pub_once(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> 
 def test_pub_from_standard_input_and_file(
     robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._REGISTERED_CONNECT_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.REGISTERED_CONNECT_SECONDS", 60.0)
     file = tmp_path / "messages.yaml"
     file.write_text("data: True\n---\ndata: False\n---\n")
     pub = ("pub", "-r", "50", "/listen", "std_msgs/Bool")
@@ -237,7 +237,7 @@ def test_pub_that_cannot_be(master: str, command: Any, argv: list[str], status: 
 
 
 def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "/listen", "std_msgs/String", "x")
     assert (
         "WARNING: topic [/listen] is of type [std_msgs/Bool] already, not [std_msgs/String]\n" in result.err
@@ -247,7 +247,7 @@ def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch:
 def test_pub_without_subscribers_suggests_a_similar_topic(
     robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     misspelt = command("rostopic", "pub", "-1", "/lisen", "std_msgs/Bool", "true")
     assert misspelt.status == 0
     assert misspelt.err == "WARNING: topic [/lisen] has no subscribers yet; did you mean /listen?\n"
@@ -363,14 +363,14 @@ def test_pub_options_that_exclude_each_other(master: str, command: Any) -> None:
 
 
 def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "")
     assert result == (0, "publishing and latching [data: ''] for 0.1 seconds\n", "")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
 def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
-    """In `rostopic echo /a | rostopic pub /b TYPE`, each message is published as soon as it arrives, not at end of file."""
+    """In `rostopic echo /a | rostopic pub /b TYPE`, each message is published when it arrives, not at the end of the input."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool"])
     assert pub.stdin is not None
     for text, heard in (("data: True\n---\n", [b"\x01"]), ("data: False\n---\n", [b"\x01", b"\x00"])):
@@ -447,7 +447,7 @@ def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: St
 
 
 def test_a_value_is_no_remapping(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub.LATCH_SECONDS", 0.1)
     result = command("rostopic", "pub", "-1", "-v", "/t", "std_msgs/String", "data: 'x:=1'")
     assert result == (0, 'publishing and latching [data: "x:=1"] for 0.1 seconds\n', "")
 
@@ -463,7 +463,7 @@ def test_argument_that_yaml_cannot_hold_is_misuse(master: str, command: Any, tex
 
 @pytest.mark.skipif(os.name == "nt", reason="select() supports only sockets on Windows")
 def test_documents_on_stdin_are_read_as_soon_as_they_arrive() -> None:
-    """Several lines in one write do not wait in a buffer for the next write."""
+    """Several lines in one write do not wait in a buffer until the next write."""
     program = "import rostopic\nfor document in rostopic.stdin_yaml_arg():\n    print(document, flush=True)\n"
     with subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE

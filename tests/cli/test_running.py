@@ -70,7 +70,7 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
     running: list[subprocess.Popen[str]] = []
     yield running
     for process in running:
-        # Stop the child processes too, because an orphan would keep the pipe open.
+        # Also stop the child processes: an orphan would keep the pipe open.
         with contextlib.suppress(psutil.Error):
             for child in psutil.Process(process.pid).children(recursive=True):
                 child.kill()

@@ -1,4 +1,4 @@
-"""cli/windows: rqt's windows, as plug-ins and as ROS packages."""
+"""cli/windows: rqt's windows, as plugins and as ROS packages."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def program(name: str) -> list[str]:
 @pytest.mark.parametrize("name", ["script", "xacro", "xacro.py", "verb"])
 def test_packages_and_arguments_are_found(name: str, macros: Path) -> None:
     scripts = {"script": [str(BIN / "xacro")], "verb": [str(BIN / "rosrun"), "xacro", "xacro"]}
-    # Run it with a code page that cannot encode the file's characters.
+    # Run xacro with a code page that cannot encode the file's characters.
     done = run(
         *(scripts.get(name) or program(name)), macros, "--inorder", "--xacro-ns", PYTHONIOENCODING="cp437"
     )

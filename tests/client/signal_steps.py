@@ -32,7 +32,7 @@ from roscpp import msg, srv  # noqa: F401
 
 from minirospy.base.errors import RpcRefused
 
-# Import the modules that init_node uses, because an import's steps do not count as the node's.
+# Import the modules that init_node uses: the steps of an import do not count as steps of the node.
 from minirospy.client import params, shutdown, startup  # noqa: F401
 from minirospy.client.session import current_session
 from minirospy.runtime.master import log_file  # noqa: F401
@@ -42,7 +42,8 @@ from minirospy.runtime.transport import loop
 
 _AT_ONCE = 3
 _numbers = itertools.count()
-_GUARD = 60.0  # seconds after which a process is considered hung; a machine that runs tests may stall
+# seconds after which a process is considered hung; a machine that runs tests may stall for a while
+_GUARD = 60.0
 # Maximum seconds to stay at a step. In a critical section, or before the library's thread has started, no signal is
 # dispatched.
 _STAND = 0.3
@@ -87,8 +88,8 @@ def run_node(name: str, at: int, way: Callable[[], None], notes: int) -> None:
 
     At step 0 the node is not shut down.
     """
-    # Disable timeouts that depend on the machine's speed: the interrupt of a running main thread, the report of slow
-    # work.
+    # Disable the timeouts that depend on the machine's speed: the interrupt of a running main thread, and the report
+    # of slow work.
     shutdown._GRACE_SECONDS = shutdown._REPORT_SECONDS = 1000.0
     # Raise the limits that would hide a deadlock.
     loop.CLOSE_SECONDS = registration.SILENT_SECONDS = registration.STILL_SILENT_SECONDS = 1000.0
@@ -179,7 +180,7 @@ class Trial:
                 texts.append(file.read().decode())
         output, notes = texts
         if self._is_twice:
-            # The second signal may cause a warning, and leave the node in the master's lists.
+            # The second signal may cause a warning, and may leave the node in the master's lists.
             output = output if "Traceback" in output else ""
         else:
             with contextlib.suppress(RpcRefused):

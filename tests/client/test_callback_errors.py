@@ -1,4 +1,4 @@
-"""Which errors in callbacks are logged, and when, with a manual clock."""
+"""Which errors in callbacks are logged, and when. The test controls the clock."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def fail(
     kind: type[Exception] = ValueError,
     callback: object = "CALLBACK",
 ) -> None:
-    """Log an error that is raised at the same line each time."""
+    """Log an error that is always raised at the same line."""
     try:
         raise kind(text)
     except kind as error:

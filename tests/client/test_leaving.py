@@ -1,4 +1,4 @@
-"""A node leaves the graph however it shuts down: the master no longer knows it, and its process exits with status 0."""
+"""However a node shuts down, it leaves the graph: the master no longer knows it, and its process exits with status 0."""
 
 from __future__ import annotations
 

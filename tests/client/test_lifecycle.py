@@ -62,7 +62,7 @@ NO_REPORT = "from minirospy.client import shutdown; shutdown._REPORT_SECONDS = 1
 
 
 def deliver(process: subprocess.Popen[str], number: int) -> None:
-    """Send a signal, and wait until the process has received it, because of two pending signals it receives only one."""
+    """Send a signal, and wait until the process has received it: of two pending signals, it would receive only one."""
     process.send_signal(number)
     if sys.platform != "linux":
         time.sleep(0.1)
@@ -81,7 +81,7 @@ def deliver(process: subprocess.Popen[str], number: int) -> None:
 def signalled(script: str, number: int) -> tuple[int, str, str, float]:
     """Return a program's exit status, its output after the signal, and how long it ran."""
     process = start(script)
-    # Keep the program's stdin open: a program that reads it must exit because of the signal.
+    # Keep the program's stdin open, so that a program that reads it can only exit because of the signal.
     open_input, process.stdin = process.stdin, None
     assert open_input
     with open_input:
@@ -91,7 +91,7 @@ def signalled(script: str, number: int) -> tuple[int, str, str, float]:
         return process.returncode, output, errors, time.monotonic() - start_time
 
 
-SECONDS = 3.0  # seconds; one is promised, but a machine that runs tests may be busy
+SECONDS = 3.0  # seconds; one is promised, but a machine that runs tests may be slow
 
 
 def in_time(program: Callable[[], float]) -> None:
@@ -307,7 +307,7 @@ def test_request_of_another_process_interrupts_a_main_thread_that_does_not_end(
     master: str, what: str
 ) -> None:
     body, prints, is_interrupted = REQUEST[what]
-    # Do not limit the time of a loop that polls and exits by itself, because the machine may stall.
+    # Do not limit the time of a loop that polls and exits by itself: the machine may stall.
     grace = SHORT_GRACE.format(0.5 if is_interrupted else 1000.0)
     process = start(grace + PROGRAM.format(textwrap.indent(body, "    ")))
     open_input, process.stdin = process.stdin, None
@@ -610,7 +610,7 @@ print("still there")
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has process namespaces")
 def test_the_first_process_of_a_container(master: str) -> None:
-    """The kernel does not deliver signals to this process that it does not handle."""
+    """The kernel does not deliver signals to this process unless it has a handler for them."""
     unshare = ["unshare", "--pid", "--fork", "--kill-child"]
     if (
         not shutil.which("unshare")
@@ -667,7 +667,7 @@ print("cleaned up", flush=True)
 
 @POSIX_ONLY
 def test_a_program_that_stands_still_keeps_its_time(master: str) -> None:
-    """The grace period after a signal is time during which the program can run, even on a machine that stalls."""
+    """The grace period after a signal counts only the time during which the program can run, even if the machine stalls."""
     process = start("""
 import signal, time, rospy
 rospy.init_node("still")
@@ -1107,7 +1107,7 @@ except rospy.ROSInitException as error:
 
 @POSIX_ONLY
 def test_a_hook_does_not_log_into_a_line_that_is_being_written(master: str) -> None:
-    """Files and streams are not reentrant: a signal in the middle of a line must wait until the line is written."""
+    """Files and streams are not reentrant. A signal in the middle of a line must wait until the line is complete."""
     process = start("""
 import atexit, logging, os, signal
 import rospy
@@ -1139,7 +1139,7 @@ rospy.loginfo("line")
 
 @POSIX_ONLY
 def test_a_fork_is_left_to_the_system_until_it_polls(master: str) -> None:
-    """A Python handler would wait for the C code in a pool's worker, sometimes forever."""
+    """In a pool's worker, a Python handler would have to wait for C code, sometimes forever."""
     process = start("""
 import os, signal, sys, time
 import rospy

@@ -1,4 +1,4 @@
-"""Deliberate improvements of services over rospy's, for cases in which rospy hangs or leaves a dead proxy."""
+"""Where minirospy's services deliberately differ from rospy's, which hang or leave a dead proxy."""
 
 from __future__ import annotations
 
@@ -260,7 +260,7 @@ def test_closing_a_persistent_proxy_ends_the_call_of_another_thread(started: lis
 
 
 def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
-    """The proxy connects to the last known address first; the response comes from the node that the master returns."""
+    """The proxy first connects to the last known address. The response comes from the node that the master returns."""
     client = start(started, PERSISTENT.replace("persistent=True", "persistent=False"))
     servers = []
     for name in ("one", "two"):
@@ -278,7 +278,7 @@ def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
 
 
 def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
-    """rospy would wait until the handler has returned."""
+    """rospy would wait for the handler to return."""
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     client = start(started, WAITING)
@@ -345,7 +345,7 @@ def test_shutdown_hook_may_call_the_proxy_whose_call_it_interrupts(
 
 
 def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:
-    """rospy's thread would exit, and the client would wait forever."""
+    """In rospy, the thread would exit and the client would wait forever."""
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     proxy = MasterProxy(master, "/test")
@@ -388,7 +388,7 @@ def test_a_service_that_one_thread_ends_another_may_offer_at_that_moment(started
         started,
         """
 import threading
-import minirospy.client.services as module
+import minirospy.client.service as module
 import rospy
 from std_srvs.srv import Trigger
 

@@ -80,7 +80,7 @@ def test_waiting_calls_run_once_the_node_is_ready(session: Session) -> None:
 
 
 def test_a_signal_while_a_call_of_the_loop_starts_waits_for_its_start(session: Session) -> None:
-    """At that point the thread holds a lock, for which closing the loop would wait."""
+    """At this point the thread holds a lock, for which closing the loop would wait."""
     was_requested: list[bool] = []
 
     class Loop:

@@ -203,7 +203,7 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
     lifecycle: Lifecycle, watchdog: SignalWatchdog, *, was_notified: bool
 ) -> None:
     lifecycle.signal_shutdown("test")
-    # The watchdog sends the interrupt; before it arrives, the program polls is_shutdown(), and starts to clean up.
+    # The watchdog sends the interrupt. Before it arrives, the program polls is_shutdown() and starts to clean up.
     if was_notified:
         assert lifecycle.poll_shutdown()
         nudge(watchdog, Action.INTERRUPT)

@@ -190,7 +190,7 @@ def test_sleep_without_clock_names_it_once(sleep: str) -> None:
 {LOG}
 from minirospy.base import clock
 import rospy.rostime
-clock._SILENT_SECONDS = 0.1
+clock.SILENT_SECONDS = 0.1
 rospy.set_param("/use_sim_time", True)
 rospy.init_node("case")
 print_log()

@@ -224,7 +224,7 @@ print(eventually(lambda: len(calls) == 6), calls)
 
 
 def test_slow_callback_gets_the_newest_message(start: Start) -> None:
-    """This is a common mistake: large images, a slow callback, queue_size=1, and the default buff_size."""
+    """This is a common mistake: large images, a slow callback, queue_size=1 and the default buff_size."""
     output, _ = finished(
         start("""
 rospy.init_node("camera")
@@ -244,8 +244,8 @@ assert eventually(lambda: 100 in heard)
 print(len(heard) < 10, heard[-1])
 """)
     )
-    # If all messages arrived in order, the second would follow the first. Messages in the sockets may still precede
-    # the newest.
+    # If all messages arrived in order, the second would follow the first. Messages in the sockets may still come
+    # before the newest.
     assert output == "True 100\n"
 
 

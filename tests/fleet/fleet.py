@@ -1,4 +1,4 @@
-"""Masters, gateways and nodes of a fleet on one event loop, which use only loopback and no multicast."""
+"""Masters, gateways and nodes of a fleet on one event loop. They use only loopback, and no multicast."""
 
 from __future__ import annotations
 

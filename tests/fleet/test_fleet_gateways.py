@@ -155,8 +155,8 @@ def test_strings_flow_both_ways_without_loops(fleet: Fleet) -> None:
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     heard = collect(fleet, robot, "/chat", String)
-    # Start it before the gateway, which queries the header of a publisher that starts later and then counts as a
-    # subscriber, too.
+    # Start it before the gateway: the gateway queries a publisher that starts later for its header, and then counts
+    # as a subscriber, too.
     said = publisher(fleet, robot, "/chat", String)
     robot.gateway("robot1")
     fleet.until_shown(control, "/robot1/chat")

@@ -643,7 +643,7 @@ def test_a_second_start_that_cannot_listen_or_waits_does_not_end_the_first(
 
 
 def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
-    """The link is cut, and the event loop of the robot's gateway is blocked. Publishing zero velocity depends on neither."""
+    """The link is cut, and the event loop of the robot's gateway is blocked. Zero velocity must be published regardless."""
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     proxy = Proxy(fleet, fleet.endpoint)

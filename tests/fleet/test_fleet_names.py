@@ -189,7 +189,7 @@ def test_a_machine_whose_clock_is_behind_takes_no_name(
     gateway = robot.gateway("robot1", host="a" * 16)
     heard = collect(fleet, robot, "/cmd_vel", String)
     fleet.until_shown(control, "/robot1/cmd_vel")
-    # Its clock is a year slow: in an earlier version, it took over the name and the commands within 0.1 s.
+    # Its clock is a year slow. An earlier version let it take over the name and the commands within 0.1 s.
     other = late.gateway("robot1", host="b" * 16, clock=lambda: 1)
     stolen = collect(fleet, late, "/cmd_vel", String)
     fleet.until(lambda: importer.contents.waiting)

@@ -132,7 +132,7 @@ def test_topic_of_the_bridge_is_shown_here_and_passed(fleet: Fleet, peer: Callab
 def test_messages_without_any_beacon_are_passed_both_ways(
     fleet: Fleet, peer: Callable[..., Ros1Peer]
 ) -> None:
-    """A bridge sends no beacon while another one sends the same; a program that only uses Zenoh sends none."""
+    """A bridge sends no beacon while another one sends the same. A program that only uses Zenoh sends none."""
     place = fleet.place()
     chat = publisher(fleet, place, "/out", String)
     received = collect(fleet, place, "/in", String)
@@ -380,7 +380,7 @@ def test_a_second_gateway_of_these_keys_is_refused(fleet: Fleet) -> None:
 def test_topics_of_another_gateway_of_this_master_are_not_announced(
     fleet: Fleet, peer: Callable[..., Ros1Peer], caplog: pytest.LogCaptureFixture
 ) -> None:
-    """This happens if two gateways start at the same moment, or zenoh-bridge-ros1 itself starts later."""
+    """This happens if two gateways start at the same moment, or if zenoh-bridge-ros1 itself starts later."""
     place = fleet.place()
     gateway(place, listens=True)
     chat = publisher(fleet, place, "/chat", String, name="ros1_to_zenoh_bridge", headers={MARK: "1"})

@@ -95,7 +95,7 @@ def test_a_call_is_answered_though_another_answers_the_same_key_never(fleet: Fle
     with stranger(fleet) as session:
         key = call_key("robot1", gateway.id, "/lamp", SetBool._md5sum)
         declared = fleet.call(lambda: session.answer(key, silence))
-        # Its own answer would never arrive: by then the control room knows the type.
+        # Its own answer would come too late: by then the control room knows the type.
         with pytest.raises(QueryFailed):
             fleet.run(session.query(f"{ROOT}/nobody", seconds=0.5))
         assert fleet.run(client.call("/robot1/lamp", SetBool, True)).message == "on"
@@ -108,7 +108,7 @@ def test_a_query_that_ends_early_does_not_say_that_it_has_waited(fleet: Fleet) -
     serve_lamp(fleet, robot)
     control_room(fleet, control)
     gateway = robot.gateway("robot1")
-    # If a broken link cuts off a call, Zenoh finishes the query without a reply, long before its timeout.
+    # If a broken link cuts off a call, Zenoh ends the query without a reply, long before its timeout.
     match = "no answer: nobody answers there, or the link broke after"
     with stranger(fleet) as session, pytest.raises(QueryFailed, match=match):
         fleet.run(session.query(f"{ROOT}/call/robot1/{gateway.id}x/none", seconds=3600.0))
@@ -125,7 +125,7 @@ def test_only_as_many_replies_as_wanted_are_kept() -> None:
 
     async def check() -> None:
         network = FleetNetwork(stub(close=lambda: None, get=get), asyncio.get_running_loop())
-        # The query never finishes by itself.
+        # The query never ends by itself.
         assert len(await network.queries("a/*", seconds=3600.0, most=10)) == 10
         assert await network.query("a/1", seconds=3600.0) == b"x"
         await network.close()

@@ -23,7 +23,7 @@ from websockets.sync.client import ClientConnection, connect
 from tests.waiting import wait_until
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE = 200.0  # seconds to wait for a state; a loaded machine may need many
+PATIENCE = 200.0  # seconds to wait for a state; a busy machine may take many
 
 _FLAGS = (
     "--headless=new",
@@ -183,7 +183,7 @@ class Page:
             self._arm(find, text)
             for kind in ("mousePressed", "mouseReleased"):
                 self._mouse(kind, find, text)
-            # A page that has just been loaded has no record of the click that loaded it.
+            # A page that was just loaded has no record of the click that loaded it.
             if self.evaluate("window.clickedByTest !== false"):
                 return
             assert time.monotonic() < end, f"the clicks do not reach {find} {text!r}"

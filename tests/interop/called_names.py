@@ -55,7 +55,7 @@ AT_RANDOM = re.compile(
     r"^random_|\bgetPid$|^Rate.remaining$|date_time_string$|^RosStreamHandler.emit$|^TransformRegistration.print_me$"
     r"|^rosmsg_cmd_packages$|disk_usage$|^list_msg_types$|^get_pkg_msg_specs$|^roswtf_main$"
 )
-"""Names whose values differ between calls or machines, such as lists of installed packages."""
+"""Names whose values differ between calls or machines, for example lists of installed packages."""
 
 # Standard library modules whose methods ROS's classes inherit.
 NOT_OF_ROS = ("http.server", "logging", "socketserver", "xmlrpc.server")

@@ -27,11 +27,12 @@ REAL_BIN = Path("/usr/bin")
 OUR_BIN = Path(sys.executable).parent
 
 STACKS = ("ours", "rospy", "roscpp")
-PATIENCE = 200.0  # seconds after which a program is considered hung: on a busy machine, starting one may take a minute
+# seconds after which a program is considered hung; on a busy machine, starting one may take a minute
+PATIENCE = 200.0
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # Start the test that takes minutes first, so that the others run in parallel.
+    # Start the test that takes minutes first; the others then run in parallel.
     items.sort(key=lambda item: item.name.partition("[")[0] != "test_the_table")
     for item in items:
         if HERE not in item.path.parents:
@@ -39,8 +40,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not (REAL_BIN / "rosmaster").exists():
             item.add_marker(pytest.mark.skip(reason="real ROS 1 is not installed: make interop"))
         elif not item.get_closest_marker("timeout"):
-            # Use a longer timeout than PATIENCE, whose error names the condition. The test may first run a compiler,
-            # in parallel with other tests.
+            # Longer than PATIENCE, whose error names the condition. The test may first run a compiler in parallel
+            # with other tests.
             item.add_marker(pytest.mark.timeout(3 * PATIENCE))
 
 

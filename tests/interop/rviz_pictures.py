@@ -1,8 +1,7 @@
 """`PYTHONPATH=. python tests/interop/rviz_pictures.py FOLDER [SCENE...]`: pictures of Debian's RViz and minirospy's 3D view.
 
-Both open the same .rviz file on the same topics and draw from the same camera; each scene becomes one picture, RViz on
-the left.
-RViz runs under Xvfb, by Mesa's software renderer: apt-get install rviz xvfb libgl1-mesa-dri.
+Both open the same .rviz file on the same topics and draw from the same camera position. Each scene becomes one picture, with
+RViz on the left. RViz runs under Xvfb with Mesa's software renderer: apt-get install rviz xvfb libgl1-mesa-dri.
 """
 
 from __future__ import annotations

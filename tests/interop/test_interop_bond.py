@@ -1,4 +1,7 @@
-"""Bonds between minirospy's bondpy, Debian's bondpy and bondcpp are formed, and are broken by an endpoint or by killing one."""
+"""Bonds between minirospy's bondpy, Debian's bondpy and bondcpp.
+
+They are formed, and broken by an endpoint or by killing one.
+"""
 
 from __future__ import annotations
 

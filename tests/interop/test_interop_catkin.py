@@ -158,7 +158,7 @@ PACKAGES = {
     ),
 }  # fmt: skip
 
-# Real catkin needs these for the md5sum of a message that contains them, but generates no class; minirospy does.
+# Real catkin needs these for the md5sum of a message that contains them, but generates no classes for them; minirospy does.
 UNLISTED = ("wild.msg.Left", "half_listed.msg.Unlisted")
 
 LOOK = """

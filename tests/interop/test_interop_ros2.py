@@ -41,7 +41,7 @@ from tests.waiting import until
 
 _T = TypeVar("_T")
 HERE = Path(__file__).parent
-LIMIT = 90.0  # seconds to wait for a state before failing: much longer than a busy machine takes
+LIMIT = 90.0  # seconds to wait for a state before failing; much longer than a busy machine takes
 
 DOMAIN_PORTS = 28_000
 
@@ -559,7 +559,7 @@ def test_a_server_of_ros2_is_called_from_ros1(scene: Scene) -> None:
 
 
 def test_the_first_call_waits_until_the_server_has_found_the_bridge(scene: Scene, tmp_path: Path) -> None:
-    """rmw_fastrtps drops the response to a client whose reader it has not discovered."""
+    """rmw_fastrtps drops the response to a client whose reader it has not discovered yet."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("needs a C compiler")

@@ -138,7 +138,7 @@ def test_publishing_and_echoing(
     # The command waits for the topic.
     assert echo.stderr
     assert "does not appear to be published yet" in echo.stderr.readline()
-    # `pub -1` exits after three seconds, during which a busy machine may stall.
+    # `pub -1` exits after three seconds; a busy machine may stall for that long.
     out = err = ""
 
     for _ in range(6):

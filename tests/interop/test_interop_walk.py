@@ -21,6 +21,7 @@ from minirospy.board.board import Board
 from minirospy.web.dashboard.views import VIEWS
 from tests.interop import robot_scene
 from tests.interop.browser import Page
+from tests.interop.test_interop_control_page import Manager
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher, statuses
 from tests.web.dashboard.bags import make_bag
 from tests.web.dashboard.conftest import Served, serve
@@ -46,6 +47,8 @@ SEEN = {
     "launch": (".launch-files button", "workshop.launch"),
     "bag": ("select option", "walk.bag"),
     "joints": (".joint .name", "left_wheel_joint"),
+    "controllers": (".controllers .name", "arm"),
+    "trajectory": (".joint .name", "shoulder"),
     "smach": (".smach-state", "DOCK"),
     "diagnostics": (".report", "Battery"),
 }
@@ -116,6 +119,7 @@ def furnish(served: Served) -> None:
 
     server = served.node("led")
     served.run(others())
+    Manager(served).states["arm"] = "running"
 
 
 def use(page: Page, view: str) -> None:

@@ -105,6 +105,16 @@ def test_modules_come_with_an_import_of_ros(program: str, output: str) -> None:
     assert (done.stdout.strip(), done.stderr) == (output, "")
 
 
+def test_messages_alone_import_no_xml() -> None:
+    """Real genpy does not import it either; programs that use only messages need not wait for it."""
+    program = (
+        "import sys; from std_msgs.msg import Bool; from sensor_msgs.msg import Image; import cv_bridge; "
+        "print('xml' in sys.modules, 'xmlrpc' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout.split(), done.stderr) == (["False", "False"], "")
+
+
 def test_importing_submodules_prints_nothing() -> None:
     program = "\n".join(f"import {module}" for module in RECORD["offered"])
     warned_of = "ignore:roslib.rospack is deprecated"

@@ -106,7 +106,7 @@ class Other:
 
 
 def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
-    """Return the result of ``look()``, called at most ten times until all of it is true.
+    """Call ``look()`` until its whole result is true, at most ten times; return the result.
 
     This is for durations, which are longer if the machine stalls occasionally, but not ten times in a row.
     """

@@ -216,7 +216,7 @@ def test_a_goal_waits_until_responses_of_the_server_arrive(monkeypatch: pytest.M
         async with ActionClient(node, "/fly", FibonacciAction) as client:
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=3))
-            # Requests are sent one after the other, but get no response.
+            # Requests are sent one after the other but get no response.
             await until(lambda: len(probe.reaching) >= 3 and goal.state is GoalState.PENDING)
             assert not there.goals
             probe.answers = True
@@ -408,7 +408,7 @@ def test_client_of_rclpy_that_the_executor_sees_too_early_has_a_lock(monkeypatch
         _lock: threading.Lock
 
         def __init__(self, *_: object, **__: object) -> None:
-            # As in rclpy, the executor's thread may call it from here on.
+            # As in rclpy, the executor's thread may call it from now on.
             with self._lock:
                 pass
             self._lock = threading.Lock()
@@ -423,7 +423,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
         _logger: Any
 
         def __init__(self, *_: object, **__: object) -> None:
-            # As in rclpy, the executor's thread may call it from here on.
+            # As in rclpy, the executor's thread may call it from now on.
             self._logger.debug("a goal")
 
     monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())

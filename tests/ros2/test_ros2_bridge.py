@@ -459,7 +459,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any], topics: NameFilt
 
 
 async def connected(bridge: Ros2Bridge, count: int = 1) -> None:
-    """Wait until the bridge's subscriptions have ``count`` publishers; each refresh also connects, and disconnects again."""
+    """Wait until the bridge's subscriptions have ``count`` publishers. Each refresh also connects and disconnects again."""
 
     def found() -> int:
         return sum(len(each._subscription.headers) for each in bridge.topics.links.values())

@@ -219,7 +219,7 @@ def test_options_of_the_header_are_written_and_ignored() -> None:
 
 
 def test_a_large_message_is_copied_once() -> None:
-    # The result joins one slice of the source, which is not a copy, with the data before it.
+    # The result joins one slice of the source, not a copy of it, with the data before it.
     made = transcoder_of("sensor_msgs/Image")
     image = message_class("sensor_msgs/Image")(
         height=480, width=640, encoding="bgr8", step=1920, data=bytes(921_600)

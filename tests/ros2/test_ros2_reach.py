@@ -58,7 +58,7 @@ def test_requests_wait_ten_seconds_at_most_in_all() -> None:
         assert second.done()
         await asyncio.wait_for(reach.wait(), 1)
 
-        # Probing continues, because responses from a server that was only busy still arrive eventually.
+        # Probing continues: a server that was only busy will still respond.
         assert client.prober
         client.prober.answers = True
         await loop.advance(8)
@@ -88,7 +88,7 @@ def test_server_is_reached_after_a_silent_one_has_left() -> None:
         assert crashed
         reach.start()
         await loop.advance(10)
-        # The parameter services of a node that has left never become connected.
+        # The parameter services of a node that has exited never become connected.
         other = client.prober = FakeProbe(answers=False)
         client.servers = frozenset({b"2"})
         waiting = asyncio.ensure_future(reach.wait())

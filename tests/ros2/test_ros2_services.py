@@ -280,7 +280,7 @@ def test_a_time_limit_of_calls_that_is_no_time_is_refused(capsys: pytest.Capture
 
 @pytest.mark.usefixtures("master")
 def test_call_waits_longer_for_a_busy_server_than_a_probe(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hundreds of concurrent calls take long, and none of them may fail for that reason."""
+    """Hundreds of concurrent calls are slow, and none of them may fail for that reason."""
     monkeypatch.setattr(raw, "PROBE_SECONDS", 0.05)
     answer = serialize_header({"callerid": "/n", "md5sum": "0" * 32, "type": "a/B"})
 

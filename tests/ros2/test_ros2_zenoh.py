@@ -32,7 +32,7 @@ from tests.waiting import wait_until
 
 zenoh: Any = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
-LIMIT = 60.0  # seconds to wait for a state before failing: much longer than a busy machine takes
+LIMIT = 60.0  # seconds to wait for a state before failing; much longer than a busy machine takes
 CHATTER = f"0/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"
 SWITCH = f"0/switch/std_srvs::srv::dds_::SetBool_/{SERVICE_HASHES['std_srvs/SetBool']}"
 HELLO = bytes.fromhex("00010000 06000000 68656c6c6f00")

@@ -130,7 +130,7 @@ _STEPS = st.lists(
 
 @given(_STEPS)
 def test_account_is_the_sum_of_what_waits(steps: list[tuple[int, str, int]]) -> None:
-    """Whenever a message leaves a queue, for whatever reason, its large pieces leave the account."""
+    """However a message leaves a queue, its large pieces are removed from the account."""
     account = Account()
     shares = [account.open("a", lambda: None) for _ in range(4)]
     queues = [SendQueue(4 * LARGE_PIECE, share=share) for share in shares]
@@ -187,7 +187,7 @@ def test_shedding_does_not_choose_again_within_itself() -> None:
 
     def shed_first() -> None:
         order.append("first starts")
-        # A response to the client, such as the reason, counts even while the account exceeds its limit.
+        # A message to the client, such as the reason, counts even while the account exceeds its limit.
         first.set(first.size + 1)
         order.append("first ends")
         first.set(0)

@@ -97,7 +97,7 @@ def test_address_with_more_than_half_gives_way_to_one_with_few() -> None:
     greedy = [Seat("greedy", Rank.WRITE, number / 10) for number in range(9)]
     others = [Seat(f"b{number}", Rank.WRITE, 5.0) for number in range(7)]
     assert choose([*greedy, *others]) is greedy[-1]
-    # An eighth of the connections is too many to count as few.
+    # More than an eighth of the connections no longer counts as few.
     newcomers = [Seat("new", Rank.WRITE, 5.0) for _ in range(2)]
     assert choose([*greedy, *others[:5], *newcomers]) is None
     assert choose([*greedy, *others[:6], newcomers[0]]) is greedy[-1]

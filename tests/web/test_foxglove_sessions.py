@@ -283,7 +283,7 @@ def test_changes_of_parameters_reach_subscribers(bridge: Running) -> None:
     assert everything.next("parameterValues")["parameters"] == [{"name": "/ns/x", "value": 5}]
     assert everything.next("parameterValues")["parameters"] == [{"name": "/a"}]
     client.send(op="unsubscribeParameterUpdates", parameterNames=["/a", "/ns", "/ns/x"])
-    # Its response shows that the bridge has read the earlier messages.
+    # The response to it shows that the bridge has read the earlier messages.
     client.send(op="getParameters", parameterNames=["/a"], id="unsubscribed")
     client.next("parameterValues", lambda message: message.get("id") == "unsubscribed")
     everything.close()
@@ -387,7 +387,7 @@ def test_type_of_a_client_is_known_without_a_class_of_it() -> None:
 
 def test_asset_over_the_bound_is_refused(tmp_path: Path) -> None:
     write_files(tmp_path / "arm", {"package.xml": "<package><name>arm</name></package>", "a.stl": "12345"})
-    assets = Assets(Packages.below(tmp_path), most_bytes=4)
+    assets = Assets(Packages.below(tmp_path), max_bytes=4)
     with pytest.raises(BridgeError, match="5 bytes, 4 are allowed"):
         assets.open("package://arm/a.stl")
 

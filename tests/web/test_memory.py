@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from websockets.frames import Opcode
 
-MAX_PEAK = 400_000_000  # maximum bytes of the process, with Python and all libraries
+MAX_PEAK = 400_000_000  # maximum memory of the process in bytes, with Python and all libraries
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="by /proc")
 
@@ -94,7 +94,7 @@ class Attacked:
 
 
 def frame(data: bytes, opcode: int = Opcode.TEXT, *, announced: int = 0) -> bytes:
-    """Return a client's frame; with ``announced`` it is truncated."""
+    """Return a client's frame; with ``announced``, it is cut off."""
     size = announced or len(data)
     return bytes((0x80 | opcode, 0xFF)) + struct.pack("!Q", size) + bytes(4) + data
 

@@ -227,7 +227,7 @@ def test_limits_of_quick_messages_are_exact() -> None:
     for part in ("[", b"["):
         assert protocol.is_quick(part * MAX_QUICK_CHARACTERS) is True
         assert protocol.is_quick(part * (MAX_QUICK_CHARACTERS + 1)) is False
-    # A large string of few values is quick, too.
+    # A large string with few values is quick, too.
     assert protocol.is_quick("a" * (MAX_QUICK_CHARACTERS + 1)) is True
 
 
@@ -452,7 +452,7 @@ def test_messages_that_wait_share_the_room_of_their_client() -> None:
         assert not one.arrived(bytes(3000), 0.1)
     assert (one.dropped, other.dropped) == (3, 0)
     assert not other.arrived(bytes(6000), 0.1)
-    # A topic's newest message is kept in any case.
+    # A topic's newest message is always kept.
     assert other.dropped == 0
     assert not other.arrived(bytes(1), 0.1)
     assert (other.dropped, budget.taken <= 10_000) == (1, True)

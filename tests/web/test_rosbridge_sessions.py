@@ -166,7 +166,7 @@ def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> No
 def test_large_message_is_encoded_in_a_thread_while_others_are_served(
     bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
 ) -> None:
-    encode, names = shared._encoded, list[str]()
+    encode, names = shared.encode_arrival, list[str]()
     has_started, may_end = threading.Event(), threading.Event()
 
     def slow(topic: str, *arguments: Any) -> bytes:
@@ -176,11 +176,11 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
             may_end.wait(30)
         return encode(topic, *arguments)
 
-    monkeypatch.setattr(shared, "_encoded", slow)
+    monkeypatch.setattr(shared, "encode_arrival", slow)
     latched(bridge, "/large", String("a" * 100_000))
     latched(bridge, "/small", String("b"))
     fields = {"compression": compression, "fragment_size": fragment_size}
-    # The clients do not read all fragments, so they do not receive a close frame either.
+    # The clients do not read all fragments, so they do not receive a close frame.
     client, other = (bridge.rosbridge(close_timeout=0.1) for _ in range(2))
     client.send(op="subscribe", topic="/large", **fields)
     assert has_started.wait(30)
@@ -205,14 +205,14 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
 def test_client_may_leave_while_its_large_message_is_encoded(
     bridge: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    encode, has_started, may_end = shared._encoded, threading.Event(), threading.Event()
+    encode, has_started, may_end = shared.encode_arrival, threading.Event(), threading.Event()
 
     def slow(*arguments: Any) -> bytes:
         has_started.set()
         may_end.wait(30)
         return encode(*arguments)
 
-    monkeypatch.setattr(shared, "_encoded", slow)
+    monkeypatch.setattr(shared, "encode_arrival", slow)
     latched(bridge, "/large", String("a" * 100_000))
     client = bridge.rosbridge()
     client.send(op="subscribe", topic="/large")
@@ -306,7 +306,7 @@ def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Run
         client = bridge.rosbridge(path=f"/?token={opening}")
         client.socket.send(cbor2.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 9000}))
         assert "bytes of CBOR is too large: this token is read-only" in client.next("status")["msg"]
-        # A token in parts is not accepted, either.
+        # A token in fragments is not accepted, either.
         client = bridge.rosbridge(path=f"/?token={opening}")
         text = json.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 25_000})
         for at, half in enumerate((text[:40_000], text[40_000:])):

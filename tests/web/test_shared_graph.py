@@ -72,7 +72,7 @@ def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
                 sock, _ = server.accept()
                 with sock:
                     may_answer.wait()
-                    # The probe may have timed out: then there is another one.
+                    # The probe may have timed out; in that case there is a second one.
                     with contextlib.suppress(OSError):
                         sock.sendall(serialize_header(fields))
                         sock.recv(4096)
@@ -129,7 +129,7 @@ def test_earlier_look_does_not_replace_the_snapshot_of_a_later_one(
 
 @pytest.mark.parametrize("turns", range(6))
 def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns: int) -> None:
-    """Before Python 3.12, asyncio.wait_for swallows the cancellation if the event arrives in the same iteration."""
+    """Before Python 3.12, asyncio.wait_for swallows the cancellation if the event occurs in the same iteration."""
 
     async def look_and_close() -> None:
         graph = SharedGraph(bridge.bridge.node, max_refresh_interval=60.0)

@@ -1,4 +1,4 @@
-"""How a server's clients share its event loop: the order of their work, with a clock that the test controls."""
+"""A server's clients share its event loop: the order of their work, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -247,7 +247,7 @@ def test_iteration_ends_when_its_time_has_passed() -> None:
     ],
 )
 def test_short_bursts_allow_as_many_slices(bursts: list[int], weight: float, slices: int) -> None:
-    """A client is interactive until it has used these slices in a burst; one whose last burst was long is not at all."""
+    """A client is interactive for this many slices of a burst; after a long burst, it is not interactive at all."""
     machine = Machine(turn=1000.0, slice_=1.0)
     machine.join("hog", 1.0)
     machine.join("a", 1.0)
@@ -320,7 +320,7 @@ def test_known_clients_have_their_own_expected_time() -> None:
 def test_queued_new_client_is_expected_to_take_longer_if_another_does(
     seconds: float, order: list[str]
 ) -> None:
-    """It moves back in the queue if the difference is more than a slice."""
+    """It moves back in the queue if the difference exceeds a slice."""
     machine = Machine(turn=4.0, slice_=1.0)
     machine.join("known", 1.5)
     for _ in range(NEW_PIECES):
@@ -398,7 +398,7 @@ def test_client_that_was_idle_has_no_advantage_over_those_that_were_not() -> Non
 
 
 def test_fault_does_not_end_turns() -> None:
-    """Work that starts after a fault is not work that is started by other work."""
+    """Work that starts after a fault does not count as work started by other work."""
     machine = Machine()
     machine.join("a", 0.0001)
 
@@ -462,7 +462,7 @@ def test_client_is_not_charged_while_other_processes_run() -> None:
 
 
 def test_interactive_client_goes_before_clients_whose_work_is_never_done() -> None:
-    """The interactive client goes first even if it uses more than an equal share of the time.
+    """The interactive client goes first even if it uses more than its equal share of the time.
 
     Its requests take longer than a slice.
     """
@@ -514,7 +514,7 @@ def test_bulk_client_becomes_interactive_after_a_short_burst() -> None:
         machine.iterate()
     for _ in range(20):
         machine.iterate()
-    # The client's burst was longer than ten slices, so it waits like the other client, and after that no longer.
+    # The client's burst exceeded ten slices, so it waits like the other client; after that, it no longer waits.
     waits = []
     for _ in range(2):
         machine.send("a", 1)

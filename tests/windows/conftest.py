@@ -36,7 +36,7 @@ def _wine_server() -> Iterator[None]:
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """Return a folder whose name has a space and an umlaut."""
+    """Return a folder whose name contains a space and an umlaut."""
     folder = tmp_path / "Übung eins"
     folder.mkdir()
     return folder

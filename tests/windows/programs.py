@@ -15,7 +15,7 @@ from tests.windows.windows import Windows
 
 WINDOWS = Windows()
 
-# seconds; a process takes some to start under Wine, and several times as many on a busy machine
+# seconds; under Wine, a process takes some of them to start, and several times as many on a busy machine
 SECONDS = 240.0
 
 MANIFEST = """<package><name>pkg</name><version>1.0.0</version><description>d</description>
@@ -93,7 +93,7 @@ class Run:
         """Kill the program."""
         self.process.kill()
         self.process.wait()
-        # The pipe is closed when its last process exits, including those that a launcher has started.
+        # The pipe is closed when its last process exits, including any process that a launcher has started.
         self._reader.join(SECONDS)
         if self._reader.is_alive():
             pytest.fail(f"what it started still has its output:\n{self.said}")

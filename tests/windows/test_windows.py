@@ -79,7 +79,7 @@ def test_nodes_of_linux_and_windows_exchange_messages(
 
 
 def test_launch_file_with_line_ends_of_windows(start: Start, place: Path, environ: dict[str, str]) -> None:
-    """All files have CRLF; one node respawns, and another one is required."""
+    """All files have CRLF line ends; one node respawns, and another one is required."""
     stop = (
         "import sys, rospy\nrospy.init_node('x', anonymous=True)\nprint('stopped', flush=True)\nsys.exit(4)\n"
     )
@@ -143,7 +143,7 @@ def test_bag(start: Start, place: Path, environ: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("launcher", ["roslaunch", "rosrun", "minirospy"])
 def test_nothing_outlives_a_launcher_that_is_ended_by_force(launcher: str, start: Start, place: Path) -> None:
-    """The launcher is killed at different moments, also while it starts, and also as its command's .exe."""
+    """The launcher is killed at different moments, including during its start, and also when run as its command's .exe."""
     write_files(
         place / "pkg",
         {

@@ -40,7 +40,7 @@ def typed(environ: dict[str, str], place: Path) -> Typed:
 
 
 class Typed:
-    """Runs commands as in a second terminal of a student, and returns their output."""
+    """Runs commands as a student does in a second terminal, and returns their output."""
 
     def __init__(self, environ: dict[str, str], folder: Path) -> None:
         self._environ = environ

@@ -24,9 +24,7 @@ ROOT = Path(__file__).parents[2]
 FOLDER = Path(os.environ.get("MINIROSPY_WINDOWS", ROOT / "build" / "windows"))
 
 VERSION = "3.12"
-"""The newest version for which there is a numpy that Wine 8 can load (1.26); later ones call functions that Wine's ucrtbase
-lacks.
-"""
+"""The newest version with a numpy that Wine 8 can load (1.26); later ones call functions that Wine's ucrtbase lacks."""
 
 PYTHON = r"C:\Python312"
 
@@ -190,7 +188,7 @@ class Windows:
         }
 
     def _unpack_python(self) -> None:
-        """Unpack the embeddable Python, and make it find packages as an installed one does."""
+        """Unpack the embeddable Python, and make it find packages as an installed Python does."""
         with tempfile.TemporaryDirectory() as name:
             self._checked(
                 [
@@ -217,7 +215,7 @@ class Windows:
         for path_file in self.python.glob("*._pth"):
             # The file would isolate Python from PYTHONPATH and from the script's folder.
             path_file.unlink()
-        # Wine 8 crashes in this module, and `platform` works without it.
+        # Wine 8 crashes in this module; `platform` works without it.
         (self.python / "_wmi.pyd").unlink()
 
     def _install_wheel(self) -> None:

@@ -236,7 +236,7 @@ def test_the_ways_to_write_a_setup(scene: Scene, text: str) -> None:
 
 
 def test_programs_are_in_devel(scene: Scene) -> None:
-    """Scripts in setup.py are on PATH, as in catkin; real rosrun finds scripts that are installed as Python programs."""
+    """Scripts in setup.py are on PATH, as in catkin; real rosrun finds scripts installed as Python programs."""
     lines = (
         "#!/usr/bin/env python3\nimport helper, sys\nprint(__name__, __file__, helper.VALUE, sys.argv[1:])\n"
     )
@@ -654,7 +654,7 @@ def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
 def test_large_package_reads_each_definition_a_few_times(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Robot arm drivers have hundreds of services, so the number of steps must be proportional to theirs, not to its square."""
+    """Robot arm drivers have hundreds of services, so the number of steps must grow linearly with them, not quadratically."""
     files = {f"srv/S{number}.srv": "---\n" for number in range(30)}
     files |= {f"action/A{number}.action": "---\n---\n" for number in range(10)}
     scene.messages("arm", files, "std_msgs actionlib_msgs")
@@ -749,7 +749,7 @@ def test_package_without_cmake_lists_is_left_out(scene: Scene, capsys: pytest.Ca
 
 
 def test_nothing_to_generate_is_no_error(scene: Scene) -> None:
-    """catkin does the same, because some third-party packages still have such a line."""
+    """Like catkin, because some third-party packages still have such a line."""
     folder = scene.package("p", "find_package(catkin REQUIRED)\ngenerate_messages()")
     (warning,) = scene.build()["p"].warnings
     assert warning.startswith(f"{folder / 'CMakeLists.txt'}:4: generate_messages(): nothing to generate")
@@ -920,7 +920,7 @@ def test_src_of_a_folder_above_is_no_workspace(scene: Scene) -> None:
 
 
 def test_a_macro_of_a_package_does_not_replace_catkins(scene: Scene) -> None:
-    """As dynamic_reconfigure in a workspace: its macro would run CMake's add_custom_command."""
+    """dynamic_reconfigure is such a package: its macro would run CMake's add_custom_command."""
     scene.package(
         "p",
         "include(cmake/own.cmake)\nfind_package(catkin REQUIRED COMPONENTS message_generation)\n"
@@ -1017,7 +1017,7 @@ def test_download_that_ends_early(
 
 
 def test_service_without_a_response(scene: Scene) -> None:
-    """As in ROS, it is built; a warning says what may be wrong."""
+    """As in ROS, it is built; a warning points out the possible mistake."""
     folder = scene.messages("led_msgs", {"srv/Set.srv": "int8 number\n", "srv/Get.srv": "---\nint8 number\n"})
     report = scene.build()["led_msgs"]
     line = f"{folder / 'srv' / 'Set.srv'}:1: 0 lines of '---' instead of 1: write request --- response"
@@ -1087,7 +1087,7 @@ def test_install(scene: Scene) -> None:
 
 
 def test_missing_files_are_errors_of_install_only(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """As in CMake, a package whose install rules list missing files can still be built."""
+    """As in CMake, a package can be built even if its install rules list missing files."""
     folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
     assert catkin_make(["-C", str(scene.root)]) == 0
     assert catkin_make(["-C", str(scene.root), "install"]) == 1

@@ -174,7 +174,7 @@ def test_return_ends_the_file(tmp_path: Path) -> None:
 
 
 def test_return_in_a_macro_ends_its_caller(tmp_path: Path) -> None:
-    """As in CMake, whose macros are text: in a function it ends the function, else the file."""
+    """As in CMake, where macros are text: it ends the function that called the macro, or else the file."""
     text = (
         "macro(leave)\n f(leaves)\n return()\nendmacro()\nfunction(g)\n leave()\n f(never)\nendfunction()\n"
         "g()\nf(goes on)\nforeach(I 1 2)\n leave()\nendforeach()\nf(never)"
@@ -200,7 +200,7 @@ def test_own_module_of_find_package(tmp_path: Path) -> None:
     "search", ["find_package(Eigen3)", "pkg_check_modules(EIGEN3 eigen3)", "pkg_search_module(EIGEN3 eigen3)"]
 )
 def test_missing_library_does_not_end_the_file(tmp_path: Path, search: str) -> None:
-    """Nothing is compiled with it: what the file says about Python counts."""
+    """Nothing is compiled with the library; only what the file says about Python matters."""
     text = f"{search}\nif(NOT EIGEN3_FOUND)\n return()\nendif()\nf(goes on)"
     assert said(tmp_path, text) == ["goes on"]
 

@@ -47,7 +47,7 @@ def test_unknown_names_have_no_advice() -> None:
 
 
 def test_packages_of_the_table_are_not_included() -> None:
-    # minirospy has programs of rqt_gui and rviz, but their Python modules belong to Qt windows.
+    # minirospy provides programs of rqt_gui and rviz, but their Python modules belong to Qt windows.
     assert set(TABLE) & set(Packages.below(*built_in_roots()).names()) == {"rqt_gui", "rviz"}
 
 

@@ -70,7 +70,7 @@ def test_the_variables(scene: Scene, shell: str, ending: str) -> None:
     }
     once = f". '{scene.devel}/setup.{ending}'"
     assert variables(shell, once, scene.root) == expected
-    # Sourcing it twice adds nothing a second time.
+    # Sourcing it twice adds nothing further.
     assert variables(shell, f"{once}\n{once}", scene.root) == expected
 
 

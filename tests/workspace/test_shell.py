@@ -388,7 +388,7 @@ def zsh_or_skip(tmp_path: Path) -> Shell:
 
 def test_zsh_tab(tmp_path: Path) -> None:
     zsh = zsh_or_skip(tmp_path)
-    # Outside its line editor, zsh has no compadd, so replace it by a function that prints.
+    # zsh has no compadd outside its line editor, so replace it with a function that prints.
     script = """
     compadd() { for last; do :; done; for each in "${(@P)last}"; do print -r -- "$*:$each"; done }
     tab() { words=("$@"); CURRENT=${#words}; _ros_complete_zsh }

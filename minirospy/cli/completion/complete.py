@@ -71,11 +71,11 @@ def candidates(
     try:
         found = _of_command(command, before, word.text)
         fitting = (completers.on_one_line(text) if one_line else text for text in found)
-        # Drop names with control characters, because the shell would send them to the terminal.
+        # Drop names with control characters, which the shell would send to the terminal.
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # The package or type is unknown; the command itself will report that.
+        # The package or type is unknown; the command itself will report it.
         return []
 
 
@@ -121,7 +121,7 @@ def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Itera
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            # If an option's value is optional, it is a number, so do not offer completions for it.
+            # Options with an optional value expect a number, so offer no completions.
             pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None

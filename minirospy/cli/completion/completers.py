@@ -39,7 +39,7 @@ _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Cursor(NamedTuple):
-    """The cursor's position: in an argument of ``verb``, after the arguments ``given``. ``word`` is the incomplete word."""
+    """The cursor: in an argument of ``verb``, after the arguments ``given``; ``word`` is the incomplete word before it."""
 
     verb: str
     given: tuple[str, ...]
@@ -47,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit. The shell code quotes it instead of escaping each blank with a backslash."""
+    """A candidate that the user will edit. The shell code quotes it, instead of escaping each space with a backslash."""
 
     __slots__ = ()
 
@@ -56,7 +56,7 @@ Completer = Callable[[Cursor], Iterable[str]]
 
 
 def nothing(_: Cursor) -> Iterable[str]:
-    """Return no candidates, for an argument that is a number, an expression or a new name."""
+    """Return no candidates. For arguments that are numbers, expressions or new names."""
     return ()
 
 
@@ -108,7 +108,7 @@ _OWN_FOLDERS = {"log": _logs, "test_results": _results}
 
 
 def package_file(cursor: Cursor) -> Iterable[str]:
-    """Complete the package first, then the names and paths of files in that package."""
+    """Complete the package first, then the names and paths of its files."""
     if not cursor.given:
         return _packages().names()
     if len(cursor.given) > 1:
@@ -123,7 +123,7 @@ def package_path(cursor: Cursor) -> Iterable[str]:
 
 
 def package_file_and_target(cursor: Cursor) -> Iterable[str]:
-    """Complete the package first, then files in that package, then destinations."""
+    """Complete the package first, then its files, then destinations."""
     return files(cursor) if len(cursor.given) > 1 else package_file(cursor)
 
 
@@ -166,7 +166,7 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
         entries = [entry for entry in os.scandir(folder) if hidden or not entry.name.startswith(".")]
     except OSError:
         return []
-    # isdir() returns False for a link to itself, without an error.
+    # isdir() returns False, without an error, for a link to itself.
     return sorted(entry.name + "/" if os.path.isdir(entry) else entry.name for entry in entries)
 
 
@@ -194,14 +194,14 @@ def rosrun_words(cursor: Cursor) -> Iterable[str]:
 
 
 def rospack_words(cursor: Cursor) -> Iterable[str]:
-    """Return rospack's verbs and options, and packages."""
+    """Return rospack's verbs and options, and the names of packages."""
     from minirospy.ros.rospack.commands.rospack import _VERBS
 
     return _pack_words(cursor, _VERBS)
 
 
 def rosstack_words(cursor: Cursor) -> Iterable[str]:
-    """Return rosstack's verbs and options, and stacks."""
+    """Return rosstack's verbs and options, and the names of stacks."""
     from minirospy.ros.rospack.commands.rospack import _STACK_VERBS
 
     return _pack_words(cursor, _STACK_VERBS)
@@ -273,7 +273,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     if not cursor.given:
         return []
     file = _launch_file(cursor)
-    # Set missing arguments to an empty value, and collect errors in a list, so that neither hides nodes.
+    # Set missing arguments to an empty value and collect errors in a list, because otherwise either would hide nodes.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.named_runnables()), cursor.word)
@@ -283,7 +283,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """Return the result of ``ask``, which queries the master and nodes, or [] if that takes longer than LIVE_SECONDS."""
+    """Return the result of ``ask``, which queries the master and nodes, or [] after LIVE_SECONDS."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -307,7 +307,7 @@ def _as_typed(names: Iterable[str], word: str) -> list[str]:
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics. For `echo` and `type`, also return the fields of their messages."""
+    """Return the topics and, for `echo` and `type`, the fields of their messages."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -324,7 +324,7 @@ def topics(cursor: Cursor) -> Iterable[str]:
 
 
 def nodes(cursor: Cursor) -> Iterable[str]:
-    """Return the nodes that are not on the command line yet."""
+    """Return the nodes that are not yet on the command line."""
     from minirospy.introspect.nodes import list_nodes
 
     names = _live(list_nodes)
@@ -364,8 +364,8 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # Lists and dictionaries can be written on one line. Skip long values, because nobody edits a whole robot
-    # description on a command line.
+    # A list or dictionary can be written on one line.
+    # Skip long values: nobody edits a whole robot description on a command line.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 
@@ -395,7 +395,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Return ``pkg/`` first, then ``pkg/Type``, because a list of all types would be too long.
+    """Return ``pkg/`` first and then ``pkg/Type``, because a list of all types would be too long.
 
     For `rosmsg show`, also return type names without the package.
     """
@@ -502,8 +502,7 @@ def on_one_line(text: str) -> str:
         elif isinstance(node, yaml.ScalarNode) and "\n" in node.value:
             node.style = '"'
 
-    # Compose YAML nodes, because loading and dumping values would change them: a field called `on` would become
-    # `true`.
+    # Compose YAML nodes: loading and dumping the values would change them, for example a field called `on` to `true`.
     root = yaml.compose(text, yaml.SafeLoader)
     flow(root)
     return Text(
@@ -522,7 +521,7 @@ def pins(cursor: Cursor) -> Iterable[str]:
 
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
-    """Return the dashboard's views, and the layouts whose name is not that of a view."""
+    """Return the dashboard's views, and those of its layouts that do not have a view's name."""
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))

@@ -38,7 +38,7 @@ def _parser() -> Parser:
 def _shell(shell: str | None) -> None:
     default = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
     name = shell or Path(default).stem
-    # pwsh is PowerShell's program name on Linux and macOS, and on Windows from version 6 on.
+    # pwsh is the name of PowerShell's program on Linux and macOS and, from version 6 on, on Windows.
     name = "powershell" if name == "pwsh" else name
     if name not in SHELLS:
         raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")

@@ -23,7 +23,7 @@ Commas are excluded because they make an array, and @ and % because they have ot
 
 
 class Word(NamedTuple):
-    """A word without its quotes. If a ``quote`` is left open, ``text[at:]`` is the part after the opening quote."""
+    """A word without its quotes. If a ``quote`` is still open, ``text[at:]`` is the part after it."""
 
     text: str
     quote: str
@@ -31,7 +31,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """A shell's syntax: a function that parses a word, and one that formats a candidate to replace a word."""
+    """A shell's syntax: a function that parses a word, and one that formats the candidate that replaces it."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -68,9 +68,9 @@ def _read_posix(word: str) -> Word:
 
 
 def _write_posix(text: str, word: Word) -> str:
-    """Return ``text`` in the shell's syntax: in the quotes opened by the user, or in double quotes for a :class:`Text`."""
+    """Return ``text`` in the shell's syntax: inside the quote that the user opened, or in double quotes for a :class:`Text`."""
     if word.quote:
-        # Leave the quotes around a folder open, because the user may continue the path.
+        # Leave the quote around a folder open, because the user may continue the path.
         end = "" if text.endswith("/") else word.quote
         return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
     if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):
@@ -94,7 +94,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Remove a word's quotes. ``quote`` is the quote at the word's start, even if it is closed."""
+    """Remove a word's quotes. ``quote`` is the quote at the start of the word, even if it is closed."""
     text = ""
     quote = ""
     read = 0
@@ -117,7 +117,7 @@ def _read_powershell(word: str) -> Word:
 
 
 def _write_powershell(text: str, word: Word) -> str:
-    """Return ``text`` in the quotes opened by the user, else in single quotes if ``text`` needs quotes."""
+    """Return ``text`` inside the quote that the user has opened, otherwise in single quotes if ``text`` needs quotes."""
     if word.quote == '"':
         return '"' + re.sub(r'([`$"])', r"`\1", text) + '"'
     if word.quote or not _PLAIN_IN_POWERSHELL.match(text):

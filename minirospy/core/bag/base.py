@@ -14,7 +14,7 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 __all__ = ["BagReader", "Block", "Position", "StoredMessage"]
 
 Position = int | tuple[int, int]
-"""A message's location: its chunk's position and its offset in the chunk; in version 1.2, its position in the file."""
+"""A message's location: its chunk's position and its offset in the chunk or, in version 1.2, its position in the file."""
 
 
 class StoredMessage(NamedTuple):
@@ -84,7 +84,7 @@ class BagReader(ABC):
 
     @abstractmethod
     def message_at(self, position: Position) -> StoredMessage:
-        """Return the message at a position that comes from an index entry or another message.
+        """Return the message at a position taken from an index entry or from another message.
 
         Raise BagFormatError if there is none.
         """
@@ -117,8 +117,8 @@ class BagReader(ABC):
 
 
 class ScannedReader(BagReader):
-    """A reader for bags that may lack an index; bags without one are scanned."""
+    """A reader for bags that may lack an index. Such bags are scanned."""
 
     @abstractmethod
     def scan(self) -> Iterator[int]:
-        """Build the index by reading the whole bag; yield the positions that are read, to show the progress."""
+        """Build the index by reading the whole bag. Yield the positions while reading, to show the progress."""

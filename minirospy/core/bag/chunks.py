@@ -37,14 +37,17 @@ class StoredChunk(NamedTuple):
 
 
 Found = tuple[int, int, int, int, int]
-"""A message in a chunk's data: time, rank of its connection, record offset, start and end of its body.
+"""A message in a chunk's data: time, rank of its connection, record offset, and start and end of its body.
 
 These are plain tuples, which sort as rosbag orders messages: by time, then by connection, then by offset.
 """
 
 
 class Ranks(Protocol):
-    """A mapping, such as a dict, from a connection to its rank among the requested ones; None if it was not requested."""
+    """A mapping, such as a dict, from a connection to its rank among the requested connections.
+
+    ``get`` returns None for all others.
+    """
 
     def get(self, number: int, /) -> int | None:
         """Return a connection's rank, or None if it was not requested."""
@@ -91,7 +94,7 @@ class ChunkStream:
         return self._headers[position]
 
     def set_header(self, position: int, header: StoredChunk) -> None:
-        """Use this header for the chunk at a position, instead of the header in the file."""
+        """Use this header for the chunk at a position instead of the header in the file."""
         self._headers[position] = header
 
     def data(self, position: int) -> bytes:
@@ -133,7 +136,7 @@ class ChunkStream:
             return None
 
     def prepare(self, positions: Iterable[int]) -> None:
-        """Start to decompress the chunks at these positions; cancel the decompression of all other chunks."""
+        """Start decompressing the chunks at these positions; cancel the decompression of all others."""
         wanted = [
             position
             for position in positions
@@ -169,7 +172,7 @@ class ChunkStream:
     def _entries(
         self, header: StoredChunk, info: ChunkInfo, ranks: Ranks
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
-        """From a chunk's index records, return (offset, time, rank, connection) for each requested message.
+        """Return (offset, time, rank, connection) for each requested message, from a chunk's index records.
 
         Also return the offsets of all messages, keyed by connection.
         """
@@ -259,10 +262,10 @@ Leaves one core to the reader's thread.
 """
 
 
-# Maximum size in bytes of a chunk to decompress in advance, because several of them may be in memory
+# Maximum size in bytes of a chunk to decompress in advance; several of them may be in memory
 _MAX_AHEAD = 64 * 1024 * 1024
 
-# Chunk bytes per requested message; above this, read only the requested messages, not the whole chunk
+# Chunk bytes per requested message; above this ratio, read only the requested messages instead of the whole chunk
 PICK_SIZE = 32 * 1024
 
 

@@ -33,12 +33,12 @@ LZ4 = "lz4"
 COMPRESSIONS = (NONE, BZ2, LZ4)  # in rosbag's order
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
-"""Maximum size of a compressed chunk's data in bytes: enough for the longest message (1 GiB) and the records before it."""
+"""Maximum size, in bytes, of a compressed chunk's data: the longest message (1 GiB) and the records before it must fit."""
 
 _MAX_LZ4 = 256  # maximum ratio of decompressed to compressed size of an LZ4 block
 _MAX_STREAMS = 20_000  # maximum bz2 streams per chunk; parallel compressors write one per 100 kB
-_PIECE = 16 * 1024 * 1024  # bytes to decompress at a time; Ctrl-C takes effect only in between
-_INPUT = 256 * 1024  # bytes of compressed data to pass to a library at a time
+_PIECE = 16 * 1024 * 1024  # bytes to decompress per step; Ctrl-C takes effect only between steps
+_INPUT = 256 * 1024  # bytes of compressed data to pass to a library per call
 
 Buffer = bytes | bytearray | memoryview
 _T = TypeVar("_T")
@@ -147,7 +147,7 @@ class _Output:
 
     @property
     def room(self) -> int:
-        """The number of bytes to request, one more than expected, so that the stream's checksum is reached and verified."""
+        """The number of bytes to request: one more than expected, so that the stream's checksum is reached and verified."""
         return min(self.size - self._length + 1, _PIECE)
 
     def add(self, piece: bytes) -> None:
@@ -179,8 +179,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
     view, streams = memoryview(data), 0
     stream: bz2.BZ2Decompressor | None = None
-    # Pass the data in parts, because each stream copies the data that follows it: for a million short streams, a
-    # million times.
+    # Pass the data in parts: each stream copies the data after it, which is slow for a million short streams.
     for start in range(0, len(data), _INPUT):
         part: Buffer = view[start : start + _INPUT]
         while part:
@@ -205,7 +204,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
 def _decompress_lz4(data: bytes, output: _Output) -> bytes:
     if output.size > len(data) * _MAX_LZ4:
-        # Check the size first, because the library allocates it before it reads the data.
+        # Check the size first: the library allocates that much before it reads the data.
         raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
     # Pass the data in parts, because the library copies the remaining data each time.

@@ -17,7 +17,6 @@ from minirospy.core.bag.records import (
     OP_CHUNK_INFO,
     OP_CONNECTION,
     OP_INDEX_DATA,
-    OP_MESSAGE_DATA,
     BagHeader,
     Chunk,
     ChunkInfo,
@@ -31,19 +30,16 @@ __all__ = [
     "encode_connection",
     "encode_fields",
     "encode_index_data",
-    "encode_message_header",
     "message_prefix",
     "message_prefixes",
 ]
 
-_MAX_TIME = MAX_UINT32 * 10**9 + 999_999_999
 _BILLION = 10**9
 _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")
 _TIME = struct.Struct("<II")
 _PAIR = struct.Struct("<II")
 _ENTRY = struct.Struct("<III")
-_MESSAGE_HEADER = struct.Struct("<I I3sB I5sI I5sII I")
 
 
 def message_prefix(connection: int) -> bytes:
@@ -110,18 +106,6 @@ def encode_connection(connection: Connection) -> bytes:
         "conn": _UINT32.pack(connection.id),
     }
     return encode_fields(fields) + encode_fields(connection.header)
-
-
-def encode_message_header(connection: int, time: int, size: int) -> bytes:
-    """Serialize a message's header and the length of its body. Raise BagFormatError if a limit is exceeded."""
-    if size > MAX_UINT32:
-        raise BagFormatError(f"a message of {size} bytes is larger than the format allows, 4 GiB")
-    if not 0 <= time <= _MAX_TIME:
-        raise BagFormatError(f"the time {time} ns does not fit into a bag: it must be from 0 to 2106")
-    seconds, nanoseconds = divmod(time, _BILLION)
-    return _MESSAGE_HEADER.pack(
-        38, 4, b"op=", OP_MESSAGE_DATA, 9, b"conn=", connection, 13, b"time=", seconds, nanoseconds, size
-    )
 
 
 def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> bytes:

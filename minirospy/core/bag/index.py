@@ -103,7 +103,7 @@ class ConnectionIndex:
 
 
 def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[int]]:
-    """Read the data of a version 2.0 index record: times and offsets. Leaves the stream at the end of the record.
+    """Read the data of a version 2.0 index record: times and offsets. Leave the stream at the end of the record.
 
     The data's size is computed from the number of entries, because ROS C Turtle wrote a wrong length. Raise BagFormatError
     if the record is damaged.

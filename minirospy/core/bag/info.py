@@ -31,13 +31,13 @@ __all__ = [
 ]
 
 NUMPY_PAYS = 100_000
-"""Number of timestamps above which numpy computes the median faster than Python, even counting numpy's import."""
+"""Number of timestamps above which numpy computes the median faster than Python, even including the time to import numpy."""
 
 BLOCK = 1 << 16  # number of timestamps that numpy processes together
 
 
 class Topic(NamedTuple):
-    """A topic: its first connection's type, the number of messages and connections, and the rate in Hz, if known."""
+    """A topic: its first connection's type, its numbers of messages and connections, and its rate in Hz if known."""
 
     name: str
     type: str
@@ -93,7 +93,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         end = seconds(max(index.times[-1] for index in indexes if index))
 
     if frequencies:
-        # Omit connections without messages, as ROS's reader does. ROS's Python writer also stores those.
+        # Omit connections without messages, as ROS's reader does; ROS's Python writer stores those, too.
         connections = [each for each in connections if counts[each.id]]
     types: dict[str, str] = {}
     by_topic: dict[str, list[Connection]] = {}
@@ -319,7 +319,7 @@ def _topic_lines(topics: Sequence[Topic], widest_type: int) -> Iterable[str]:
 
 
 def _listed(name: str, lines: Iterable[str]) -> list[tuple[str, str]]:
-    """Return one table row per line; only the first row contains the name."""
+    """Return a table row for each line; only the first row contains the name."""
     return [("" if number else name, line) for number, line in enumerate(lines)]
 
 

@@ -111,8 +111,9 @@ class McapReader(BagReader):
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
         selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
-        # Read a chunk when its first message may be the next one, so that each chunk's data is loaded once, and
-        # several chunks are in memory only if they overlap in time. Positions are unique, so runs are never compared.
+        # Read a chunk when its first message may be the next one.
+        # This loads each chunk only once, and keeps several chunks in memory only if they overlap in time.
+        # Positions are unique, so runs are never compared.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
         while heap:
@@ -203,7 +204,7 @@ class _Selection(NamedTuple):
     """The caller's criteria for selecting messages."""
 
     known: Collection[int]
-    """The channels in the summary; a message on another channel means that the file is damaged."""
+    """The channels in the summary. A message on any other channel means that the file is damaged."""
     wanted: Collection[int]
     first: int
     last: int
@@ -289,7 +290,10 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the mcap library, which may request any length. Returns the available data without allocating that length."""
+    """A stream for the mcap library, which may request any length.
+
+    Returns the data that is there, without allocating that length.
+    """
 
     def __init__(self, data: bytes) -> None:
         self._stream = BytesIO(data)
@@ -365,7 +369,7 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
 
 
 def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
-    """Return the chunk infos. Each has the message counts of the whole file, because the summary has no counts per chunk."""
+    """Return the chunk infos. Each has the message counts of the whole file, because the summary has none per chunk."""
     assert summary.statistics is not None
     counts = dict(summary.statistics.channel_message_counts)
     infos = []

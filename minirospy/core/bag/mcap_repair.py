@@ -51,8 +51,8 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # Decompressors raise these errors for lengths that exceed the memory. A seek before the start of a short file
-        # also raises them.
+        # Decompressors raise these errors for lengths that exceed the memory.
+        # A seek to before the start of a short file raises them, too.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
@@ -68,7 +68,7 @@ def chunk_data(name: str, data: bytes, size: int) -> bytes:
 
 
 class _Recovered(NamedTuple):
-    """A recovered chunk: the messages on each of its channels, and the end of the chunk including its message indexes."""
+    """A recovered chunk: the messages on each of its channels, and the position after the chunk and its message indexes."""
 
     info: ChunkIndex
     counts: Counter[int]
@@ -163,8 +163,7 @@ class McapRepair:
             self._add_message_index(records.MessageIndex.read(stream), position, length)
             return
         if self._entries:
-            # The last chunk's message indexes are incomplete: discard them, because a chunk must have all of its
-            # message indexes or none.
+            # The last chunk's message indexes are incomplete. Discard them: a chunk must have all of them or none.
             self._chunks[-1].info.message_index_offsets.clear()
             self._chunks[-1].info.message_index_length = 0
             self._entries = {}

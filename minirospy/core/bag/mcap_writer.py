@@ -112,11 +112,11 @@ class McapWriter:
             raise BagFormatError(f"the time {time} ns is before 1970")
         whole = b"".join((body, tail)) if tail else body
 
-        # Count over all connections, as the MCAP tools' converter does.
+        # Count over all connections, like the MCAP tools' converter.
         sequence = self._count % 2**32
         self._gathered += len(whole)
         self._count += 1
-        # A memoryview is allowed, because the library copies it into the chunk.
+        # A memoryview is fine, because the library copies it into the chunk.
         self._writer.add_message(connection, time, whole, time, sequence)  # type: ignore[arg-type]
         if self._gathered > self._chunk_size:
             self._gathered = 0

@@ -1,4 +1,4 @@
-"""Opens bags older than version 2.0. Only this module names their readers, which are imported when such a bag is opened."""
+"""Opens bags older than version 2.0. Only this module knows their readers, and imports them when such a bag is opened."""
 
 from __future__ import annotations
 

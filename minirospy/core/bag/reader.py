@@ -25,7 +25,7 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 
 __all__ = ["ChunkedReader", "open_bag"]
 
-# Maximum bytes of overlapping chunks that stay decompressed in memory; beyond that, some chunks are read again
+# Maximum bytes of overlapping chunks to keep decompressed in memory; beyond that, some chunks are read again
 CACHE_SIZE = 64 * 1024 * 1024
 
 _END_OF_TIME = 1 << 64
@@ -229,7 +229,7 @@ class _Merge:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the messages as blocks, in order."""
-        # The run's number is the tie-breaker between runs whose next messages have equal time, connection and offset.
+        # The run's number is the tie-breaker for runs whose next messages have the same time, connection and offset.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:
@@ -248,7 +248,7 @@ class _Merge:
                 stop = bisect_left(found, heap[0][:2], run.done)
             if number < count:
                 stop = min(stop, bisect_left(found, (self._chunks[number].start_time,), run.done))
-            # Of two messages with equal time and connection, yield the one in the earlier chunk first.
+            # If two messages have the same time and connection, yield the one in the earlier chunk first.
             stop = max(stop, run.done + 1)
 
             yield Block(
@@ -307,7 +307,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if the index does not match the bag header, because messages would then be missing."""
+    """Raise BagFormatError if the index does not match the bag header; messages would be missing then."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:

@@ -32,8 +32,6 @@ __all__ = [
     "ChunkInfo",
     "Connection",
     "Fields",
-    "IndexData",
-    "IndexEntry",
     "MessageData",
     "Record",
     "parse_bag_header",
@@ -41,7 +39,6 @@ __all__ = [
     "parse_chunk_info",
     "parse_connection",
     "parse_fields",
-    "parse_index_data",
     "parse_message_data",
     "parse_record",
     "parse_records",
@@ -66,7 +63,7 @@ BAG_HEADER_SIZE = 4096
 closed.
 """
 
-# maximum bytes in a record's header, which contains definitions in version 1.2 bags
+# maximum bytes in a record's header; in version 1.2 bags it contains definitions
 MAX_HEADER = 16 * 1024 * 1024
 
 MAX_UINT32 = 0xFFFFFFFF
@@ -87,10 +84,9 @@ _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")
 _TIME = struct.Struct("<II")
 _PAIR = struct.Struct("<II")
-_ENTRY = struct.Struct("<III")
 
 Fields = dict[str, bytes]
-"""A header's fields; the values are bytes, because definitions are not always UTF-8."""
+"""A header's fields. The values are bytes, because definitions are not always UTF-8."""
 
 
 class BagHeader(NamedTuple):
@@ -143,20 +139,6 @@ class MessageData(NamedTuple):
     connection: int
     time: int
     body: bytes
-
-
-class IndexEntry(NamedTuple):
-    """A message's location: its time, and its record's offset in the chunk's decompressed data."""
-
-    time: int
-    offset: int
-
-
-class IndexData(NamedTuple):
-    """The entries for one connection in the chunk that precedes this record."""
-
-    connection: int
-    entries: list[IndexEntry]
 
 
 class Chunk(NamedTuple):
@@ -250,7 +232,7 @@ def read_version(stream: BinaryIO) -> int:
 
 
 def read_record(stream: BinaryIO, limit: int) -> Record:
-    """Read the header of the record at the stream's position, and the length of its data, which follows.
+    """Read the header and data length of the record at the stream's position; leave the stream at the start of the data.
 
     ``limit`` is the stream's size. Raise BagFormatError if the record is damaged, or a length goes beyond ``limit``.
     """
@@ -349,22 +331,6 @@ def parse_message_data(record: Record, body: bytes) -> MessageData:
     """Parse a message record. Raise BagFormatError if it is invalid."""
     record.expect(OP_MESSAGE_DATA)
     return MessageData(record.uint32("conn"), record.time("time"), body)
-
-
-def parse_index_data(record: Record, data: bytes) -> IndexData:
-    """Parse the entries of a version 2.0 index record. Raise BagFormatError if the record is invalid."""
-    record.expect(OP_INDEX_DATA)
-    version, count = record.uint32("ver"), record.uint32("count")
-    if version != 1:
-        raise BagFormatError(f"expecting index version 1, got {version}", record.position)
-    if len(data) < count * _ENTRY.size:
-        raise BagFormatError(f"an index of {count} messages has only {len(data)} bytes", record.position)
-
-    entries = [
-        IndexEntry(seconds * _BILLION + nanoseconds, offset)
-        for seconds, nanoseconds, offset in _ENTRY.iter_unpack(data[: count * _ENTRY.size])
-    ]
-    return IndexData(record.uint32("conn"), entries)
 
 
 def parse_chunk_header(record: Record) -> Chunk:

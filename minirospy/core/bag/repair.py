@@ -68,7 +68,7 @@ class _Edit(NamedTuple):
 
 
 class _Rewriting:
-    """Applies edits to a file, in order and in place; buffers output that would overwrite bytes that have not been read yet."""
+    """Applies edits to a file, in order and in place. Buffers output that would overwrite bytes not read yet."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -128,7 +128,7 @@ class Repair:
         self.problems: list[str] = []
         self._stream = stream
         self._edits: list[_Edit] = []
-        # chunk infos counted in the bag header that have not been read yet
+        # number of chunk infos, according to the bag header, that have not been read yet
         self._infos_left = 0
         self._total = 0  # total of the message counts in the chunk infos read so far
 
@@ -192,7 +192,7 @@ class Repair:
         return record.end
 
     def _read(self, position: int, limit: int) -> int:
-        """Read the record at a position. If it is a chunk, also read its index records. Return the position after them.
+        """Read the record at a position and, for a chunk, its index records. Return the position after them.
 
         Raise BagFormatError if a record is damaged.
         """
@@ -209,8 +209,7 @@ class Repair:
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
-            # A chunk's header is completed together with the chunk, so the writer was killed before it completed this
-            # chunk.
+            # A chunk's size is written to its header at the end, so the writer was killed before it completed this chunk.
             raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)
@@ -223,7 +222,7 @@ class Repair:
                 raise BagFormatError("a record of the chunk is damaged")
             self._check_connections(content)
             if content.has_wrong_time:
-                # Add the connections although the chunk is omitted, because later chunks may need them.
+                # Add the connections even though the chunk is omitted, because later chunks may need them.
                 self._add_connections(content)
                 raise BagFormatError("a message of the chunk has a time that no index can hold")
         except (BagFormatError, BagCompressionError) as error:
@@ -234,7 +233,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError if a connection differs from the same one in previous chunks, so that the chunk is unreliable."""
+        """Raise BagFormatError if the chunk is unreliable: a connection differs from the same one in previous chunks."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (
@@ -247,7 +246,7 @@ class Repair:
                 )
 
     def _add_connections(self, content: _Content) -> None:
-        # Add the connections in file order, because ROS writes them to the index in that order.
+        # Add the connections in file order: ROS writes them to the index in that order.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
 
@@ -295,7 +294,7 @@ class Repair:
         return end
 
     def _read_partial(self, position: int, end: int, limit: int) -> bool:
-        """Recover the messages in an uncompressed chunk whose size is wrong; return whether there are any.
+        """Recover the messages in an uncompressed chunk whose size is wrong; return whether any were found.
 
         At the end of the file, recover every complete message. Elsewhere, check the messages against the chunk's index
         records, and recover all of them or none.
@@ -312,7 +311,7 @@ class Repair:
         data_end = record.data_position + content.end
         _, entries = _read_index(self._stream, data_end, limit)
         if end < limit and _times(entries) != _times(content.entries):
-            # Only the times are compared: wrong offsets are acceptable, because the index is rewritten.
+            # Compare only the times: wrong offsets do not matter, because the index is rewritten.
             return False
         self._add_connections(content)
         self.chunks.append(content.info(position))
@@ -329,7 +328,7 @@ class Repair:
         return True
 
     def _report_lost(self) -> None:
-        """Report the number of missing messages, if the bag's own index still contains the total number."""
+        """Report the number of missing messages, if the bag's own index still states the total number."""
         lost = self._total - sum(sum(chunk.counts.values()) for chunk in self.chunks)
         if self._infos_left == 0 and lost > 0:
             self.problems.append(f"{lost} of {self._total} messages are lost")
@@ -354,7 +353,7 @@ def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[
             found += [(time, number, at) for time, at in zip(*read_entries(stream, record), strict=True)]
             position = stream.tell()
     except BagFormatError:
-        pass  # the caller compares the entries to detect missing ones
+        pass  # the caller finds missing entries by comparison
     return position, sorted(found)
 
 
@@ -386,7 +385,7 @@ def _content(data: bytes) -> _Content:
 
 
 class _Any:
-    """Used as ranks if all connections are requested: a connection's rank is its id."""
+    """Represents the ranks if all connections are requested. A connection's rank is its id."""
 
     def get(self, number: int, /) -> int | None:
         """Return a connection's rank."""
@@ -394,7 +393,7 @@ class _Any:
 
 
 def _partial_chunk(stream: BinaryIO, position: int, limit: int) -> Record | None:
-    """Return the record of an uncompressed chunk whose data is truncated, or None if it is not such a record."""
+    """Return the record of an uncompressed chunk whose data is truncated, or None if the record is something else."""
     try:
         stream.seek(position)
         head = stream.read(min(4096, limit - position))

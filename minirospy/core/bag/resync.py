@@ -17,7 +17,7 @@ _BEFORE = (0, 13, 19, 20, 32, 33)
 
 
 def is_record(stream: BinaryIO, position: int, limit: int) -> bool:
-    """Return whether there is a record at ``position``, or whether that is the end of the stream, ``limit``."""
+    """Return whether there is a record at ``position``, or the stream ends there (``limit``)."""
     return position == limit or _op(stream, position, limit) in _OPS
 
 
@@ -39,8 +39,7 @@ def next_chunk(stream: BinaryIO, start: int, limit: int) -> int | None:
             at = block.find(_MARK, at + 1)
         if position + len(block) >= limit:
             return None
-        # Let the blocks overlap, because the mark may cross the end of a block, and the header starts before the
-        # mark.
+        # Let the blocks overlap: the mark may cross the end of a block, and the header starts before the mark.
         position += max(len(block) - len(_MARK) - 4 - _BEFORE[-1], 1)
     return None
 

@@ -31,7 +31,7 @@ class TopicTimes(NamedTuple):
 
 
 class Timeline:
-    """A bag's index, keyed by topic. ``topics`` maps the name of each topic that has messages to its times.
+    """A bag's index, keyed by topic. ``topics`` maps the names of the topics that have messages to their times.
 
     Raise BagFormatError if the index is damaged.
     """
@@ -87,7 +87,7 @@ class Timeline:
         return max(found, default=None)
 
     def count_at(self, time: int) -> int:
-        """Return the number of messages at exactly this time."""
+        """Return the number of messages with exactly this time."""
         return sum(
             bisect_right(times, time) - bisect_left(times, time)
             for topic in self.topics.values()

@@ -44,7 +44,7 @@ Buffer = bytes | bytearray | memoryview
 
 CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is complete; ROS's default
 
-_LARGE = 64 * 1024  # bytes; a message of at least this size is not copied into the chunk
+_LARGE = 64 * 1024  # bytes; a message of this size or larger is not copied into the chunk
 
 _BILLION = 10**9
 _OVERHEAD = 46  # bytes in a message's record in addition to its body
@@ -61,7 +61,7 @@ class _Stream:
     def __init__(self, connection: Connection, *, is_stored: bool) -> None:
         self.connection = connection
         self.prefix = message_prefixes(connection.id)[0]
-        # The connection's record, empty once a chunk contains it
+        # The connection's record; empty once a chunk contains it
         self.record = b"" if is_stored else encode_connection(connection)
         self.clear()
 
@@ -114,7 +114,7 @@ class BagWriter:
     """Writes a version 2.0 bag to a binary stream, which it does not close. Use it in one thread at a time.
 
     ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without an
-    executor, the calling thread compresses them. If more than ``most_waiting`` chunks are queued for compression,
+    executor, the calling thread compresses them. If more than ``max_waiting`` chunks are queued for compression,
     :meth:`write` blocks. ``continued``: append to the bag in the stream, overwriting its index. Raise
     BagCompressionError if the compression is unknown or its library is missing.
 
@@ -129,14 +129,14 @@ class BagWriter:
         compression: str = NONE,
         chunk_threshold: int = CHUNK_THRESHOLD,
         executor: Executor | None = None,
-        most_waiting: int = 4,
+        max_waiting: int = 4,
         continued: Continued | None = None,
     ) -> None:
         self.chunk_threshold = chunk_threshold
         self.chunks: list[ChunkInfo] = []  # the chunks already written
         self._stream = stream
         self._executor = executor
-        self._most_waiting = most_waiting
+        self._max_waiting = max_waiting
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
@@ -181,7 +181,7 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """The bag's size so far in bytes; uncompressed data is counted with the compression ratio of the previous chunks.
+        """The bag's size so far in bytes; data not compressed yet counts with the previous chunks' compression ratio.
 
         Before the first chunk is written, the data in memory counts as 0, because the ratio is unknown.
         """
@@ -276,7 +276,7 @@ class BagWriter:
         self._start_chunk()
         self._complete.append(complete)
         self._waiting += complete.size
-        self._write_complete(self._most_waiting)
+        self._write_complete(self._max_waiting)
 
     def write_ready(self) -> None:
         """Write the complete chunks that are already compressed. Raise OSError if the stream fails."""
@@ -313,7 +313,7 @@ class BagWriter:
         self._closed = True
 
         while True:
-            # The end of the last chunk is where the next one would start.
+            # The last chunk ends where the next one would start.
             while self.chunks and self._position > end:
                 dropped = self.chunks.pop()
                 lost += sum(dropped.counts.values())
@@ -335,7 +335,7 @@ class BagWriter:
     def _set_compression(self, name: str) -> None:
         check_compression(name)
         self._compression = name
-        # Random data grows when compressed, and minirospy's readers reject larger chunks.
+        # Random data grows when it is compressed, and minirospy's readers reject larger chunks.
         self._limit = MAX_UINT32 if name == NONE else MAX_CHUNK_SIZE
 
     def _continue(self, connections: Iterable[Connection], chunks: Iterable[ChunkInfo], end: int) -> None:
@@ -343,7 +343,7 @@ class BagWriter:
         self._next_id = max(self._streams, default=-1) + 1
         self.chunks.extend(chunks)
 
-        # Write the header first, so that the bag is marked as not closed if the program is killed now.
+        # Write the header first: if the program is killed now, it marks the bag as not closed.
         self._header_position = len(MAGIC)
         self._stream.seek(self._header_position)
         self._put([encode_bag_header(BagHeader(0, 0, 0))])
@@ -376,11 +376,11 @@ class BagWriter:
         if self._small:
             self._pieces.append(self._small)
             self._small = bytearray()
-        # Copy types other than bytes, because the caller may change them before they are written.
+        # Copy any type except bytes, because the caller may change the data before it is written.
         self._pieces.append(body if type(body) is bytes else bytes(body))
 
     def _data(self, pieces: list[Buffer]) -> tuple[Callable[[], bool], Callable[[], list[Buffer]]]:
-        """Return a function that returns whether the chunk's data is ready, and one that waits for the data and returns it."""
+        """Return two functions: one returns whether the chunk's data is ready, the other waits for the data and returns it."""
         name = self._compression
         if name == NONE:
             return (lambda: True), (lambda: pieces)
@@ -392,7 +392,7 @@ class BagWriter:
         return future.done, (lambda: [future.result()])
 
     def _write_complete(self, left: int) -> None:
-        """Write the complete chunks that are ready, then wait for the other chunks until at most ``left`` remain."""
+        """Write the complete chunks that are ready; then wait for the others until at most ``left`` remain."""
         while self._complete:
             chunk = self._complete[0]
             if len(self._complete) <= left and not chunk.is_ready():
@@ -423,6 +423,6 @@ class BagWriter:
         write = self._stream.write
         for piece in pieces:
             count = write(piece)
-            # An unbuffered stream may write only a part of the data.
+            # An unbuffered stream may write only part of the data.
             while count is not None and count < len(piece):
                 count += write(memoryview(piece)[count:])

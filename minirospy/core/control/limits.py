@@ -148,9 +148,11 @@ class _Limiter:
         lowest, highest = -limits.velocity, limits.velocity
         if (soft := limits.soft) and not isinf(limits.lower):
             lowest, highest = _soft_velocities(soft, previous, limits.velocity)
-        low = max(previous + lowest * seconds if isfinite(lowest) else -inf, limits.lower)
-        high = min(previous + highest * seconds if isfinite(highest) else inf, limits.upper)
-        joint.position_command = self.previous = min(max(command, low), high)
+        command = min(max(command, limits.lower), limits.upper)
+        if isfinite(highest):
+            # The velocity counts more than the position: a joint outside its limits comes back without a jump.
+            command = min(max(command, previous + lowest * seconds), previous + highest * seconds)
+        joint.position_command = self.previous = command
         return is_valid
 
     def velocity(self, seconds: float) -> bool:

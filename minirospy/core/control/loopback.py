@@ -1,6 +1,6 @@
 """Hardware without a robot: joints whose state follows their commands within the limits of the description.
 
-A position command is reached in the same cycle, a velocity command is integrated, and an effort command accelerates a mass of
+A position command is reached before the next cycle, a velocity command is integrated, and an effort command accelerates a mass of
 1 kg (or 1 kg m^2) against a damping of 1 N s/m (or N m s/rad). A joint without a controller stands still.
 """
 
@@ -32,7 +32,10 @@ _MOVABLE = {JointType.REVOLUTE, JointType.CONTINUOUS, JointType.PRISMATIC}
 
 
 class LoopbackHardware(RobotHardware):
-    """The joints of a robot description. Mimic joints follow theirs, and cannot be commanded."""
+    """The joints of a robot description.
+
+    A mimic joint follows its joint. It can be commanded only if it has a transmission, and then does not follow.
+    """
 
     def __init__(
         self,
@@ -43,7 +46,8 @@ class LoopbackHardware(RobotHardware):
     ) -> None:
         """Create the joints that have a transmission, or all movable ones, with all interfaces, if there is no transmission.
 
-        Raise HardwareError if ``initial`` names a joint that does not exist, or has a value that is not finite.
+        Call ``warn`` with a line for each transmission or initial position that is ignored. Raise HardwareError if
+        ``initial`` names a joint that the robot lacks, or has a value that is not finite.
         """
         super().__init__()
         movable = movable_joints(robot)
@@ -59,7 +63,7 @@ class LoopbackHardware(RobotHardware):
         self._bounds: list[tuple[Joint, float, float]] = []
         self._mimics: list[tuple[Joint, Joint, float, float]] = []
         for name, joint in movable.items():
-            if joint.mimic or (transmissions and name not in interfaces):
+            if name not in interfaces and (joint.mimic or transmissions):
                 continue
             lower, upper = _bounds(joint)
             position = initial.pop(name, min(max(0.0, lower), upper))
@@ -68,12 +72,14 @@ class LoopbackHardware(RobotHardware):
         for name, joint in movable.items():
             if joint.mimic and joint.mimic.joint in self.joints:
                 leader = self.joints[joint.mimic.joint]
-                follower = self.add_joint(name)
+                follower = self.joints.get(name) or self.add_joint(name)
                 self._mimics.append((follower, leader, joint.mimic.multiplier, joint.mimic.offset))
         if not self._bounds:
             raise HardwareError(f"robot '{robot.name}' has no joint that can be commanded")
         for name in initial:
-            raise HardwareError(f"initial position of '{name}': the robot has no such joint")
+            if name not in movable:
+                raise HardwareError(f"initial position of '{name}': the robot has no such joint")
+            warn(f"the initial position of joint '{name}' is ignored, because it has no transmission")
         self._follow()
 
     def add_sensors(self, imus: Mapping[str, str], force_torque_sensors: Mapping[str, str]) -> None:
@@ -92,8 +98,12 @@ class LoopbackHardware(RobotHardware):
         for name, frame in force_torque_sensors.items():
             self.force_torque_sensors[name] = ForceTorqueSensor(name, frame)
 
-    def write(self, time: Time, period: Duration) -> None:
-        """Move the joints by one cycle."""
+    def read(self, time: Time, period: Duration) -> None:
+        """Move the joints by their last commands.
+
+        A motor would have moved them during the period that has passed. The cycles of a loop last differently long, so
+        write() does not know it yet.
+        """
         seconds = period.to_sec()
         for joint, lower, upper in self._bounds:
             before = position = joint.position
@@ -121,8 +131,9 @@ class LoopbackHardware(RobotHardware):
 
     def _follow(self) -> None:
         for joint, leader, factor, offset in self._mimics:
-            joint.position = leader.position * factor + offset
-            joint.velocity = leader.velocity * factor
+            if joint.active is None:
+                joint.position = leader.position * factor + offset
+                joint.velocity = leader.velocity * factor
 
 
 def movable_joints(robot: Robot) -> dict[str, UrdfJoint]:

@@ -63,6 +63,13 @@ class Parameters:
             return None
         return list(value)
 
+    def numbers(self, key: str) -> list[float] | None:
+        """Return a list of ints and floats as floats, or None if the value is something else."""
+        value = self.get(key)
+        if not isinstance(value, list) or not all(type(each) in (int, float) for each in value):
+            return None
+        return list(map(float, value))
+
     def below(self, key: str) -> Parameters:
         """Return the parameters of a namespace below this one; it has none if it is not set."""
         value = self.get(key)

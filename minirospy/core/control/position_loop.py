@@ -35,11 +35,12 @@ class PositionLoop:
         return min(max(position, self._lower), self._upper)
 
     def error(self, target: float) -> float:
-        """Return the way to a target that is within the limits. It is not finite if the joint's position is not."""
+        """Return the way to a target that is within the limits. It is not finite if one of them is not."""
         position = self.joint.position
-        if not self._turns or not math.isfinite(position):
-            return target - position
-        way = math.remainder(target - position, math.tau)
+        way = target - position
+        if not self._turns or not math.isfinite(way):
+            return way
+        way = math.remainder(way, math.tau)
         if self._lower <= position + way <= self._upper:
             return way
         other = way - math.copysign(math.tau, way)

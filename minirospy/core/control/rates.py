@@ -33,7 +33,7 @@ class PublishRate:
         return cls(parameters.finite("publish_rate", 0.0))
 
     def set(self, hertz: float) -> None:
-        """Change the rate."""
+        """Change the rate, from any thread."""
         self._period = round(1e9 / hertz) if hertz > 0.0 else None
 
     def start(self, time: Time, *, is_due: bool = False) -> None:
@@ -42,13 +42,14 @@ class PublishRate:
 
     def is_due(self, time: Time) -> bool:
         """Return whether to publish in this cycle. If the time has gone backwards, count from it."""
-        if self._period is None:
+        period = self._period  # another thread may change it
+        if period is None:
             return False
         now = nanoseconds(time)
         if self._last is None or now < self._last:
             self._last = now
         behind = now - self._last
-        if behind <= self._period:
+        if behind <= period:
             return False
-        self._last = now if behind > self._period + MAX_BEHIND else self._last + self._period
+        self._last = now if behind > period + MAX_BEHIND else self._last + period
         return True

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-__all__ = ["CycleTimes", "Spread", "spread"]
+__all__ = ["MAX_CYCLES", "CycleTimes", "Spread", "spread"]
+
+MAX_CYCLES = 100_000  # cycles kept until they are taken; some minutes, in case nothing takes them
 
 
 class Spread(NamedTuple):
@@ -30,8 +32,9 @@ class CycleTimes:
         """Record a cycle that began ``late`` after its deadline, and took ``busy``. ``is_overrun``: it missed the next one."""
         self.cycles += 1
         self.overruns += is_overrun
-        self._late.append(late)
-        self._busy.append(busy)
+        if len(self._late) < MAX_CYCLES:
+            self._late.append(late)
+            self._busy.append(busy)
 
     def take(self) -> tuple[Sequence[int], Sequence[int]]:
         """Return the delays and the durations of the cycles since the last call."""

@@ -18,6 +18,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.core.control.goal import MonitoredGoal
 
 __all__ = [
+    "MAX_MAGNITUDE",
     "NEVER",
     "UNCHECKED",
     "ErrorCode",
@@ -34,9 +35,9 @@ __all__ = [
     "wraparound_offset",
 ]
 
-NEVER = 1 << 62  # ns, after all times
+NEVER = 1 << 100  # ns, after all uptimes, also if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
-_MAX_MAGNITUDE = 1e100  # of positions and derivatives; no coefficient of a segment overflows below it
+MAX_MAGNITUDE = 1e100  # of positions and derivatives; no coefficient of a segment overflows below it
 _SINGULARITY = 1e-9  # rad; the direction of a half turn is chosen by the positions, not by rounding
 
 
@@ -250,12 +251,12 @@ def _check_values(names: Sequence[str], point: Point, index: int) -> None:
         ("velocity", point.velocities),
         ("acceleration", point.accelerations),
     ):
-        if sum(map(abs, values)) < _MAX_MAGNITUDE:
+        if sum(map(abs, values)) < MAX_MAGNITUDE:
             continue
         name, value = next(
             (name, value)
             for name, value in zip(names, values, strict=True)
-            if not abs(value) < _MAX_MAGNITUDE / len(names)
+            if not abs(value) < MAX_MAGNITUDE / len(names)
         )
         raise TrajectoryError(
             f"Invalid trajectory point at index: {index}. "

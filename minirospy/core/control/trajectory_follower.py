@@ -15,6 +15,7 @@ from minirospy.core.control.controller import ControllerError
 from minirospy.core.control.goal import MonitoredGoal, Outcome
 from minirospy.core.control.parameters import Parameters
 from minirospy.core.control.trajectory import (
+    MAX_MAGNITUDE,
     NEVER,
     UNCHECKED,
     ErrorCode,
@@ -35,6 +36,7 @@ from minirospy.core.urdf.model import JointType, Robot
 __all__ = ["FollowedJoint", "GoalTolerance", "JointsError", "Plan", "TrajectoryFollower", "read_joints"]
 
 _SECOND = 1_000_000_000  # ns
+_MAX_REQUESTS = 100  # trajectories kept while the loop pauses, like a simulation; the oldest are dropped
 _remainder, _turn = math.remainder, math.tau
 _SUCCEEDED = Outcome(GoalEvent.SUCCEED, (ErrorCode.SUCCESSFUL, ""))
 
@@ -87,7 +89,7 @@ class TrajectoryFollower:
         self._all_reached = (1 << len(joints)) - 1
         self._stop_duration = stop_duration
         self._allows_partial_goals = allows_partial_goals
-        self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque()
+        self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque(maxlen=_MAX_REQUESTS)
         self._paths: list[JointPath] = []
         self.is_running = False
         self.time = 0  # ns of ROS time, of the last update
@@ -289,7 +291,7 @@ class TrajectoryFollower:
                 segment = _stop(before, position, velocity, self._stop_duration, goal)
             else:
                 here = State(actual if math.isfinite(actual) else position)
-                segment = Segment(self.uptime, here, self.uptime, here, goal)
+                segment = Segment(before, here, before, here, goal)
             paths.append(JointPath([segment], goal=goal))
         self._paths = paths
 
@@ -314,7 +316,10 @@ class TrajectoryFollower:
                 continue
             allowed = UNCHECKED if goal is None else tolerances
             kept = path.until(bridge_start)
-            state = State(*kept[-1].sample(bridge_start))
+            sampled = kept[-1].sample(bridge_start)
+            state = State(*sampled)
+            if max(map(abs, sampled)) >= MAX_MAGNITUDE:
+                state = State(min(max(state.position, -MAX_MAGNITUDE), MAX_MAGNITUDE), None, None)
             target = points.points[first].positions[column]
             offset = wraparound_offset(state.position, target) if is_continuous else 0.0
             bridge = Segment(

@@ -33,8 +33,11 @@ def read_transmissions(
     Raise UrdfError if the text is not XML.
     """
     found: list[Transmission] = []
+    lines: dict[str, None] = {}  # a transmission may have the same line for each of its joints
     for element in parse_xml(text, file).all("transmission"):
-        found += _read(element, warn)
+        found += _read(element, lines.setdefault)
+    for line in lines:
+        warn(line)
     return found
 
 
@@ -60,17 +63,19 @@ def _read(element: Element, warn_of: Callable[[str], object]) -> list[Transmissi
     found = []
     for joint in joints:
         interfaces: list[Interface] = []
+        is_unknown = False
         for each in list(joint.all("hardwareInterface")) or shared:
             try:
                 interface = Interface.parse(each.text)
             except HardwareError as error:
                 warn(f"{error}, so it is skipped")
+                is_unknown = True
                 continue
             if interface in COMMAND_INTERFACES and interface not in interfaces:
                 interfaces.append(interface)
         if interfaces:
             found.append(Transmission(name, kind, joint.attributes.get("name", ""), tuple(interfaces)))
-        else:
+        elif not is_unknown:
             warn(
                 f"joint '{joint.attributes.get('name', '')}' is skipped, because it has no hardware interface"
             )

@@ -64,7 +64,7 @@ class Parameter(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A method: the function to call with the caller_id and the arguments, and the value to return for a refused call."""
+    """A method: the function to call with the caller_id and the arguments, and the value to return if the call is refused."""
 
     function: Callable[..., Answer | Steps[Answer]]
     refused: object
@@ -191,7 +191,7 @@ def global_name(value: object, name: str, caller_id: str) -> str:
 def node_name(value: object, name: str, caller_id: str) -> str:
     """Return a node name, resolved relative to the caller."""
     found = _short_text(value, name)
-    # Accept most illegal names, as rosmaster does: many robots have topics with a dash.
+    # Accept most illegal names, as rosmaster does, because many robots have topics with a dash.
     if ":" in found or " " in found or has_controls(found):
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return _resolve(found, caller_id)
@@ -225,7 +225,7 @@ def api_uri(value: object, name: str, caller_id: str) -> str:
     if not found.startswith(("http://", "rosrpc://")):
         raise CallRefused(f"ERROR: parameter [{name}] is not an RPC URI")
     if " " in found or has_controls(found):
-        # Reject control characters, because the URI is used in requests to the node, and in log lines.
+        # Reject control characters, because the URI is used in requests and in log lines.
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return found
 
@@ -275,5 +275,5 @@ def _resolve(name: str, caller_id: str) -> str:
 
 
 def parameters(**readers: Callable[[object, str, str], object]) -> tuple[Parameter, ...]:
-    """Return a method's parameters; each keyword is a parameter's name, with its reader as the value."""
+    """Return a method's parameters. Each keyword is a parameter's name; its value is the parameter's reader."""
     return tuple(Parameter(name, read) for name, read in readers.items())

@@ -64,7 +64,7 @@ class SimpleState(IntEnum):
 
 
 class GoalEvent(Enum):
-    """A server's action on a goal, or a request for one. The value describes the resulting state, for use in messages."""
+    """A server's action on a goal, or a request for one. The value describes the new state, for use in messages."""
 
     ACCEPT = "an active state"
     CANCEL_REQUEST = "a cancel requested state"
@@ -75,7 +75,7 @@ class GoalEvent(Enum):
 
 
 class SimpleStep(Enum):
-    """The effect of a change in the client's state on the simple client."""
+    """How a change of the client's state affects the simple client."""
 
     NONE = "nothing"
     ACTIVATE = "the goal has become active"
@@ -154,7 +154,7 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
         _G.ABORTED: _TO_RESULT,
         _G.PREEMPTING: (_C.PREEMPTING,),
     },
-    # Ignore an ACTIVE status: it may be delayed and older than the result, whose status was already processed.
+    # Ignore an ACTIVE status: it may be a delayed one, older than the result whose status has been processed.
     _C.WAITING_FOR_RESULT: {_G.ACTIVE: _STAYS, **_ENDED},
     _C.WAITING_FOR_CANCEL_ACK: {
         _G.PENDING: _STAYS,
@@ -235,5 +235,8 @@ def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -
 
 
 def visible_state(status: int) -> int:
-    """Return the goal's status as the simple client reports it: a goal being cancelled still counts as pending or active."""
+    """Return the goal's status as the simple client reports it.
+
+    A goal that is being cancelled still counts as pending or active.
+    """
     return int(_VISIBLE.get(status, status))

@@ -50,7 +50,7 @@ _FEW = 200  # maximum number of nodes to notify in one step
 
 _ROWS = 500  # maximum number of table rows to collect in one step
 
-PARAMETERS = ""  # represents parameters in :meth:`MasterApi.defer`; no topic has this name
+PARAMETERS = ""  # stands for the parameters in :meth:`MasterApi.defer`; no topic has this name
 
 # A notification from the master to a node after a change.
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
@@ -66,7 +66,7 @@ class MasterApi(ABC):
         # called for each change, with the record that the journal stores
         self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
-        """Writes a large value to the journal; returns the number that a change uses to refer to it."""
+        """Writes a large value to the journal; returns the number by which a change refers to it."""
 
         topic = parameters(topic=global_name, caller_api=api_uri)
         typed_topic = parameters(topic=global_name, topic_type=type_name, caller_api=api_uri)
@@ -179,7 +179,7 @@ class MasterApi(ABC):
     def collect_system_state(self) -> Steps[Answer]:
         """Return the response to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
-            # Build one list at a time, so that memory does not hold one for each client that waits for a response.
+            # Build one list at a time: memory must not hold one for each client that waits for a response.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())
@@ -273,10 +273,9 @@ class MasterApi(ABC):
             return self._get(name)
 
         def get() -> Steps[Answer]:
-            # Count the items in a separate step, because this takes time.
+            # Count the items in a separate step, because counting takes time.
             if not self.parameters.is_small_at(name):
-                # Send one value at a time: while a value is being sent, it must be copied whenever another client
-                # changes it.
+                # Send one value at a time: while one is being sent, every change to it by another client requires a copy.
                 yield ALONE
             return self._get(name)
 
@@ -299,7 +298,7 @@ class MasterApi(ABC):
         return self._run(steps, self.parameters.count_subscriptions())
 
     def _set_large(self, caller_id: str, name: str, value: object) -> Steps[Answer]:
-        # Process one value at a time, so that each is stored in the tree or freed before the next one.
+        # Process the values one by one, so that each is stored in the tree or freed before the next.
         yield ALONE
         weight = yield from _weigh(name, value)
         yield from self.parameters.make_room(weight)
@@ -363,7 +362,7 @@ class MasterApi(ABC):
 
     def subscribe_param(self, caller_id: str, uri: str, name: str) -> Answer:
         """Subscribe a node to a parameter's changes; return its current value."""
-        # Subscribe first, so that a refusal because of a limit has no side effects.
+        # Subscribe first, so that exceeding a limit has no side effects.
         value = self.parameters.subscribe(name, caller_id, uri)
         try:
             actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
@@ -387,7 +386,7 @@ class MasterApi(ABC):
     # --- helpers
 
     def _run(self, steps: Steps[Answer], actions: int) -> Answer | Steps[Answer]:
-        """Return the response immediately if it requires only a few actions, otherwise the steps that compute it."""
+        """Return the response immediately if it requires only a few actions; otherwise return the steps that compute it."""
         return finish(steps) if actions <= _FEW else steps
 
     def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
@@ -439,5 +438,5 @@ def nothing(*_: object) -> None:
 
 
 def key_of_node(key: str) -> str:
-    """Return the name to use for a parameter in a node's table, which also contains topics and services."""
+    """Return the name under which a parameter is in a node's table, which also contains topics and services."""
     return key.rstrip("/") or "/"

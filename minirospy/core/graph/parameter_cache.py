@@ -32,15 +32,15 @@ class ParameterCache:
 
     @property
     def changes(self) -> int:
-        """The number of changes: read it before querying the master, and pass it to :meth:`store`."""
+        """The number of changes. Read it before querying the master, and pass it to :meth:`store`."""
         return self._changes
 
     def get(self, key: str) -> object:
-        """Return the value stored for ``key``. Raise LookupError if there is none, or it has changed since it was stored."""
+        """Return the value stored for ``key``. Raise LookupError if there is none, or if it has changed since."""
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:
-        """Store the value that the master returned, unless there was a change since the query."""
+        """Store the value that the master returned, unless it has changed since the query."""
         if changes == self._changes:
             self._values[key] = value
 

@@ -19,7 +19,7 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-# Maximum nesting of namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
+# Maximum nesting of namespaces and dictionaries. With the response around them, they must fit into XML-RPC's 64 levels
 _MAX_DEPTH = 56
 
 _MAX_INT = 2**31
@@ -30,13 +30,13 @@ _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 
 MAX_BYTES = 96 * 1024 * 1024  # maximum total bytes of all parameters in memory
 
-# Part of MAX_BYTES that is reserved for values of at most SMALL bytes
+# Part of MAX_BYTES reserved for values of at most SMALL bytes
 RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
 
-# Maximum subscriptions to parameters: from all nodes, and from one host and port
+# Maximum number of subscriptions to parameters: from all nodes, and from one host and port
 MAX_SUBSCRIPTIONS, MAX_OF_ONE = 20_000, 10_000
 
-# Part of MAX_SUBSCRIPTIONS that is reserved for hosts and ports with at most FEW subscriptions
+# Part of MAX_SUBSCRIPTIONS reserved for hosts and ports with at most FEW subscriptions
 FEW_RESERVE, FEW = 5_000, 100
 
 _FEW_BYTES, _MANY_BYTES = 50_000, 1_000_000
@@ -54,7 +54,7 @@ class ParametersFullError(MinirospyError):
 
 
 class ParameterUpdate(NamedTuple):
-    """Notify the node at ``uri`` that ``key`` (which ends in a slash) has this value, or {} if it is not set."""
+    """Notify the node at ``uri`` that ``key`` (which ends with a slash) has this value, or {} if it is not set."""
 
     uri: str
     key: str
@@ -75,14 +75,13 @@ class ParameterTree:
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that have not been returned to a caller since their creation, so that they may
-        # be changed.
+        # The ids of the dictionaries that no caller has received since their creation; only these may be modified in place.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
-        # The subscribed keys, sorted, so that the keys below a namespace are adjacent.
+        # The subscribed keys, sorted so that all keys below a namespace are adjacent.
         self._keys: list[str] = []
         self._shares = Shares(MAX_SUBSCRIPTIONS, MAX_OF_ONE, FEW_RESERVE, FEW)
-        # Dict from a node's URI to its keys, each with the number of node names that subscribed to it.
+        # For each node's URI: its keys, each with the number of node names that have subscribed to it.
         self._keys_of: dict[str, dict[str, int]] = {}
         self._most = most
         self._reserve = reserve
@@ -109,7 +108,7 @@ class ParameterTree:
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of all names would use so much memory that only one should be built at a time."""
+        """Return whether a list of all names would use so much memory that only one such list should be built at a time."""
         return self._bytes > _MANY_BYTES
 
     def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
@@ -117,14 +116,14 @@ class ParameterTree:
         return is_small(self._find(_split(key)), most)
 
     def has_room(self, weight: int) -> bool:
-        """Return whether there is certainly enough memory for a value of ``weight`` bytes."""
+        """Return whether there is certainly enough memory left for a value of ``weight`` bytes."""
         return self._bytes + weight <= self._most_for(weight)
 
     def _most_for(self, weight: int) -> int:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Recalculate the memory in use, because it may include replaced values.
+        """Recalculate the memory in use, which may still include values that were replaced.
 
         Raise ParametersFullError if there is still too little.
         """
@@ -178,17 +177,18 @@ class ParameterTree:
             namespace = namespace_of(base)
 
     def names(self) -> list[str]:
-        """Return the names of all parameters, without namespaces."""
+        """Return the names of all parameters, but no namespaces."""
         return finish(self.names_in_steps())
 
     def names_in_steps(self) -> Steps[list[str]]:
-        """Return the names of all parameters in steps, because the tree may be large."""
+        """Return the names of all parameters, in steps because the tree may be large."""
         found: list[str] = []
         left = _STEP_ITEMS
         root = self.get("/")
         assert isinstance(root, dict)
-        # The namespaces that contain the current item. This is not a recursive function, because such a closure is in
-        # a reference cycle with its list, and the master's garbage collector does not examine old objects.
+        # The namespaces that contain the current item.
+        # Do not use a recursive function: its closure and this list would form a reference cycle.
+        # The master's garbage collector does not examine old objects.
         around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
 
         while around:
@@ -304,15 +304,15 @@ class ParameterTree:
             del self._keys[bisect_left(self._keys, key)]
 
     def _updates(self, path: list[str], setter: str | None = None) -> Iterator[ParameterUpdate]:
-        """Yield the updates that a change requires, one by one, because there may be many."""
+        """Yield, one by one, the updates that a change requires; there may be many."""
         changed = _with_slash(path)
         for length in range(len(path) + 1):
-            # Skip the node that set the value, because it has the value already.
+            # Skip the node that set the value: it already has it.
             for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
                 if each.caller_id != setter:
                     yield ParameterUpdate(each.uri, changed)
 
-        # Notify the node that set the namespace too: its cached value for a parameter inside is outdated.
+        # Also notify the node that set the namespace: its cached value of a parameter inside is outdated.
         at = bisect_right(self._keys, changed)
         while at < len(self._keys) and self._keys[at].startswith(changed):
             key = self._keys[at]
@@ -332,10 +332,10 @@ def weigh_in_steps(key: str, value: object) -> Steps[int]:
     """
     if not _split(key) and not isinstance(value, dict):
         raise ValueError("cannot set root of parameter tree to non-dictionary")
-    # Include the namespaces that contain the value, because they may not exist yet.
+    # Include the namespaces that contain the value, which may not exist yet.
     weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
     left = _STEP_ITEMS
-    # One entry per container that encloses the current item: (depth of its items, iterator over its remaining items).
+    # One entry per container around the current item: (depth of its items, iterator over its remaining items).
     around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
     while around:
         depth, items = around[-1]

@@ -32,14 +32,14 @@ _FEW_BYTES, _MANY_BYTES = 50_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):
-    """Send the subscriber at ``uri`` the complete list of a topic's publishers, as the list is at the time of sending."""
+    """Send the subscriber at ``uri`` the complete list of a topic's publishers at the time of sending."""
 
     uri: str
     topic: str
 
 
 class NodeShutdown(NamedTuple):
-    """Stop the node at ``uri``, because another node has registered with its name."""
+    """Shut down the node at ``uri``, because another node has registered with its name."""
 
     uri: str
     name: str
@@ -95,7 +95,7 @@ class Registry:
 
     def __init__(self, shares: Shares | None = None) -> None:
         """Create an empty registry; ``shares`` limits how many bytes the nodes on each host and port may use."""
-        self.changes = 0  # increases whenever publishers, subscribers or services may have changed
+        self.changes = 0  # increases whenever the publishers, subscribers or services may have changed
         self.shares = shares or registry_limits.new_shares()
         self._nodes: dict[str, _NodeEntry] = {}
         self._publishers: dict[str, dict[str, str]] = {}
@@ -189,7 +189,7 @@ class Registry:
         return self._updates(*published)
 
     def set_type(self, topic: str, type_: str) -> None:
-        """Set the type of a topic that has no registrations at present."""
+        """Set the type of a topic that currently has no registrations."""
         self._types.keep(topic, type_)
 
     # --- queries
@@ -206,7 +206,7 @@ class Registry:
 
     @property
     def is_crowded(self) -> bool:
-        """Return whether only the memory reserved for nodes with few registrations is left."""
+        """Return whether the only memory left is that reserved for nodes with few registrations."""
         return self.shares.total > self.shares.shared * 7 // 8
 
     def node_uri(self, node: str) -> str | None:
@@ -240,10 +240,6 @@ class Registry:
         """Return the type of each topic that has ever been registered with a type."""
         return dict(self.type_rows())
 
-    def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
-        """Return (topic, type) for each published topic below the namespace ``subgraph``."""
-        return list(self.published_rows(subgraph))
-
     def publishers(self) -> dict[str, list[str]]:
         """Return the nodes that publish each topic."""
         return dict(self.publisher_rows())
@@ -261,7 +257,7 @@ class Registry:
         return self._types.rows()
 
     def published_rows(self, subgraph: str = "") -> Iterator[tuple[str, str]]:
-        """Yield the items of :meth:`published_topics`. The table may change during the iteration."""
+        """Yield (topic, type) for each published topic below the namespace ``subgraph``. The table may change meanwhile."""
         prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
         return (
             (topic, self._types[topic])
@@ -334,7 +330,7 @@ class Registry:
         return chain((shutdown,), self._updates(*published))
 
     def _cost_of_text(self, name: str, kind: int, text: str) -> int:
-        """Return the bytes for a type or service URI, minus the bytes of the one that it replaces."""
+        """Return the number of bytes for a type or service URI, minus those of the one that it replaces."""
         if kind == SERVES:
             service = self._services.get(name)
             return text_cost(text) - (text_cost(service.uri) if service else 0)
@@ -393,7 +389,7 @@ class Registry:
             self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
-        """Yield an update for each subscriber to the topics, with the list of publishers at the time of yielding."""
+        """Yield an update for each subscriber to the topics, with the publishers at that moment."""
         for topic in topics:
             for uri in list(self._subscribers.get(topic, {}).values()):
                 yield PublisherUpdate(uri, topic)
@@ -417,6 +413,6 @@ def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
 
 
 def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-    # The fastest way to copy many small tables; every rewrite of a journal starts with this copy.
+    # This is the fastest way to copy many small tables, and every rewrite of a journal starts with this copy.
     rows = list(zip(table, map(tuple, table.values()), strict=True))
     return ((node, topic) for topic, nodes in rows for node in nodes)

@@ -29,13 +29,13 @@ MAX_BYTES = 64 * _MIB
 MAX_OF_ONE = 32 * _MIB  # maximum bytes in memory of the registrations from one host and port
 
 RESERVE = 16 * _MIB
-"""Part of MAX_BYTES that is reserved for hosts and ports that use at most FEW_OF_ONE, about 300 topics and services."""
+"""Part of MAX_BYTES reserved for hosts and ports that use at most FEW_OF_ONE, about 300 topics and services."""
 
 FEW_OF_ONE = _MIB // 4
 
 MAX_ENTRIES = 10_000  # maximum number of topics, services and parameters per node
 
-# Approximate bytes for a node, and for each name that it registers, not counting their strings
+# Approximate bytes for a node, and for each name that it registers, excluding their strings
 _NODE_BYTES, _NAME_BYTES = 400, 150
 
 PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8  # kinds of registration for a name, as bits
@@ -85,10 +85,10 @@ def node_cost(name: str, uri: str) -> int:
 
 
 def name_cost(name: str, kind: int, kinds: int) -> int:
-    """Return the bytes needed to register a name as ``kind`` if it is already registered as ``kinds``."""
+    """Return the bytes needed to register a name as ``kind`` if it is already registered as the kinds in ``kinds``."""
     if kinds & kind:
         return 0
     text = text_cost(name)
-    # Count the name again, because the parameter server has its own copy of it.
+    # Count the name again: the parameter server has its own copy.
     size = _KIND_BYTES[kind] + (text if kind == PARAMETER else 0)
     return size if kinds else size + _NAME_BYTES + text

@@ -31,7 +31,7 @@ class Shares:
         self.most = most
         self.largest = largest
         self.small = small
-        self.shared = most - reserve  # limit for the total of all holders that have more than ``small``
+        self.shared = most - reserve  # limit for the total of all holders that exceed ``small``
         self._held: dict[str, int] = {}
 
     def excess(self, holder: str, more: int) -> Excess | None:

@@ -13,7 +13,7 @@ __all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
 MAX_PUBLISHERS = 1000  # maximum publishers of one topic that a node connects to
 
-# New publishers to connect to at a time, and seconds between these groups, so that not all refusals arrive together
+# Number of new publishers to connect to as a group, and seconds between groups, so that refusals do not all arrive together
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
 FIRST_DELAY = 0.1
@@ -44,7 +44,7 @@ class SubscriptionPlan:
     """
 
     def __init__(self) -> None:
-        # keys are the URIs in the master's last list, in the same order
+        # keyed by URI, in the order of the master's last list
         self._failures: dict[str, int] = {}
         self._refusals: set[str] = set()
 
@@ -73,7 +73,7 @@ class SubscriptionPlan:
             self._failures[uri] = 0
 
     def refused(self, uri: str) -> None:
-        """Record that the publisher at ``uri`` refused this subscriber, and would do so again if retried."""
+        """Record that the publisher at ``uri`` refused this subscriber, and that retrying would not help."""
         if uri in self._failures:
             self._refusals.add(uri)
 

@@ -13,7 +13,7 @@ from minirospy.core.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
-MAX_OLD = 10_000  # maximum unregistered topics whose types are stored
+MAX_OLD = 10_000  # maximum number of unregistered topics whose types are kept
 _MAX_OLD_BYTES = 4 * 1024 * 1024  # maximum total bytes of unregistered topics' types in memory
 
 _TYPE_BYTES = 100  # approximate bytes for a type without its string
@@ -21,7 +21,7 @@ _TYPE_BYTES = 100  # approximate bytes for a type without its string
 
 class _Type(NamedTuple):
     text: str
-    node: str  # the node to which the type is charged; "" if no node registers the topic
+    node: str  # the node to which the type is charged; "" if no node has registered the topic
 
 
 class TopicTypes:
@@ -33,7 +33,7 @@ class TopicTypes:
     def __init__(self, count: Callable[[str, int], object]) -> None:
         self._count = count
         self._types: dict[str, _Type] = {}
-        # The unregistered topics, the most recent last, and the bytes that their types use.
+        # The unregistered topics, most recent last, and the bytes that their types use.
         self._old: dict[str, None] = {}
         self._old_bytes = 0
 
@@ -53,7 +53,7 @@ class TopicTypes:
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
 
     def cost(self, topic: str, type_: str) -> int:
-        """Return the bytes to charge to a node for registering the topic with this type, minus those of the type it replaces."""
+        """Return the bytes to charge to a node for registering the topic with this type, minus those of the replaced type."""
         before = self._types.get(topic)
         if before and before.node:
             return max(0, text_cost(type_) - text_cost(before.text))

@@ -36,7 +36,7 @@ def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
             value = getattr(message, name)
             for inner in value if is_array else (value,):
                 if _is_plain(inner):
-                    # The remaining elements have the same type, so they need not be checked.
+                    # The other elements have the same type, so do not check them.
                     break
                 arrays_from_bytes(inner, numpy)
         elif name in raw:

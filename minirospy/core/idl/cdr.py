@@ -37,11 +37,11 @@ __all__ = [
 CDR_HEADER = bytes((0, 1, 0, 0))
 """The encapsulation of plain CDR version 1, little-endian; the last two bytes are options, which readers ignore."""
 
-_SPARE = 10_000  # number of zero-size elements allowed, in addition to one element per message byte
+_SPARE = 10_000  # number of zero-size elements allowed in addition to one per byte of the message
 
 
 class Side(Enum):
-    """Whether an item exists in both message types, or in only one.
+    """States whether an item exists in both message types, or in only one.
 
     An item that exists only in the source is skipped; one that exists only in the target is written as zeros.
     """
@@ -88,7 +88,7 @@ class Transcoder(NamedTuple):
 
 
 def make_transcoder(name: str, layout: Layout) -> Transcoder:
-    """Return the functions that convert a message with this layout; ``name`` appears in tracebacks.
+    """Return the functions that convert messages with this layout; ``name`` is shown in tracebacks.
 
     Raise DefinitionError if Python cannot compile them.
     """
@@ -117,7 +117,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
 
 
 class _Position(NamedTuple):
-    """What is known about a position in CDR: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
+    """A position in CDR of which only the remainder after division by ``modulus`` (1, 2, 4 or 8) is known."""
 
     modulus: int
     remainder: int
@@ -126,7 +126,7 @@ class _Position(NamedTuple):
         return _Position(self.modulus, (self.remainder + size) % self.modulus)
 
     def after_any(self, width: int) -> _Position:
-        """Return what is known about the position after any number of items of ``width`` bytes."""
+        """Return the position after any number of items of ``width`` bytes."""
         modulus = min(self.modulus, width)
         return _Position(modulus, self.remainder % modulus)
 
@@ -134,11 +134,11 @@ class _Position(NamedTuple):
         return self.after(-self.remainder % width) if width <= self.modulus else _Position(width, 0)
 
     def padding(self, width: int) -> int | None:
-        """Return the number of bytes to the next multiple of ``width``; None if it depends on the message."""
+        """Return the number of bytes to the next multiple of ``width``, or None if it depends on the message."""
         return -self.remainder % width if width <= self.modulus else None
 
     def or_(self, other: _Position) -> _Position:
-        """Return a position that describes both ``self`` and ``other``."""
+        """Return a position that covers both ``self`` and ``other``."""
         modulus = min(self.modulus, other.modulus)
         while (self.remainder - other.remainder) % modulus:
             modulus //= 2
@@ -165,7 +165,7 @@ class _Walk:
         return self._known[key]
 
     def in_loop(self, layout: Layout, start: _Position) -> _Position:
-        """Return what is known about the position before each element and after the last one."""
+        """Return what is known about the position before each element, and after the last one."""
         while True:
             both = start.or_(self.after(layout, start))
             if both == start:
@@ -207,14 +207,14 @@ def block_of(layout: Layout) -> Block | None:
             return None
         width = max(width, item.width)
         offset += item.width * item.number
-    # Padding depends on the first member: unless it is the widest one, elements may need padding in between.
+    # Padding depends on the first member: if it is not the widest one, elements may need padding in between.
     if not offset or offset % width or not isinstance(layout[0], Fixed) or layout[0].width != width:
         return None
     return Block(width, offset)
 
 
 def _least_size(layout: Layout, absent: Side) -> int:
-    """Return the minimum size of a layout, without padding, in the message that lacks the items of side ``absent``."""
+    """Return the minimum size of a layout, without padding, in the message that lacks the items of the side ``absent``."""
     size = 0
     for item in layout:
         if item.side is absent:
@@ -232,26 +232,26 @@ def _least_size(layout: Layout, absent: Side) -> int:
 
 
 class _Copy(NamedTuple):
-    """Bytes that are read and written."""
+    """Bytes that are copied."""
 
     size: int
 
 
 class _Swap(NamedTuple):
-    """Numbers of ``width`` bytes that are read and written with their bytes reversed."""
+    """Numbers of ``width`` bytes that are read, byte-swapped and written."""
 
     width: int
     size: int
 
 
 class _Skip(NamedTuple):
-    """Bytes that are read and dropped."""
+    """Bytes that are skipped."""
 
     size: int
 
 
 class _Zeros(NamedTuple):
-    """Zero bytes that are written."""
+    """A run of zero-valued bytes (padding) to write."""
 
     size: int
 
@@ -273,11 +273,13 @@ class _Length(NamedTuple):
 
 
 _Token = Union[_Copy, _Swap, _Skip, _Zeros, _Constant, _Length]  # noqa: UP007 - evaluated
-"""The generated function's operation on the next bytes. Do not compare tokens: named tuples of two classes may be equal."""
+"""The generated function's operation on the next bytes. Do not compare tokens: named tuples of different classes may be
+equal.
+"""
 
 
 class _Generator:
-    """Generates one function. ``end`` is the position in the source, ``at`` the position in the CDR being written."""
+    """Generates one function. ``end`` is the position in the source; ``at`` is the position in the CDR being written."""
 
     def __init__(self, *, is_cdr_source: bool, swaps: bool) -> None:
         self._source = Source()
@@ -286,7 +288,7 @@ class _Generator:
         self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items missing in the source message
         self._walk = _Walk()
         self._position = _Position(8, 0)
-        # pending items, which _flush() merges and writes in as few lines as possible
+        # pending items; _flush() merges them and writes them in as few lines as possible
         self._tokens: list[_Token] = []
 
     def function(self, layout: Layout) -> str:
@@ -352,7 +354,7 @@ class _Generator:
             self._align(4)
             self._position = _UNKNOWN
         if not self._is_read(item):
-            # Write an empty string, which in CDR consists of a NUL.
+            # Write an empty string; in CDR it consists of a NUL.
             self._tokens.append(_Zeros(4) if self._is_cdr_source else _Constant(b"\1\0\0\0\0"))
             return
 
@@ -405,7 +407,7 @@ class _Generator:
         if is_fixed or start.padding(block.width) == 0:
             write()
         else:
-            # An empty sequence is not followed by padding.
+            # No padding follows an empty sequence.
             with self._source.block(f"if {count}:"):
                 write()
         self._position = start.or_(start.aligned(block.width)).after_any(block.width)
@@ -422,7 +424,7 @@ class _Generator:
         with self._source.block(f"for _ in range({count}):"):
             self._items(item.items)
             self._flush()
-            # The body of the loop may be empty, if the element's items have no bytes.
+            # The body of the loop is empty if the element's items have no bytes.
             line("pass")
         self._position = position
 
@@ -446,7 +448,7 @@ class _Generator:
             return
         last = self._tokens[-1] if self._tokens else None
         if isinstance(last, _Zeros) and last.size == 1:
-            # Remove the tokens of a string's NUL, and of the padding after it.
+            # Remove the tokens for a string's NUL and for the padding after it.
             self._tokens.pop()
             self._flush()
             self._source.line(f"add(_NUL[~at & {mask}])")
@@ -457,7 +459,7 @@ class _Generator:
         self._source.line(f"at += -at & {mask}")
 
     def _length(self, side: Side, *, is_text: bool) -> str:
-        """Generate code that reads a length after the pending tokens; return the local variable's name.
+        """Generate code that reads a length after the pending tokens; return the name of the local variable.
 
         The code writes the length if both messages have it. In CDR a string's length includes the trailing NUL.
         """
@@ -570,7 +572,7 @@ _PADDING = tuple(bytes(count) for count in range(8))
 
 
 def _compiled(name: str, source: str) -> Callable[..., bytes]:
-    """Execute the source of a function, which contains only sizes and names generated here, no text from a definition."""
+    """Execute the source of a function. It contains only sizes and names generated here, and no text from a definition."""
     file = f"<generated {name}>"
     names: dict[str, object] = {
         "DeserializationError": DeserializationError,

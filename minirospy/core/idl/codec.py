@@ -19,7 +19,7 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-_SPARE = 10_000  # maximum number of elements without bytes, in addition to one per byte in the message
+_SPARE = 10_000  # maximum number of elements without bytes, in addition to one per byte of the message
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 
@@ -46,7 +46,7 @@ class _Leaf(NamedTuple):
 
     @property
     def is_numbers(self) -> bool:
-        """Return whether the field is an array that a single ``struct`` packs."""
+        """Return whether the field is an array that ``struct`` packs with a single call."""
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:
@@ -77,7 +77,7 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
-    """Return the format characters of the fields that remain bytes until they are read: number arrays of any length."""
+    """Return the format characters of the fields that stay bytes until they are read: number arrays of any length."""
     return {
         python_name(field.name): PRIMITIVES[field.type.base]
         for field in spec.fields
@@ -218,7 +218,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the source of the call that packs values. An inner message that contains several of them is read only once."""
+        """Return the source of the call that packs values. Read an inner message only once if it contains several of them."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -235,7 +235,7 @@ class _Writer:
         return f"{self._source.struct(letters)}.pack({', '.join(arguments)})"
 
     def _fixed(self, leaf: _Leaf) -> list[str]:
-        """Return the values of a fixed-size field; check the length of byte arrays, because struct does not."""
+        """Return the values of a fixed-size field. Check the length of byte arrays, because struct does not."""
         if not leaf.type.is_array:
             return leaf.packed()
         name = self._bytes(leaf)
@@ -355,7 +355,7 @@ class _Reader:
                 self._line('raise genpy.DeserializationError("the message ends too early")')
 
         if raw:
-            # Delete the slots' values, so that reading one of them calls __getattr__.
+            # Delete the slots' values, so that reading a slot calls __getattr__.
             self._line(" = ".join(f"self.{name}" for name in raw) + " = []")
             self._line("del " + ", ".join(f"self.{name}" for name in raw))
             self._line("self._raw = {" + ", ".join(f'"{name}": {local}' for name, local in raw.items()) + "}")
@@ -383,7 +383,7 @@ class _Reader:
     def _fields(
         self, chunks: list[_Chunk], names: dict[str, str], lazy: dict[str, str] | None = None
     ) -> dict[str, str]:
-        """Generate code that reads the chunks, but only slices out the bytes of lazy arrays.
+        """Generate code that reads the fields; for a lazy array it only slices out the raw bytes.
 
         Return a dict from field name to the local name of its bytes.
         """
@@ -481,7 +481,7 @@ class _Reader:
         spec = None if type_.is_primitive else self._lookup(type_.base)
         least = _least_size(spec, self._lookup) if spec else 0
         if spec and not least:
-            # The elements have no bytes, so without this limit a short message could claim any number of them.
+            # The elements have no bytes. Without this limit, a short message could claim any number of them.
             self._line(f"spare -= {count}")
             with self._source.block("if spare < 0:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
@@ -503,8 +503,7 @@ class _Reader:
             return
 
         if least and type_.length is None:
-            # The elements consist of slices, and a slice that is too short is detected only at the end of the
-            # message.
+            # The elements consist of slices; a slice that is too short is only detected at the end of the message.
             with self._source.block(f"if {_times(count, least)} > len(data) - end:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
         with self._source.block(f"for _ in range({count}):"):

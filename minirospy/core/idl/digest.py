@@ -12,8 +12,7 @@ from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
-    # Use the module that hashlib uses without OpenSSL, because loading OpenSSL takes 2 ms, and it refuses MD5 in FIPS
-    # mode.
+    # Use the module that hashlib uses without OpenSSL: loading OpenSSL takes 2 ms, and in FIPS mode OpenSSL refuses MD5.
     from _md5 import md5  # type: ignore[import-not-found]
 except ImportError:
     from hashlib import md5
@@ -52,7 +51,7 @@ def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
-    """Return all types that a message uses, each once and before the types that it uses itself."""
+    """Return all types that a message uses, each one once and before the types that it uses itself."""
     found: dict[str, None] = {}
 
     def visit(current: MessageSpec) -> None:
@@ -83,7 +82,10 @@ def _md5(text: str) -> str:
 def _md5_text(
     spec: MessageSpec, lookup: Lookup, around: tuple[str, ...], known: dict[str, str] | None = None
 ) -> str:
-    """Return the text for the md5sum. ``around``: the messages that contain this one; ``known``: md5sums computed so far."""
+    """Return the text for the md5sum.
+
+    ``around`` are the messages that contain this one, ``known`` the md5sums computed so far.
+    """
     if spec.full_name in around:
         raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
     if len(around) > MAX_LEVELS:

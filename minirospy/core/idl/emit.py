@@ -124,7 +124,7 @@ def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
 
 
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
-    """Generate the source of a message's class. Its globals must contain the classes of its fields.
+    """Generate the source of a message's class. The globals must contain the classes of its fields.
 
     Raise DefinitionError if a name is not legal in Python.
     """
@@ -146,7 +146,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Emit the ``__init__`` of a package's msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
+    """Generate the ``__init__`` of a msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError if a name is not legal in Python.
     """
@@ -159,7 +159,7 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
         "import importlib",
         "from typing import Any",
         "",
-        # Use a compact format, because a wheel contains hundreds of these files.
+        # Use a compact format: a wheel contains hundreds of these files.
         f"_NAMES = {' '.join(names)!r}.split()",
         f'_MODULES = {{name + part: "_" + name for name in _NAMES for part in {tuple(parts)!r}}}',
         "__all__ = sorted(_MODULES)",
@@ -214,7 +214,7 @@ class ClassSource(NamedTuple):
 
 
 def _checked(lookup: Lookup) -> Lookup:
-    """Return ``lookup`` with :func:`check_spec` applied to its results, once per message."""
+    """Wrap ``lookup`` so that it runs :func:`check_spec` on each result, once per message type."""
     seen: dict[str, MessageSpec] = {}
 
     def checked(name: str) -> MessageSpec:

@@ -60,8 +60,7 @@ class Catalogue:
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        # Keyed by package and kind, because a package may have hundreds of definitions, and each is looked up by its
-        # name.
+        # Keyed by package and kind: a package may have hundreds of definitions, which are looked up by name.
         self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
         for package, files in (definitions or {}).items():
             kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
@@ -102,7 +101,7 @@ class Catalogue:
         return [self.message(f"{package}/{name}") for name in sorted(names)]
 
     def services(self, package: str) -> list[ServiceSpec]:
-        """Return all services in a package, by name."""
+        """Return all services in a package, as a dict keyed by name."""
         return [self.service(f"{package}/{name}") for name in self.files(package, "srv")]
 
     def service(self, full_name: str) -> ServiceSpec:
@@ -117,7 +116,7 @@ class Catalogue:
         return parse_service(read_definition(path), package, name, str(path))
 
     def actions(self, package: str) -> list[ActionSpec]:
-        """Return all actions in a package, by name."""
+        """Return all actions in a package, as a dict keyed by name."""
         return [self.action(f"{package}/{name}") for name in self.files(package, "action")]
 
     def action(self, full_name: str) -> ActionSpec:
@@ -170,7 +169,7 @@ _OF_OTHER_LANGUAGES = {
 
 
 def read_definition(path: Path) -> str:
-    """Return the text of a definition file. Raise DefinitionError if the file cannot be read."""
+    """Read a definition file. Raise DefinitionError if that fails."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -215,7 +214,7 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # Remove modules that remain from an earlier build, which precompiled them.
+            # Remove modules that an earlier build has precompiled.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -232,21 +231,20 @@ def top_module(package: str, files: Iterable[str]) -> str:
 
 
 def _is_generated(file: Path) -> bool:
-    """Return whether the file may be generated, because it does not exist or is from an earlier build."""
+    """Return whether the file may be generated: it does not exist, or an earlier build has generated it."""
     from minirospy.core.idl.emit import GENERATED
 
     return not file.exists() or GENERATED in file.read_text(encoding="utf-8").partition("\n")[0]
 
 
 def _on_demand(sources: dict[str, str]) -> dict[str, str]:
-    """Return the files of a package whose modules are compiled when they are imported."""
+    """Return the files of a package whose modules are compiled on import."""
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # Call a function instead of the code that emit_package generates, which would be repeated in each such
-            # file.
+            # Call a function; the code that emit_package generates would be repeated in each such file.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"
@@ -325,7 +323,7 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     if len(text) > MAX_TEXT:
         raise DefinitionError(full_name, 1, f"its definition has more than {MAX_TEXT} characters")
     specs: dict[str, MessageSpec] = {}
-    # The separator includes the newline before it, so do not add one to a text without a trailing newline.
+    # The separator starts with a newline, so do not append one to a string that lacks a trailing newline.
     for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
         name, body = full_name, part
         if number:
@@ -375,36 +373,36 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
     made: dict[str, type[Message]] = {}
     for name, spec in specs.items():
         made[name] = _run(emit_class(spec, specs.__getitem__), name, made)
-    # Pass the text on unchanged, even if minirospy would generate a different one.
+    # Pass the text on unchanged, even if minirospy would have generated a different one.
     made[full_name]._full_text = text
     return types.MappingProxyType(made)
 
 
 def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
-    """Execute the source of a class. Its fields use the classes created so far, ``made``."""
+    """Execute the source of a class; its fields use ``made``, the classes created so far."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
     for type_, alias in emitted.classes.items():
         module.__dict__[alias] = made[type_]
     source = emitted.source
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    # `validate` has checked the names, and `repr` quotes all other text, so that a peer's text is never executed.
+    # `validate` has checked the names, and `repr` quotes all other text, so text from a peer is never executed.
     try:
         exec(compile(source, file, "exec"), module.__dict__)
     except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
-        # Python has its own limits, for example on nested loops, which nested arrays generate.
+        # Python has limits of its own, for example on the nested loops that nested arrays generate.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
-    # Use genpy's naming, because programs that read bags look for names such as `_sensor_msgs__Image`.
+    # Use genpy's naming: programs that read bags look for names such as `_sensor_msgs__Image`.
     found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
     found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
     _running[id(found)] = found
-    # Remove the source together with the class, because a publisher may send any number of definitions.
+    # Remove the source when the class is removed, because a publisher may send any number of definitions.
     weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
     return found
 
 
-# Dict from id to class, for classes created at run time, so that unpickling a message finds its class
+# Classes created at run time, keyed by id, so that unpickling a message finds its class
 _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
 
 
@@ -418,7 +416,7 @@ def _reduced(message: Any) -> tuple[Any, ...]:
 
 
 def _unpickled(key: int, type_: str, text: str) -> Message:
-    """Return a new message whose class was created at run time. In another process, create the class again."""
+    """Return a new message whose class was created at run time. In another process, recreate the class."""
     found = _running.get(key)
     if found is None or (found._type, found._full_text) != (type_, text):
         found = class_from_text(type_, text)
@@ -457,7 +455,7 @@ def _has_definitions(package: str, kind: str) -> bool:
     try:
         found = importlib.util.find_spec(package)
     except (ImportError, ValueError):
-        # A module that was added to sys.modules manually has no spec, for which find_spec raises ValueError.
+        # A module added to sys.modules by hand has no spec; find_spec then raises ValueError.
         found = None
     if found is None:
         return package in sys.modules

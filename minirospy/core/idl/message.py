@@ -129,7 +129,7 @@ class Message:
 
         As in genpy, which does not convert struct's errors, a number that exceeds a float32 raises OverflowError.
         """
-        # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
+        # After an error, find the field that cannot be written. Otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)
@@ -152,7 +152,7 @@ class Message:
 
 
 def _equal(value: object, other: object) -> bool:
-    """Return whether two field values are equal as in genpy: a list equals a tuple with the same items."""
+    """Return whether two field values are equal in genpy's sense: a list equals a tuple with the same items."""
     if type(value) is not type(other) and type(value) in _SEQUENCES and type(other) in _SEQUENCES:
         return tuple(cast("Sequence[object]", value)) == tuple(cast("Sequence[object]", other))
     return bool(value == other)
@@ -192,7 +192,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            # Accept a class from another generator or from another text, because its serialized bytes are the same.
+            # Accept a class from another generator or another text: its serialized bytes are the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")
@@ -329,7 +329,7 @@ def _number(value: object, width: int | None) -> str:
 
 
 def _number_or_text(value: object, width: int | None) -> str:
-    """Return an item as text; the list's first item is a number, but the list may also contain strings."""
+    """Format an item. The list's first item is a number, but the list may also contain strings."""
     if isinstance(value, str):
         return repr(value) if width is None else _quoted(value)
     if value is None:
@@ -426,7 +426,7 @@ _CHECKS: dict[str, _Check] = {
     "time": _check_time,
     "duration": _check_time,
     **dict.fromkeys(_INTEGERS, _check_integer),
-}  # functions that check whether a value can be written
+}  # functions that check whether a value can be serialized
 
 
 def _check_strict_integer(name: str, type_: str, value: object) -> None:
@@ -459,7 +459,8 @@ _STRICT_CHECKS: dict[str, _Check] = {
     **dict.fromkeys(("float32", "float64"), _check_strict_float),
     **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
-}  # checks like genpy's that also accept numpy's numbers, which genpy's messages can contain anyway
+    # checks like genpy's, which also accept numpy's numbers, because messages of genpy may contain those anyway
+}
 
 
 def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
@@ -479,7 +480,7 @@ def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Che
 
 
 def _items_of_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> Iterable[object]:
-    """Return the items of an array; for numpy's arrays of more dimensions, the numbers, which are written row by row.
+    """Return the items of an array; flatten a multi-dimensional numpy array in row-major order.
 
     Raise SerializationError if a fixed-length field cannot be filled from the array's shape.
     """
@@ -487,7 +488,7 @@ def _items_of_array(name: str, type_: str, value: object, checks: Mapping[str, _
     if len(shape) < 2:
         return cast("Iterable[object]", value)
     length = type_.partition("[")[2]
-    # Serializing counts rows first: a column of the right length is refused there, with each row as a number.
+    # Serializing counts the rows first; a column of the right length then fails, because each row is taken as a number.
     is_refused = checks is _CHECKS and length == str(shape[0])
     if length and (is_refused or length != str(math.prod(shape))):
         hint = ": use reshape(-1)" if is_refused and length == str(math.prod(shape)) else ""
@@ -508,7 +509,7 @@ def _fill(message: protocols.Message, values: object, words: Mapping[str, object
         for name, value in values.items():
             if name not in types:
                 raise MessageException(f"No field name [{path}{name}]")
-            # YAML parses a key without a value as null, but the user means an empty string.
+            # YAML parses a key without a value as null, but the user means the empty string.
             _fill_field(message, name, types[name], "" if value is None else value, words, path)
         return
     if not isinstance(values, list | tuple):
@@ -570,14 +571,14 @@ def _filled_array(
 
 
 def _element_class(message: protocols.Message, type_: str) -> type[protocols.Message] | None:
-    """Return the installed class of an array's elements, else the one in the message's full text, else None."""
+    """Return the installed class of an array's elements, else the one from the message's full text, else None."""
     from minirospy.core.idl.load import classes_from_text, get_message_class
 
     found = get_message_class(type_)
     if found is not None:
         return found
     try:
-        # The messages of a bag or a peer are created from this text, and their packages need not be installed.
+        # Messages from a bag or peer are created from this text; their packages need not be installed.
         return classes_from_text(message._type, message._full_text).get(type_)
     except DefinitionError:
         return None

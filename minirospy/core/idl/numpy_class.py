@@ -29,7 +29,7 @@ class NumpyMissingError(MinirospyError, ImportError):
 
 @lru_cache(maxsize=256)
 def numpy_class(message_class: type[_M]) -> type[_M]:
-    """Return a message class whose arrays are numpy arrays. For peers, its type is the same as that of ``message_class``.
+    """Return a message class whose arrays are numpy arrays. To peers, it has the same type as ``message_class``.
 
     Raise NumpyMissingError if numpy is not installed.
     """
@@ -40,7 +40,7 @@ def numpy_class(message_class: type[_M]) -> type[_M]:
     if getattr(message_class, "_takes_numpy", False):
         return message_class
 
-    # Do not use genpy's generated code if it would fail: it calls ndarray.tostring, which numpy 2.3 has removed.
+    # Do not use genpy's generated code if it would fail: it calls ndarray.tostring, which numpy 2.3 removed.
     is_ours = getattr(message_class, "serialize_numpy", None) is BaseMessage.serialize_numpy
     makes_methods = _own_methods if is_ours or not hasattr(numpy.ndarray, "tostring") else _genpy_methods
     fields = {

@@ -58,7 +58,7 @@ def load_package(
 
 
 class _Finder:
-    """The last finder in ``sys.meta_path``, so that a module that exists as a file is found first."""
+    """The last finder in ``sys.meta_path``, so that modules that exist as files are found first."""
 
     def __init__(self) -> None:
         self.packages: dict[str, int] = {}
@@ -79,14 +79,17 @@ class _Finder:
 
 
 class _Loader(SourceFileLoader):
-    """Compiles the source generated from a definition; SourceFileLoader does the rest, such as caching."""
+    """Compiles the source generated from a definition; leaves the rest, such as caching, to SourceFileLoader."""
 
     def __init__(self, fullname: str, path: str, fingerprint: int) -> None:
         super().__init__(fullname, path)
         self._fingerprint = fingerprint
 
     def path_stats(self, path: str | bytes) -> dict[str, int]:
-        """Return the values that Python compares with a cached module's header. The source's size is not known in advance."""
+        """Return the values that Python compares with a cached module's header.
+
+        The size of the source is unknown at this point.
+        """
         return {"mtime": self._fingerprint, "size": 0}
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:
@@ -95,7 +98,7 @@ class _Loader(SourceFileLoader):
         super().set_data(path, cached[:12] + bytes(4) + cached[16:], _mode=_mode)
 
     def get_data(self, path: str | bytes) -> bytes:
-        """Return the module's source, or the bytes in its cache."""
+        """Return the contents of ``path``: the module's source or its cached bytecode."""
         if path != self.path:
             return super().get_data(str(path))
         package, kind, module = self.name.split(".")

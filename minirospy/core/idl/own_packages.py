@@ -25,7 +25,7 @@ COMPILED_AHEAD = frozenset(
         "visualization_msgs",
     ]
 )
-"""Packages whose modules are files in the wheel: the packages of ROS itself and of the workshop, which most programs import."""
+"""Packages whose modules are files in the wheel: ROS's own packages and the workshop's, which most programs import."""
 
 _OURS = Path(__file__).parents[2]
 

@@ -77,7 +77,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
 
     lines = {"Goal": parts[0][1], "Result": parts[1][1], "Feedback": parts[2][1]}
     messages = tuple(
-        # Add the line _GENERATED at the start, as genaction.py does, so that full texts equal those in real ROS.
+        # Prepend the line _GENERATED, as genaction.py does, so that full texts equal those of real ROS.
         _parse(_GENERATED + body, package, name + suffix, where, lines.get(suffix, 1) - 1)
         for suffix, body in texts.items()
     )
@@ -159,7 +159,7 @@ def _parse_constant(type_: FieldType, rest: str, line: str, where: str, number: 
     if type_.is_array or type_.base in ("time", "duration") or not type_.is_primitive:
         raise DefinitionError(where, number, f"a constant cannot be of type [{type_}]")
     if type_.base == "string":
-        # The value of a string constant is the rest of its line, including comment characters.
+        # A string constant's value is the rest of its line, including comment characters.
         text = line.split("=", 1)[1].strip()
         return Constant(name, type_.base, text, text)
     text = rest.split("=", 1)[1].strip()

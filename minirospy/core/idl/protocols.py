@@ -48,7 +48,7 @@ class Message(Protocol):
     _slot_types: list[str]
     _connection_header: dict[str, str]
 
-    # Use Any, not object: otherwise pyright regards a class with other parameters as incompatible.
+    # Use Any instead of object: otherwise pyright regards a class with other parameters as incompatible.
     def __init__(self, *args: Any, **kwds: Any) -> None:
         """Set all fields in order, or some by name."""
 
@@ -94,7 +94,7 @@ class Stamped(Message, Protocol):
 
 
 class ServiceClass(Protocol):
-    """A service class, which contains the classes of its request and response; it has no instances."""
+    """A service class. It contains the classes of its request and response, and has no instances."""
 
     @property
     def _type(self) -> str: ...

@@ -16,8 +16,7 @@ def to_response(response_class: type[Message], returned: object) -> Message:
     The handler may return a response, a dictionary of some of its fields, a list or tuple of all its field values, or the
     value of its only field. If the value does not match, raise ServiceException with rospy's message.
     """
-    # Compare the types' names, because the same type may have a different class, from a reloaded module or a
-    # third-party generator.
+    # Compare the types' names: a type may have several classes, for example from a reloaded module or another generator.
     if getattr(type(returned), "_type", None) == response_class._type:
         return cast("Message", returned)
     if returned is None:

@@ -19,7 +19,7 @@ def python_name(field: str) -> str:
 
 
 class Source:
-    """Collects lines; also records the structs, classes and helpers that the start of the module must define."""
+    """Collects lines, and records the structs, classes and helpers that the start of the module must define."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -64,15 +64,14 @@ class Source:
         """Return the name of a message's class, which is unique within the module."""
         if full_name not in self.classes:
             name = "_" + full_name.replace("/", "_")
-            # Without this check, a/b_C and a_b/C would have the same name, and struct/I would have the name of a
-            # compiled struct.
+            # Without this check, a/b_C and a_b/C would have the same name, and struct/I that of a compiled struct.
             while name in self.classes.values() or (name.startswith("_struct_") and name[-1] != "_"):
                 name += "_"
             self.classes[full_name] = name
         return self.classes[full_name]
 
     def local(self, stem: str) -> str:
-        """Return a local name that is unused in this function. The name ends in a digit, so that it hides no other name."""
+        """Return a local name that is unused in this function. It ends in a digit, so that it hides no other name."""
         number = self._last.get(stem, 0) + 1
         while f"{stem}{number}" in self._taken:
             number += 1

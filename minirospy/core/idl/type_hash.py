@@ -34,7 +34,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
         whole = _whole(name)
         if whole in known:
             return
-        known[whole] = None  # marks the type as being computed, to detect a type that contains itself
+        known[whole] = None  # marks the type as in progress, to detect a type that contains itself
         found = []
         for field, text in (fields(name) or _EMPTY).items():
             id, capacity, nested = _described(text)
@@ -63,7 +63,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
 
 
 def _described(text: str) -> tuple[int, int, str]:
-    """Return a field's type as (type number, maximum number of elements, message name). The name is "" if it is not a message."""
+    """Return a field's type as (type number, maximum number of elements, message name); the name is "" for other types."""
     added, capacity, base = 0, 0, text
     if text.startswith("sequence<"):
         base, _, bound = text[len("sequence<") : -1].partition(",")

@@ -26,10 +26,10 @@ MAX_TEXT = 1 << 20
 
 MAX_LEVELS = 50  # maximum depth of nested messages
 
-# Maximum fields per message, including those of inner messages, which the generated source expands
+# Maximum number of fields per message, including those of inner messages, which the generated source expands
 _MAX_FIELDS = 4_000
 
-# Maximum fields in all types that a message uses; the largest message in MoveIt has some 17,000
+# Maximum number of fields in all types that a message uses; MoveIt's largest message has some 17,000
 _MAX_FIELDS_IN_ALL = 32_000
 
 _MAX_BYTES = 1 << 27  # maximum total size in bytes of a message's fixed-length arrays in memory
@@ -95,7 +95,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     try:
         order = list(TopologicalSorter(needed).static_order())
     except CycleError as error:
-        # The first name is repeated at the end of graphlib's list of the cycle.
+        # graphlib lists a cycle with the first name repeated at the end.
         around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
         raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
 
@@ -128,7 +128,7 @@ def _size_of(spec: MessageSpec, sizes: dict[str, _Size]) -> _Size:
             each = 64 + inner.bytes
             levels = max(levels, inner.levels + 1)
         fields += 1 + (inner.fields if inner else 0)
-        # In a new message, an array without a fixed length has no elements.
+        # An array without a fixed length is empty in a new message.
         memory += each * (1 if not field.type.is_array else field.type.length or 0)
     return _Size(fields, levels, memory)
 
@@ -145,5 +145,5 @@ def _check_size(where: str, size: _Size) -> None:
 def _shown(text: str) -> str:
     """Return text from a peer, shortened and made printable for a one-line error message."""
     text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
-    # Escape non-ASCII letters, because a letter in another script may look like an ASCII letter.
+    # Escape non-ASCII letters: a letter of another script may look like an ASCII letter.
     return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

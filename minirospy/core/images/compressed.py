@@ -142,7 +142,7 @@ def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
 
 
 def _swapped(image: Pixels) -> Pixels:
-    """Swap an image's red and blue channels, because OpenCV uses BGR and Pillow RGB."""
+    """Swap an image's red and blue channels; OpenCV uses BGR, Pillow RGB."""
     import numpy as np
 
     if image.ndim == 2:

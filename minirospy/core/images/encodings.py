@@ -51,7 +51,7 @@ def _type(depth: str, channels: int) -> int:
 
 
 def is_converted_by_opencv(source: str, wanted: str) -> bool:
-    """Return whether a conversion needs OpenCV: only conversions from a Bayer pattern or YUV to colors do."""
+    """Return whether a conversion needs OpenCV. Only conversions from a Bayer pattern or YUV to colors do."""
     return (
         _kind(source) in ("bayer", _YUV)
         and _kind(wanted) == "color"
@@ -102,7 +102,7 @@ def _kind(encoding: str) -> str:
 
 
 def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image with another encoding's channels, but the depth unchanged."""
+    """Convert an image's channels to another encoding's, without changing the depth."""
     import numpy as np
 
     if source == _YUV and wanted.startswith("mono"):
@@ -145,7 +145,7 @@ def _of_depth(image: Pixels, source: str, wanted: str) -> Pixels:
     values = image.astype(np.float64) * factor
     with np.errstate(invalid="ignore"):
         values = np.rint(values)
-        # As in OpenCV, NaN and values outside of an int's range become the int's minimum, which is then clipped.
+        # As in OpenCV, NaN and values outside an int's range become the int's minimum, which is then clipped.
         values[~((values >= -(2.0**31)) & (values < 2.0**31))] = -(2.0**31)
     limits = np.iinfo(dtype)
     return np.clip(values, limits.min, limits.max).astype(dtype)

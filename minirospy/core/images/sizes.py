@@ -22,7 +22,7 @@ _TIFF_SHORT, _TIFF_LONG = 3, 4
 
 
 def size_of(data: bytes) -> tuple[int, int] | None:
-    """Return width and height, or None if the format is unknown or its header is invalid."""
+    """Return width and height, or None if the format is unknown or the header is invalid."""
     try:
         for magic, read in _READERS.items():
             if data.startswith(magic):
@@ -46,7 +46,7 @@ def _bmp(data: bytes) -> tuple[int, int]:
     if head == 12:
         return _pair("<HH", data, 18)
     width, height = _pair("<ii", data, 18)
-    # A negative height means that the rows start at the top.
+    # A negative height means that the first row is the top one.
     return abs(width), abs(height)
 
 

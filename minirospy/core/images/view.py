@@ -1,4 +1,4 @@
-"""An image message's pixels, without a copy if its byte order is this machine's. Pure."""
+"""Return an image message's pixels, without a copy if the byte order is this machine's. Pure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def pixels(message: Image) -> Pixels:
     channels = number // 8 + 1
     dtype = np.dtype(list(DEPTHS.values())[number % 8]).newbyteorder(">" if message.is_bigendian else "<")
     row = message.width * channels * dtype.itemsize
-    # Compute the row length if ``step`` is too small, because some drivers do not set it.
+    # Compute the row length if ``step`` is too small; some drivers do not set it.
     step = message.step if message.step >= row else row
     needed = max(message.height - 1, 0) * step + (row if message.height else 0)
     data = message.data

@@ -37,7 +37,7 @@ class StampedTransform(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """The samples on the path between two frames, from each frame up to their common ancestor, and their time."""
+    """The samples on the path between two frames, from each frame up to their common ancestor, and the time of the samples."""
 
     time: int
     from_source: list[Sample]
@@ -56,7 +56,7 @@ class TransformBuffer(FrameTree):
         ExtrapolationException if there is no data for the time, InvalidArgumentException if a name is invalid.
         """
         if target == source:
-            # As in tf2, a frame's pose in itself is the identity, even for an unknown frame.
+            # As in tf2, a frame's pose relative to itself is the identity, even for an unknown frame.
             return StampedTransform(time or self._newest_of(target), _ORIGIN, IDENTITY)
         target_frame = self._valid(target, "lookupTransform argument target_frame")
         source_frame = self._valid(source, "lookupTransform argument source_frame")
@@ -103,8 +103,7 @@ class TransformBuffer(FrameTree):
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         fixed_frame = self._frames.get(fixed)
         if target_frame is None or source_frame is None:
-            # If the source frame is missing, report the fixed frame as missing, as tf2 does because it tests the
-            # wrong frame.
+            # If the source frame is missing, report the fixed frame as missing: tf2 does so because it tests the wrong frame.
             missing = "" if source_frame else f" fixed_frame: {fixed}does not exist."
             return self._unknown(target, source) + missing
         if fixed_frame is None:
@@ -197,7 +196,7 @@ class TransformBuffer(FrameTree):
                 self._settle(frame)
             sample = cache.at(time)
             if sample is None:
-                # There may still be a path, because this frame may be one of the target's ancestors.
+                # There may still be a path: this frame may be one of the target's ancestors.
                 missed = frame
                 break
             if frame is target:
@@ -228,14 +227,14 @@ class TransformBuffer(FrameTree):
         return _Walk(time, from_source, from_target)
 
     def _common_time(self, target: Frame, source: Frame) -> int:
-        """Return the newest time for which every frame between the two has data; static frames have data for every time.
+        """Return the newest time at which every frame between the two has data; static frames have data at any time.
 
         Raise ConnectivityException if the frames are not connected, LookupException if the transforms form a loop.
         """
         if target is source:
             return self._newest_of(target.name)
 
-        # This inlines :meth:`_ancestors` for speed: most lookups need only this part.
+        # This inlines :meth:`_ancestors` for speed, because most lookups need only this part.
         above_source: list[tuple[int, Frame]] = []
         common = _FOREVER
         frame, arrived = source, self._arrived
@@ -268,7 +267,7 @@ class TransformBuffer(FrameTree):
         raise _unconnected(target, source)
 
     def _ancestors(self, frame: Frame) -> Iterator[tuple[int, Frame]]:
-        """Yield the newest stamp and the parent, for a frame and for each ancestor. Raise LookupException if there is a loop."""
+        """Yield the newest stamp and the parent of a frame and of each ancestor. Raise LookupException if there is a loop."""
         depth = 0
         while (cache := frame.cache) is not None:
             if frame.settled != self._arrived:
@@ -285,7 +284,7 @@ class TransformBuffer(FrameTree):
     def _path(self, target: str, source: str, time: int) -> list[str]:
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         if target_frame is source_frame:
-            # Two equal names are the same frame, even if it does not exist.
+            # Two equal names mean the same frame, even if it does not exist.
             return []
         if target_frame is None or source_frame is None:
             if time == 0:

@@ -12,12 +12,12 @@ from minirospy.core.tf2.rotation import slerp
 
 __all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
-# Maximum number of expired samples before the lists are trimmed, so that not every insertion moves all samples
+# Maximum number of expired samples before the lists are trimmed; trimming at each insertion would move all samples
 _COMPACT_ABOVE = 32
 
 
 def seconds(nanoseconds: int) -> float:
-    """Return a time in seconds, rounded as in C++; for present-day times the rounding determines the last printed digits."""
+    """Return a time in seconds, rounded as in C++. At present-day times, the rounding affects the last printed digits."""
     whole, rest = divmod(nanoseconds, 1_000_000_000)
     return whole + 1e-9 * rest
 
@@ -71,7 +71,7 @@ class TimeCache:
         return self._stamps[self._first] if self._stamps else 0
 
     def insert(self, stamp: int, sample: Sample) -> Misfit | None:
-        """Insert a sample and drop samples older than the span; if the sample is rejected, return the reason."""
+        """Insert a sample and drop samples older than the span. If the sample is rejected, return the reason."""
         stamps = self._stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
@@ -158,7 +158,7 @@ class TimeCache:
 
 
 class StaticCache:
-    """A single sample that is valid at every time, until another sample replaces it."""
+    """A single sample that is valid at any time, until another one replaces it."""
 
     __slots__ = ("_sample",)
 
@@ -183,8 +183,8 @@ class StaticCache:
         return 0, self._sample[0]
 
     def why_not(self, time: int) -> str:
-        """Return "", because there is a sample for every time."""
+        """Return "": a static transform is available at any time."""
         return ""
 
     def clear(self) -> None:
-        """Do nothing, because clearing a buffer keeps static transforms."""
+        """Do nothing: clearing a buffer keeps its static transforms."""

@@ -31,7 +31,7 @@ class Refusal(NamedTuple):
 def faults_of(
     parent: str, child: str, translation: Vector, rotation: Quaternion, authority: str
 ) -> list[Refusal]:
-    """Return all reasons why tf2 would reject this transform regardless of other transforms, in tf2's order."""
+    """Return all reasons, in tf2's order, why tf2 would reject this transform regardless of other transforms."""
     found = []
 
     def add(kind: str, text: str) -> None:

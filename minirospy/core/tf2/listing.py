@@ -11,7 +11,7 @@ from minirospy.core.tf2.cache import Frame, StaticCache, TimeCache, seconds
 
 __all__ = ["escaped_name", "frames_as_dot", "frames_as_yaml"]
 
-_MIN_SPAN = 0.0001  # seconds; the time span assumed for a single sample when computing a rate
+_MIN_SPAN = 0.0001  # seconds; a single sample counts as having this time span when a rate is computed
 
 
 def frames_as_yaml(buffer: TransformBuffer) -> str:
@@ -62,7 +62,7 @@ def _edge(frame: Frame, now: int) -> str:
 
 
 def _root(frame: Frame, now: int) -> str:
-    """Return the graph's legend for a frame without a parent. Without ``now``, return it only if the frame once had a parent."""
+    """Return the graph's legend for a frame without a parent. Without ``now``, do so only if the frame once had a parent."""
     is_root = bool(now) if frame.cache is None else frame.cache.at(0) is None
     if not is_root:
         return ""

@@ -39,7 +39,7 @@ class TransformSample(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """A stored message: its sequence number of arrival, its sender, and its bytes."""
+    """A stored message: its number in the order of arrival, its sender, and its bytes."""
 
     number: int
     authority: str
@@ -82,7 +82,7 @@ class Layout:
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
-        """Store a message and drop expired ones; return the frames that the caller must decode now."""
+        """Store a message and drop expired ones; return the frames that the caller has to decode now."""
         self._arrivals.append(arrival)
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
@@ -101,7 +101,7 @@ class Layout:
         self._arrivals.clear()
 
     def _drop_expired(self, span: int) -> list[str]:
-        """Drop the oldest blocks that no frame needs; return the frames to decode.
+        """Drop the oldest blocks that no frame needs any more; return the frames to decode.
 
         A frame does not need messages that it has decoded, or whose samples its cache would have dropped. The cache drops
         samples that are too old compared with the newest message, if it accepts that message, whose transform must be
@@ -142,7 +142,7 @@ class Layouts:
     """All known layouts, looked up by a message's bytes."""
 
     def __init__(self) -> None:
-        # For messages with one transform: a dict from the contiguous bytes of its names to the layout
+        # For messages with one transform: the layout, keyed by the contiguous bytes of the names
         self._single: dict[bytes, Layout] = {}
         # Dict from message length to (mask of the constant bytes, their value, layout)
         self._several: dict[int, list[tuple[int, int, Layout]]] = {}

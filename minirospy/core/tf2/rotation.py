@@ -29,7 +29,7 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def rotate(q: Quaternion, v: Vector) -> Vector:
-    """Return ``q v q*``: the vector rotated, and scaled by the quaternion's squared length."""
+    """Return ``q v q*``, the rotated vector, scaled by the quaternion's squared length."""
     x, y, z, w = q
     a, b, c = v
     scale = w * w - x * x - y * y - z * z
@@ -57,7 +57,7 @@ def slerp(p: Quaternion, q: Quaternion, ratio: float) -> Quaternion:
     dot = px * qx + py * qy + pz * qz + pw * qw
     length = math.sqrt((px * px + py * py + pz * pz + pw * pw) * (qx * qx + qy * qy + qz * qz + qw * qw))
     if dot < 0:
-        # -q is the same rotation as q, and closer to p.
+        # -q is the same rotation as q, but closer to p.
         dot, qx, qy, qz, qw = -dot, -qx, -qy, -qz, -qw
     cosine = dot / length
     if cosine >= 1.0:

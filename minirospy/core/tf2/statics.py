@@ -22,7 +22,7 @@ MAX_BYTES = 8 << 20
 
 
 class StaticTransforms:
-    """Stores the newest transform of each frame, as bytes: at most :data:`MAX_FRAMES` frames and :data:`MAX_BYTES` in total."""
+    """Stores the newest transform of each frame as bytes: at most :data:`MAX_FRAMES` frames, :data:`MAX_BYTES` in total."""
 
     def __init__(self) -> None:
         self.left_out = 0  # number of transforms omitted because their frames exceed the limit

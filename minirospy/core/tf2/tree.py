@@ -75,7 +75,7 @@ class FrameTree:
         is_regular = not is_static
         for parent, child, stamp, translation, rotation in read_transforms(data):
             self._insert(parent, child, stamp, translation, rotation, authority, is_static)
-            # The frame exists, because a layout is added only if all its frames exist and have samples.
+            # The frame exists: a layout is added only if all its frames exist and have samples.
             frame = self._frames.get(child)
             is_regular = (
                 is_regular and frame is not None and frame.cache is not None and parent in self._frames
@@ -84,7 +84,7 @@ class FrameTree:
             self._add_layout(data)
 
     def clear(self) -> None:
-        """Drop all transforms that are not static. The frames' names remain."""
+        """Drop all transforms that are not static. The names of the frames remain."""
         for layout in self._layouts:
             layout.forget()
         for frame in self._frames.values():
@@ -130,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Insert a transform. Earlier transforms of the same frame must already be inserted."""
+        """Insert a transform. The frame's earlier transforms must already have been inserted."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)
@@ -147,7 +147,7 @@ class FrameTree:
     ) -> bool:
         x, y, z, w = rotation
         a, b, c = translation
-        # Comparing a value with itself detects NaN, which does not equal itself.
+        # NaN does not equal itself, so comparing a value with itself detects NaN.
         is_sound = abs(x * x + y * y + z * z + w * w - 1.0) < 0.01 and a == a and b == b and c == c  # noqa: PLR0124
         if not (is_sound and child and parent and child != parent):
             for refusal in faults_of(parent, child, translation, rotation, authority):
@@ -180,7 +180,7 @@ class FrameTree:
     # --- undecoded messages
 
     def _settle(self, frame: Frame) -> None:
-        """Insert the messages for a frame that have arrived since its last lookup, in order of arrival."""
+        """Insert the messages for a frame that have arrived since its last lookup, in their order of arrival."""
         frame.settled = self._arrived
         layouts = self._lazy.get(frame.name)
         if layouts is None:

@@ -16,7 +16,8 @@ def tree_lines(robot: Robot) -> Iterator[str]:
     yield f"robot name is: {robot.name}"
     yield "---------- Successfully Parsed XML ---------------"
     yield f"root Link: {robot.root} has {len(robot.child_joints(robot.root))} child(ren)"
-    # Iterate instead of recursing, and visit each link's children once, for deep trees and links with many parents.
+    # Iterate instead of recursing, because trees may be deep.
+    # Visit each link's children only once, because links may have many parents.
     shown = {robot.root}
     waiting = [(1, *child) for child in _numbered(robot, robot.root)]
     while waiting:

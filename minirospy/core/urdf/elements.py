@@ -1,4 +1,4 @@
-"""Parse XML into elements with line numbers. Rejects text that is not XML, or is nested too deeply."""
+"""Parse XML into elements with line numbers. Reject text that is not XML or is nested too deeply."""
 
 from __future__ import annotations
 

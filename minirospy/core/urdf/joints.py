@@ -43,7 +43,7 @@ def read_joint(element: Element) -> Joint:
     limit = _part(element, "limit", _read_limit, f"Could not parse limit element for joint [{name}]")
     if limit is None and type_ in _NO_LIMITS:
         raise ElementError(element.line, f"Joint [{name}] {_NO_LIMITS[type_]}")
-    # Some messages contain two spaces, like those of ROS's parser.
+    # Some messages contain two spaces, as in ROS's parser.
     safety = _part(
         element, "safety_controller", _read_safety, f"Could not parse safety element for joint [{name}]"
     )

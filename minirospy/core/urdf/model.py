@@ -96,7 +96,7 @@ class Material(NamedTuple):
 
 
 class Visual(NamedTuple):
-    """A visible shape. ``material`` is only a name if the material is defined elsewhere."""
+    """A visible shape. ``material`` is just a name if the material is defined elsewhere."""
 
     geometry: Geometry
     origin: Origin = Origin()
@@ -190,7 +190,7 @@ class Link:
 
 
 class Problem(NamedTuple):
-    """A fault that ROS's parser reports before it continues; ``trail``: the messages that it prints, the cause first."""
+    """A fault that ROS's parser reports before it continues. ``trail`` lists the messages that it prints, the cause first."""
 
     line: int
     trail: tuple[str, ...]
@@ -219,7 +219,10 @@ class Robot:
         return self._below.get(link, [])
 
     def parent_joint(self, link: str) -> Joint | None:
-        """Return the joint above a link, or None for the root. If there are several, return the last one by name, as in ROS."""
+        """Return the joint above a link, or None for the root.
+
+        If there are several, return the one whose name sorts last, as in ROS.
+        """
         return self._above.get(link)
 
     @cached_property

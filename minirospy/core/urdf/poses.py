@@ -1,4 +1,4 @@
-"""Joint poses, computed with plain floats in the same steps as in urdfdom and KDL, so that signs and zeros are equal.
+"""Joint poses, computed with plain floats in the same steps as in urdfdom and KDL, so that even the signs of zeros are equal.
 
 Quaternions are (x, y, z, w); a matrix is nine numbers, row by row.
 """

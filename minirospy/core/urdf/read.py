@@ -96,7 +96,7 @@ def _read_links(
     if not links:
         raise UrdfError(file, root.line, "No link elements found in urdf file")
 
-    # Check this after reading all links, because a material may be defined where it is first used.
+    # Check this after all links have been read, because a material may be defined where it is first used.
     for link in links.values():
         for visual in link.visuals:
             if visual.material and (visual.material.color or visual.material.texture):
@@ -159,7 +159,7 @@ def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, J
 
 
 def _suspicions(robot: Robot) -> list[Problem]:
-    """Return the faults that ROS's parser silently accepts but that a frame tree cannot contain."""
+    """Return the faults that ROS's parser silently accepts but that a frame tree cannot represent."""
     found = []
     for joint in robot.joints.values():
         above = robot.parent_joint(joint.child)

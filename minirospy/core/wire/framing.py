@@ -84,13 +84,13 @@ class Pieces(list[Any]):
             frame = b"".join(self)
             if len(frame) == size + 4:
                 return frame
-            # Compute the size from the joined pieces, because the len() of an array.array is not its number of bytes.
+            # Compute the size from the joined pieces: len() of an array.array is not its number of bytes.
             return serialize_frame(frame[4:])
 
         joined: list[bytes] = []
         small: list[bytes] = []
         for piece in self:
-            # Copy types other than bytes, because the caller may change them before they are sent.
+            # Copy any type except bytes, because the caller may change the data before it is sent.
             whole = piece if isinstance(piece, bytes) else bytes(piece)
             if len(whole) < CHUNK:
                 small.append(whole)
@@ -144,7 +144,10 @@ Frame = memoryview | bytes  # a message's bytes as delivered
 
 
 def may_split(head: bytes, tail: int) -> bool:
-    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes. If so, the message may be split there."""
+    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes.
+
+    If so, the message may be split at this point.
+    """
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
 
@@ -181,7 +184,7 @@ class FrameReader:
         # The number of bytes received of the large frame, and the frame's total size.
         self._filled: int
         self._wanted = 0
-        # The number of bytes in a skipped frame that have not been received yet.
+        # The number of bytes of a skipped frame that are still to be received.
         self._left_out = 0
 
     @property
@@ -190,7 +193,7 @@ class FrameReader:
         return self._wanted
 
     def put_back(self, data: bytes) -> None:
-        """Store ``data``, which is short, as the first received bytes; the buffer must be empty."""
+        """Store ``data``, which must be short, as the first received bytes; the buffer must be empty."""
         self._end = len(data)
         self._small[: self._end] = data
 
@@ -198,8 +201,7 @@ class FrameReader:
         """Return the memory for the next bytes. It is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
-                # Grow the buffer as bytes arrive, so that a length prefix alone cannot allocate all the memory in
-                # advance.
+                # Let the buffer grow as bytes arrive, because a length prefix alone must not allocate all of the memory.
                 grown = bytearray(min(self._wanted, 2 * len(self._large)))
                 grown[: self._filled] = self._large
                 self._large = grown

@@ -41,7 +41,6 @@ def parse_header(body: bytes) -> Header:
         at += length
         if not separator:
             raise WireError(f"connection header's field {name[:40]!r} has no '='")
-        # Accept names and definitions in any encoding, because third-party nodes send them; a comment in a definition
-        # must not cause a failure.
+        # Accept names and definitions in any encoding: third-party nodes send them, for example in a definition's comment.
         fields[name.decode("utf-8", "replace")] = value.decode("utf-8", "replace")
     return fields

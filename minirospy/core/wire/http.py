@@ -39,7 +39,7 @@ _REASONS = {
 }
 
 
-# a message's body; a long one is not copied from the buffer that collected it
+# a message's body; a long one is the bytearray in which it was collected, not a copy
 Body = bytes | bytearray
 
 
@@ -108,11 +108,11 @@ class HttpReader:
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
-        # True if the bytes fed so far may contain another message.
+        # True if the bytes received so far may contain another message.
         self._has_more = False
-        # The part of a chunked body received so far, already removed from the buffer.
+        # The part of a chunked body received so far; it is no longer in the buffer.
         self._chunked: bytearray | None = None
-        # True if the peer waits for :meth:`continue_line` before it sends its body
+        # True if the peer sends its body only after :meth:`continue_line`
         self.wants_continue = False
 
     @property
@@ -122,7 +122,7 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the current message has a chunked body, of which even a few bytes may contain many chunks."""
+        """Return whether the current message has a chunked body; even a few bytes of it may contain many chunks."""
         return self._chunked is not None
 
     @property
@@ -202,7 +202,7 @@ class HttpReader:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
             self.wants_continue = head.headers.get("expect", "").lower() == "100-continue"
-            # Do not use a variable, which would keep the body in memory until the next message.
+            # Do not use a variable here, which would keep the body in memory until the next message.
             yield HttpMessage(head, (yield from self._whole_body(head)))
             head = None
 
@@ -218,7 +218,7 @@ class HttpReader:
         length = head.headers.get("content-length")
         if length is None:
             if head.start.startswith("HTTP/"):
-                # A response without a length extends until the connection ends.
+                # A response without a length extends to the end of the connection.
                 while not self._ended:
                     self._check(len(self._buffer))
                     yield None
@@ -242,7 +242,7 @@ class HttpReader:
                 self._chunked = None
                 return body
 
-            # Move a long chunk in pieces, because moving it in one step would take long.
+            # Move a large chunk in pieces, because moving it in one step would block the loop for too long.
             while left:
                 if not self._buffer:
                     yield from self._more()
@@ -271,7 +271,7 @@ class HttpReader:
             yield from self._more()
         if len(self._buffer) > 2 * count:
             return self._take(count)
-        # Copy the shorter part, not the longer one.
+        # Copy the shorter part instead of the longer one.
         rest = self._buffer[count:]
         del self._buffer[count:]
         whole, self._buffer = self._buffer, rest
@@ -306,7 +306,7 @@ def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
 
 def _end_of_head(data: bytearray, start: int) -> tuple[int, int]:
     """Return the end of the line before the first empty line, and the position after both; -1 if there is none."""
-    # Do not use a regular expression, which is slow for many short lines.
+    # Do not use a regular expression, which would be slow for many short lines.
     found = [(at, len(mark)) for mark in (b"\n\r\n", b"\n\n") if (at := data.find(mark, start)) >= 0]
     if not found:
         return -1, -1
@@ -355,7 +355,7 @@ def serialize_error(status: int, text: str) -> bytes:
 
 
 def _parse_head(data: bytes) -> HttpHead:
-    # Cache short heads, because the heads from one client differ only in the length.
+    # Cache short heads: the heads sent to one server differ only in the length.
     return short_head(data) if len(data) <= _SHORT_HEAD else _read_head(data)
 
 
@@ -372,8 +372,7 @@ def _read_head(data: bytes) -> HttpHead:
     headers: dict[str, str] = {}
     for line in lines:
         name, separator, value = line.partition(":")
-        # Reject spaces before the colon: a proxy that interprets them differently would see another request (request
-        # smuggling).
+        # Reject spaces before the colon: a proxy that reads them differently would see another request (request smuggling).
         if not separator or not name or name[-1] in " \t" or name[0] in " \t":
             raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
         name, value = name.lower(), value.strip()

@@ -24,7 +24,7 @@ HEAD = b"minirospy journal 1\n"
 
 STEP_ITEMS = 500
 STEP_BYTES = 65536
-# Msgpack's type bytes for a long string and for long bytes, which precede a 4-byte length
+# Msgpack's type bytes for a long string and for long bytes; a 4-byte length follows
 _TEXT_32, _BINARY_32 = b"\xdb", b"\xc6"
 
 _FRAME = struct.Struct("<II")
@@ -32,7 +32,7 @@ _DATE, _DATE_TEXT = 1, 2
 
 
 class Recovered(NamedTuple):
-    """The complete records, their size in bytes including the file's first line, and a description of the fault after them."""
+    """The complete records, their size in bytes including the file's first line, and a description of any fault after them."""
 
     records: list[list[Any]]
     size: int

@@ -41,7 +41,7 @@ def serialize_response(body: bytes) -> bytes:
 
 def serialize_failure(error: Exception) -> bytes:
     """Serialize a server's response to a failed call, with the message of ``error``."""
-    # An error message may contain characters that UTF-8 cannot encode, for example from a file name.
+    # An error message, for example one with a file name, may contain characters that UTF-8 cannot encode.
     text = str(error).encode(errors="backslashreplace")
     return _OK_LENGTH.pack(0, len(text)) + text
 

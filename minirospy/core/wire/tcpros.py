@@ -81,7 +81,7 @@ def publisher_header(
 
 
 def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | None:
-    """Return the reason why a publisher of ``type_`` refuses the subscriber with these fields, or None if it accepts it."""
+    """Return the reason why a publisher of ``type_`` refuses a subscriber that sent these fields, or None if it accepts it."""
     for name in ("md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
@@ -124,7 +124,7 @@ def service_client_header(
     probe: bool = False,
     extra: Mapping[str, str] | None = None,
 ) -> Header:
-    """Return the header that a service client sends first; ``probe`` only tests whether the service is alive."""
+    """Return the header that a service client sends first. With ``probe``, it only tests whether the service is alive."""
     fields = {"callerid": caller_id, "md5sum": md5sum, "service": service}
     if persistent:
         fields["persistent"] = "1"
@@ -149,7 +149,7 @@ def service_header(
 
 
 def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
-    """Return the reason why a service of ``type_`` refuses the client with these fields, or None if it accepts it."""
+    """Return the reason why a service of ``type_`` refuses a client that sent these fields, or None if it accepts it."""
     for name in ("service", "md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 __all__ = ["read_plain"]
 
 _MAX_TAGS = 2_000_000
-# Maximum number of open elements; below the parser's nesting limit, because deeper documents are left to the parser
+# Maximum number of open elements. Below the parser's nesting limit; deeper documents are left to the parser
 _MAX_OPEN = 60
 
 _SPACE = r"[ \t\r\n]*"
-# Characters in text, except references, "]]>", and characters that XML changes or forbids.
+# Characters in text, except for references, "]]>", and characters that XML changes or forbids.
 _TEXT = r"[\t\n !-%'-;=?-~]*"
 _STRING = rf"<value>(?:<string>({_TEXT})</string>|({_TEXT}))</value>"
 
@@ -31,7 +31,7 @@ class _Patterns(NamedTuple):
 
 
 def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
-    """Return the method of the call in ``body`` (None for a response) and the parameters, or None if the body is not plain."""
+    """Return the method called in ``body`` (None for a response) and the parameters; return None if the body is not plain."""
     try:
         text = body.decode("ascii")
         if text.count("<") > _MAX_TAGS:
@@ -54,13 +54,12 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
     Raise ValueError if a number is invalid.
     """
     if tokens and tokens[-1][4] not in {"", "</param>"}:
-        # An unexpected part of the document always becomes the last token.
+        # Any unexpected part of the document becomes the last token.
         return None
 
     params: list[object] = []
     add: Callable[[object], None] = params.append
-    # The open elements, each with the start of its end tag, the function that adds it to the enclosing value, and its
-    # contents.
+    # The open elements: for each, its end tag's start, the function that adds it to the enclosing value, and its contents.
     opened: list[tuple[str, Callable[[object], None], Any]] = []
 
     for text, param_text, bare, param_bare, other in tokens:
@@ -117,7 +116,7 @@ _NUMBERS: dict[str, Callable[[str], object]] = {
 
 @cache
 def _patterns() -> _Patterns:
-    # Compile this at first use, because compiling takes a millisecond.
+    # Compile this on first use, because it takes a millisecond.
     utf8 = "(?: encoding=(?:'utf-8'|\"utf-8\"|'UTF-8'|\"UTF-8\"))?"
     declaration = rf"<\?xml version=(?:'1\.0'|\"1\.0\"){utf8} ?\?>"
     call = rf"Call>{_SPACE}<methodName>({_TEXT})</methodName>"
@@ -133,7 +132,7 @@ def _patterns() -> _Patterns:
         "</member>",
         "<value><struct>",
         rf"</struct>{_SPACE}</value>",
-        # Unexpected text, together with everything after it, becomes an unknown token.
+        # Unexpected text, and everything after it, becomes an unknown token.
         "(?s:.+)",
     )
 

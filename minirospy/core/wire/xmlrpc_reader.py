@@ -23,7 +23,7 @@ _MIB = 1024 * 1024
 MAX_MEMORY = 64 * _MIB  # maximum bytes in memory of all long strings in one document
 
 MAX_WIDE = 16 * _MIB
-"""Maximum size in bytes of a string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the
+"""Maximum size, in bytes, of a string with a character beyond U+00FF: its characters then take 2 or 4 bytes each, and the
 string is copied.
 """
 
@@ -31,7 +31,7 @@ MAX_TOKEN = 65536  # maximum bytes in a tag, a comment or similar
 
 MAX_SCALAR = 2048  # maximum characters in a number, a boolean or a date
 
-_LONG_TEXT = 16  # number of 8-KiB pieces above which a string counts as long
+_LONG_TEXT = 16  # number of 8-KiB pieces above which a string is long
 
 _GROWTH_SHIFT = 17
 """The new pieces of a long string are joined to the string once they exceed a sixteenth of its length.
@@ -41,7 +41,7 @@ A length in characters, shifted right by this number, is a sixteenth of the leng
 
 
 class DateTime(NamedTuple):
-    """A date, as received, that is not in XML-RPC's format.
+    """A date that is not in XML-RPC's format, as received.
 
     The date may be any text, because other implementations accept it.
     """
@@ -109,7 +109,7 @@ class Reader:
         # The number of bytes fed, and the memory that the long strings use.
         self._fed = 0
         self._memory = 0
-        # The part of a long string joined so far, and the string's bytes per character.
+        # The joined part of a long string, and the string's bytes per character.
         self._joined = ""
         self._width = 1
         # The decoded part of a long base64 value.
@@ -129,14 +129,14 @@ class Reader:
         except self._errors as error:
             raise RpcProtocolError(f"not XML-RPC: {error}") from error
         self._fed += len(data)
-        # Limit incomplete tags and comments, because the parser scans them again each time more data arrives.
+        # Limit incomplete tags and comments: the parser scans them again whenever more data arrives.
         if not is_last and self._fed - self._parser.CurrentByteIndex > MAX_TOKEN:
             raise RpcProtocolError(f"a tag or comment of more than {MAX_TOKEN} bytes")
         if len(self._text) - _LONG_TEXT > len(self._joined) >> _GROWTH_SHIFT:
             self._join_text()
 
     def close(self) -> None:
-        """Release the parser, whose handlers refer to this object and all parsed values. Idempotent."""
+        """Release the parser, because its handlers refer to this object and to all parsed values. Idempotent."""
         parser = self._parser
         parser.StartElementHandler = parser.EndElementHandler = None
         parser.CharacterDataHandler = parser.StartDoctypeDeclHandler = None
@@ -224,7 +224,7 @@ class Reader:
         return self._joined or "".join(self._text)
 
     def _join_text(self) -> None:
-        """Join the received pieces of a long string, because joining all of them at the end would take too long.
+        """Join the pieces of a long string as they arrive, because joining all of them at the end would take too long.
 
         Raise RpcProtocolError if the strings exceed the memory limit.
         """
@@ -246,7 +246,7 @@ class Reader:
             most = MAX_WIDE // _MIB
             raise RpcProtocolError(f"a text of wide characters of more than {most} MiB in memory", status=413)
 
-        # Python appends in place if a local variable is the only reference to a string.
+        # Python appends in place if a local variable is the only reference to the string.
         joined += more
         self._joined = joined
 
@@ -259,7 +259,7 @@ class Reader:
 
 
 def _width(text: str) -> int:
-    """Return the bytes that each character of a long string uses in memory."""
+    """Return the number of bytes per character that a long string uses in memory."""
     return 1 if text.isascii() else min(4, sys.getsizeof(text) // len(text))
 
 

@@ -17,7 +17,7 @@ __all__ = ["Output", "escape", "is_numpy", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-# size in bytes above which the writer requests that no other response be written at the same time
+# size in bytes above which the writer asks that no other response be written at the same time
 _ALONE_BYTES = 1024 * 1024
 
 
@@ -30,7 +30,7 @@ def escape(text: str) -> str:
     if ">" in text:
         text = text.replace(">", "&gt;")
     if "\r" in text:
-        # XML parsers would convert a bare carriage return to a line feed.
+        # XML parsers would turn a bare carriage return into a line feed.
         text = text.replace("\r", "&#13;")
     return text
 
@@ -46,7 +46,7 @@ def _write_bool(value: bool, parts: list[str], depth: int) -> None:
 
 
 def _write_float(value: float, parts: list[str], depth: int) -> None:
-    # Call float's own repr, because a subclass, such as numpy's, may have a different repr.
+    # Call float's own repr: that of a subclass, such as numpy's, may be different.
     parts.append(f"<value><double>{float.__repr__(value)}</double></value>")
 
 
@@ -57,7 +57,7 @@ def _write_str(value: str, parts: list[str], depth: int) -> None:
 def _write_list(value: Sequence[object], parts: list[str], depth: int) -> None:
     parts.append("<value><array><data>")
     for item in value:
-        # Check for strings first, because most lists contain strings.
+        # Check for strings first, because most lists contain them.
         if type(item) is str:
             parts.append(f"<value><string>{escape(item)}</string></value>")
         else:
@@ -150,7 +150,7 @@ class Output:
 
 
 def write_in_steps(value: Any, out: Output, depth: int) -> Steps[None]:
-    """Do the same as :func:`write`, in steps, for a value that may be large."""
+    """Like :func:`write`, but in steps, for a value that may be large."""
     if depth > MAX_DEPTH:
         raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
     writer = _WRITERS.get(type(value)) or _writer_of_kin(value)

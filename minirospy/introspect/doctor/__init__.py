@@ -52,7 +52,7 @@ class Examination:
             yield problem("variables", str(error), "correct it, or unset it")
             return
         host, port = environment.master_address
-        # Look up all names in parallel, so that an unreachable name server costs only one timeout.
+        # Look up all names in parallel, so that an unreachable name server costs one timeout, not several.
         known = addresses_of((host, environment.host, self._environ.get("ROS_HOSTNAME") or environment.host))
         place = MasterLocation(host, port, known[host])
         yield from check_variables(self._environ, environment, place, known)
@@ -61,7 +61,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Respond to doctors on other machines until the context exits. Return False if no master was found."""
+        """Respond to doctors on other machines until the context exits. Return False if there is no master."""
         if self._listen is None:
             return False
         self._listen(report)

@@ -9,7 +9,7 @@ __all__ = ["Finding", "Status", "ok", "problem", "warning"]
 
 
 class Status(str, Enum):
-    """The result of a check. A warning may be harmless, but a problem is not."""
+    """The result of a check. A warning may be harmless; a problem is not."""
 
     OK = "ok"
     WARNING = "warning"
@@ -34,10 +34,10 @@ def ok(check: str, text: str) -> Finding:
 
 
 def warning(check: str, text: str, advice: str) -> Finding:
-    """Return a finding that may be the cause of a failure."""
+    """Return a finding for a possible cause of a failure."""
     return Finding(check, Status.WARNING, text, advice)
 
 
 def problem(check: str, text: str, advice: str) -> Finding:
-    """Return a finding that is certainly a failure."""
+    """Return a finding for a definite failure."""
     return Finding(check, Status.PROBLEM, text, advice)

@@ -74,8 +74,8 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers have stopped together with the node, so ``seen`` no longer changes. With simulated time, stamps and
-    # arrival times cannot be compared.
+    # The workers have stopped together with the node, so ``seen`` no longer changes.
+    # In simulated time, stamps cannot be compared with arrival times.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -134,7 +134,7 @@ def _loops(seen: Sequence[Observation]) -> Iterator[Finding]:
     parent = {each.child: sorted(each.parents)[0] for each in seen if each.parents}
     walked: set[str] = set()
     for child in sorted(parent):
-        # Visit each frame once, so that the time is linear in the number of frames.
+        # Visit each frame only once, so that the time is linear in the number of frames.
         way: dict[str, None] = {}
         at = child
         while at in parent and at not in walked:
@@ -164,7 +164,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
         while at not in tree and at in parent and at not in way:
             way[at] = None
             at = parent[at]
-        # Assign the frames in a loop to the tree of any frame in the loop.
+        # Assign the frames of a loop to one tree, that of any frame in the loop.
         tree.update(dict.fromkeys(way, tree.get(at, at)))
 
     hints: list[str] = []
@@ -185,7 +185,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _similar(name: str, others: Iterable[str]) -> str:
-    """Return the most similar name, or "" if there is none. Names that differ only in their digits are ignored."""
+    """Return the most similar name, or "" if there is none. Ignore names that differ only in digits."""
 
     def plain(text: str) -> str:
         return text.strip("/").lower().replace("-", "_")

@@ -77,7 +77,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats: bool = False) -> Answers:
-    """Query all registered nodes except ``besides`` in parallel, and return their responses."""
+    """Query all registered nodes in parallel, except those in ``besides``; return their responses."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -179,7 +179,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
 
 
 def differing_types(state: SystemState, answers: Answers) -> dict[str, dict[str, list[str]]]:
-    """Return the topics whose nodes report different types, as a dict: topic -> type -> nodes."""
+    """Return the topics whose nodes report different types, as a dict from topic to a dict from type to nodes."""
     found = {topic: _types(topic, answers) for topic in sorted({*state.publishers, *state.subscribers})}
     return {topic: types for topic, types in found.items() if len(types) > 1}
 
@@ -190,7 +190,7 @@ def _near(topic: str, published: set[str]) -> str:
 
 
 def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield a finding for each publisher and subscriber that should be connected but are not."""
+    """Yield a finding for each publisher and subscriber that are not connected although they should be."""
     pairs = [
         _Pair(topic, publisher, subscriber)
         for topic, publishers in state.publishers.items()
@@ -206,7 +206,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
     ]
     missing = [pair for pair in pairs if not _is_connected(pair, answers)]
     if missing:
-        # Nodes that have just started may connect within this time, so check again.
+        # Nodes that have just started may connect in the meantime, so check again.
         time.sleep(_AGAIN_SECONDS)
         names = {name for pair in missing for name in pair[1:]}
         again = in_parallel(
@@ -234,7 +234,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield a problem for each service that does not respond, unless its node has already been reported."""
+    """Yield a problem for each service that does not respond, unless its node has been reported already."""
     names = [
         name
         for name, nodes in sorted(state.services.items())
@@ -308,7 +308,7 @@ def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
 
 
 def _is_of_action(topic: str, state: SystemState) -> bool:
-    """Return whether this is an action server's goal or cancel topic, which often has no publisher."""
+    """Return whether this is an action server's goal or cancel topic; these often have no publisher."""
     name, _, end = topic.rpartition("/")
     return end in ("goal", "cancel") and f"{name}/status" in state.publishers
 
@@ -329,7 +329,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """Return advice if the publisher's definition of the type differs from this machine's, or "" if the definitions agree."""
+    """Return advice if the publisher's definition of the type differs from this machine's, or "" if they are equal."""
     from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
@@ -366,7 +366,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Join the first few names, and append the number of omitted ones."""
+    """Join the first few names and append the number of the others."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

@@ -97,7 +97,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # Strings such as `192.168.1` also resolve, here to 192.168.0.1.
+        # Strings such as `192.168.1` resolve, too: this one to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",
@@ -163,7 +163,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     if config and not Path(config).is_file():
         yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is not a file", "unset it")
 
-    # If a folder does not exist yet, check its nearest existing parent folder.
+    # If a folder does not exist yet, check its nearest parent that does.
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
         if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
@@ -195,8 +195,7 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                 f"source {workspace / 'devel' / 'setup.bash'}",
             )
         )
-    # A sourced workspace adds minirospy's packages to the path: skip those, because the user's packages may replace
-    # them.
+    # A sourced workspace adds minirospy's packages to the path. Skip those: the user's packages may replace them.
     mine = Packages.below(*(path for path in environment.package_path if path not in built_in_roots()))
     copies = mine.copies()
     for name, folders in sorted(copies.items()):
@@ -235,7 +234,7 @@ def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[
             for each in manifest.dependencies
             if each.tag in ("run_depend", "exec_depend", "depend") and each.name not in known
         ]
-        # Ignore rosdep keys that refer to system packages.
+        # Ignore rosdep keys of system packages.
         missing = [each for each in dict.fromkeys(missing) if not _is_system_key(each)]
         if missing:
             yield warning(

@@ -1,4 +1,4 @@
-"""Check the master: whether it responds, which machine is at fault if it does not, and how far its clock is off."""
+"""Check the master: whether it responds, which machine is at fault if not, and how far its clock is off."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _WRONG_SECONDS = 1.0
 
 
 def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a finding that the master responds, or a problem if it does not."""
+    """Yield a finding that the master responds or a problem if it does not."""
     if not place.addresses:
         yield problem(
             "master",
@@ -41,7 +41,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
-        pid = ""  # this master is another implementation that does not support getPid
+        pid = ""  # this master is another implementation, without getPid
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return
@@ -67,12 +67,12 @@ def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]
     if seconds is None:
         yield ok("clock", f"{place.host} does not report its time: compare `date` on both machines")
         return
-    # The header's time is rounded down to whole seconds.
+    # The header's time is rounded down to a whole second.
     yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
 
 
 def clock_finding(who: str, theirs: float, before: float, after: float) -> Finding:
-    """Compare ``theirs``, a remote time that was read between ``before`` and ``after``, with the local clock."""
+    """Compare ``theirs``, a remote time read between ``before`` and ``after``, with the local clock."""
     difference = theirs - after if theirs > after else min(0.0, theirs - before)
     if abs(difference) < _FEEL_SECONDS:
         return ok("clock", f"that of {who} is the same")

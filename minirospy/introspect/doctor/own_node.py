@@ -1,4 +1,4 @@
-"""The doctor's own node, for checking whether other machines, above all the master's, reach nodes on this machine.
+"""The doctor's own node. It shows whether other machines, above all the master's, can reach nodes on this machine.
 
 It is a normal node while the doctor runs: peers that reach it also reach the user's nodes.
 """
@@ -38,7 +38,7 @@ __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unrea
 PREFIX = "/minirospy_doctor"  # prefix of the doctors' node names
 
 _LETTER_BYTES = 16 * 1024
-"""Message size in bytes. It is larger than one packet, because some tunnels drop all packets above their limit."""
+"""Message size in bytes; larger than a packet, because some tunnels drop all packets above their size limit."""
 
 _log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class DoctorNode:
         try:
             self._loop.run(self.node.start())
         except BaseException:
-            # Ctrl-C may interrupt the start after the node's servers were opened: close them.
+            # Ctrl-C may interrupt the start after the node's servers were opened, so close them.
             self._loop.run(self.node.close())
             self._loop.close()
             raise
@@ -108,12 +108,12 @@ class DoctorNode:
             return set(wanted) - self._listeners
 
     async def _register(self) -> None:
-        # Subscribe before advertising, so that the master must send this node a publisherUpdate about itself.
+        # Subscribe before advertising: the master then has to send this node a publisherUpdate about itself.
         await self.node.master("registerSubscriber", self.letter, "std_msgs/String", self.node.uri)
         text = message_class("std_msgs/String")
         letter = Publication(self.letter, InterfaceType.of(text), latch=True)
         body = b"x" * _LETTER_BYTES
-        # A serialized std_msgs/String has the same layout as a frame: a length, then the bytes.
+        # A serialized std_msgs/String has the layout of a frame: a length, then the bytes.
         letter.publish(serialize_frame(serialize_frame(body)))
         log = message_class("rosgraph_msgs/Log")
         type_ = InterfaceType.of(log)
@@ -148,7 +148,7 @@ class _NotifiedNode(Node):
 
 
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
-    """Yield a finding on whether this machine reaches its own nodes at the address that they advertise."""
+    """Yield a finding on whether this machine can reach its own nodes at the address that they advertise."""
     host, ports = own.environment.host, own.environment.ports
     slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, same_host=False)
     try:
@@ -185,7 +185,7 @@ def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[
 
 
 def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Trouble | None) -> Finding:
-    """Return the finding that another machine (``who``, at ``their_host``) does not reach this node."""
+    """Return the finding that another machine (``who``, at ``their_host``) cannot reach this node."""
     host, port = host_port(own.node.uri)
     known = addresses(their_host)
     ours = own_address_towards(known[0]) if known else ""

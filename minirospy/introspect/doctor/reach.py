@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 CONNECT_SECONDS = 1.5
-"""Connect timeout: a reachable peer responds within this time, even over a poor radio link."""
+"""Connect timeout in seconds. A reachable peer responds within this time even over a poor radio link."""
 
 RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 """Advice for :attr:`Fault.LATE`."""
@@ -67,7 +67,7 @@ class Fault(str, Enum):
     NAME = "name"  # the host name does not resolve
     REFUSED = "refused"  # the machine is up, but no process listens on the port
     SILENT = "silent"
-    """No response: the machine is off, the address belongs to another machine, or a firewall drops the packets."""
+    """No response: the machine is off, another machine has the address, or a firewall drops the packets."""
     LATE = "late"  # connected, but no response: the process is busy or suspended
     NO_ROUTE = "no route"  # no network, or a firewall rejects the packets
     STRANGER = "stranger"  # the peer responds, but not with a ROS protocol
@@ -142,7 +142,7 @@ def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
 
 
 def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict[str, list[str]]:
-    """Look up several host names in parallel; return a dict from name to addresses, as :func:`addresses` finds them."""
+    """Look up several host names in parallel; return a dict from name to addresses, like :func:`addresses`."""
     names = list(dict.fromkeys(hosts))
     found = in_parallel(_ask_resolver, names, timeout)
     return {
@@ -173,7 +173,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether an address belongs to this machine, that is, whether a socket can be bound to it."""
+    """Return whether an address belongs to this machine, that is, whether a socket can bind to it."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from controller_manager_msgs.srv import ListControllers
 
 from minirospy import client as rospy
-from minirospy.ros.controller_manager.controller_manager import controller_manager_interface as manager
+from minirospy.ros.controller_manager import interface as manager
 
 __all__ = ["main", "main_of_groups", "new_group_parser"]
 

@@ -88,12 +88,14 @@ class ControlLoop:
         """Stop the controllers and the loop, and wait for its end for at most five seconds."""
         self._stop.set()
         if threading.current_thread() is not self._thread and not self._ended.wait(_END_SECONDS):
-            rospy.logerr(
-                "the control loop does not end: a controller, or the hardware's read() or write(), hangs"
+            rospy.logfatal(
+                "the control loop does not end: a controller, or read() or write() of the hardware, hangs"
             )
+            self._status = 1
+            self._ended.set()
 
     def wait(self) -> int:
-        """Wait until the loop has ended; return the exit status: 1 if the hardware failed, else 0."""
+        """Wait until the loop has ended; return the exit status: 1 if the hardware failed or hangs, else 0."""
         wait_for_event(self._ended, None)
         return self._status
 
@@ -119,6 +121,7 @@ class ControlLoop:
         now = rospy.get_rostime()
         period = Duration(*divmod(self._times.period, _BILLION))
         self.manager.close(now)
+        self._log_invalid()
         methods: tuple[Callable[[], object], ...] = (
             partial(self.hardware.write, now, period),
             self.hardware.close,
@@ -199,14 +202,17 @@ class ControlLoop:
                 if overruns > len(busy) * _WARN_SHARE and wall.monotonic() - warned >= _WARN_SECONDS:
                     warned = wall.monotonic()
                     rospy.logwarn("%s", status.message)
-                if self._invalid:
-                    invalid, self._invalid = self._invalid, {}
-                    rospy.logerr_throttle(
-                        _WARN_SECONDS,
-                        f"commands that are not finite were replaced, joints: {', '.join(invalid)}",
-                    )
+                self._log_invalid()
         except rospy.ROSException:
             pass  # the node shuts down
+
+    def _log_invalid(self) -> None:
+        """Log the joints whose commands were not finite, if any."""
+        if self._invalid:
+            invalid, self._invalid = self._invalid, {}
+            rospy.logerr_throttle(
+                _WARN_SECONDS, f"commands that are not finite were replaced, joints: {', '.join(invalid)}"
+            )
 
     def _status_message(self, overruns: int, late: Sequence[int], busy: Sequence[int]) -> DiagnosticStatus:
         times = self._times

@@ -103,6 +103,8 @@ class ControllerManager:
     def load(self, name: str) -> bool:
         """Load the controller whose parameters are in NAMESPACE/name; return whether that succeeded. A failure is logged."""
         with self._lock:
+            if self._is_closed:
+                return False
             if self.table.find(name):
                 log(ERROR, f"A controller named '{name}' was already loaded inside the controller manager")
                 return False
@@ -132,7 +134,7 @@ class ControllerManager:
     def unload(self, name: str) -> bool:
         """Unload a controller that does not run; return whether that succeeded. A failure is logged."""
         with self._lock:
-            if not (found := self.table.unload(name)) or not self._wait_for_update():
+            if self._is_closed or not (found := self.table.unload(name)) or not self._wait_for_update():
                 return False
             self.table.close(found)
             return True
@@ -150,8 +152,10 @@ class ControllerManager:
         Wait without limit if ``timeout`` is 0, else for ``timeout`` plus one second.
         """
         with self._lock:
+            if self._is_closed:
+                return False
             plan = self.table.plan_switch(start, stop, strictness, start_asap, timeout, rospy.Time.now())
-            if plan is None or self._is_closed:
+            if plan is None:
                 return False
             done = SignalSafeEvent()
             plan.on_done = done.set
@@ -164,7 +168,10 @@ class ControllerManager:
             return is_done and not rospy.is_down() and not self._is_closed
 
     def close(self, time: Time) -> None:
-        """Stop all controllers and close them. Call it in the loop's thread, or after the loop. Idempotent."""
+        """Stop all controllers and close them, and end the services. Call it in the loop's thread, or after the loop.
+
+        Idempotent.
+        """
         self._is_closed = True
         if pending := self.table.withdraw():
             pending.on_done()
@@ -174,6 +181,9 @@ class ControllerManager:
         loaded, self.table.loaded = self.table.loaded, ()
         for each in reversed(loaded):
             self.table.close(each)
+        if not rospy.is_shutdown_requested():  # else the node unregisters all of its services at once
+            for service in self._services:
+                service.shutdown("the controller manager is closed")
 
     def unregister(self) -> None:
         """End the services, after :meth:`close`, so that another controller manager of the node can use the namespace."""

@@ -54,7 +54,8 @@ class Plugin(NamedTuple):
             raise PluginError(
                 f"{self.python} is written in C++ ({self.origin}): minirospy loads controllers that are written in Python"
             )
-        module, _, name = self.python.replace(":", ".").rpartition(".")
+        # An entry point has a colon between the module and the class.
+        module, _, name = self.python.partition(":") if ":" in self.python else self.python.rpartition(".")
         try:
             if self.folder:
                 _find_module(module.partition(".")[0], self.folder)

@@ -25,7 +25,6 @@ _LABEL_COLORS = bytes.fromhex(
 )
 """Red, green and blue for labels 0, 1, ...: CSS's named colors in alphabetical order, rounded as in ROS."""
 
-_BACKGROUND = -1  # the label that is displayed as black
 _SHOWN = ("rgb8", "bgr8", "rgba8", "bgra8", "mono8")
 _GRAY = 128  # gray level for an image without contrast
 _LEGACY = {
@@ -36,7 +35,7 @@ _LEGACY = {
     "CV_16UC3": "bgr16",
     "CV_16UC4": "bgra16",
 }
-"""Maps encodings without color information to those they are interpreted as."""
+"""For encodings without color information: the encodings as which they are interpreted."""
 
 
 def cvtColorForDisplay(
@@ -50,8 +49,8 @@ def cvtColorForDisplay(
     """Return an 8-bit image for display in a window; ``encoding_out`` is a color or mono encoding, or "" for bgr8.
 
     An image with one channel is scaled from ``min_image_value`` and ``max_image_value`` if they differ, or from its own
-    minimum
-    and maximum if ``do_dynamic_scaling``. Labels (32SC1) become colors. Raise RuntimeError if there is no such conversion.
+    minimum and maximum if ``do_dynamic_scaling``. Labels (32SC1) become colors. Raise RuntimeError if there is no such
+    conversion.
     """
     import numpy as np
 
@@ -116,7 +115,7 @@ def _scaled(image: Pixels, low: float, high: float) -> Pixels:
 
     values = image.astype(np.float64) - low
     if image.dtype.kind != "f":
-        # OpenCV subtracts in the image's own type.
+        # OpenCV subtracts in the image's own data type.
         limits = np.iinfo(image.dtype)
         values = np.clip(np.rint(values), limits.min, limits.max)
     # OpenCV multiplies in float32, except for these types.

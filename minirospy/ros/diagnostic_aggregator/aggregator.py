@@ -63,7 +63,7 @@ def analyzer_loader() -> int:
 
     class AnalyzerLoader(unittest.TestCase):
         def runTest(self) -> None:
-            """Create the analyzers and get their report."""
+            """Create the analyzers and make them report."""
             group = load_group("", "~")
             assert group.is_complete, "Analyzer group failed to initialize: see its log messages"
             assert group.report(rospy.get_time())
@@ -154,7 +154,7 @@ class Aggregator:
                 return AddDiagnosticsResponse(
                     False, f"Requested load from namespace {namespace} which is already in use"
                 )
-            # Use one topic per bond: on a shared topic, heartbeats from different bonds would overwrite each other.
+            # Use one topic per bond: on a shared topic, the heartbeats of different bonds would overwrite each other.
             bond = self._bonds[namespace] = Bond(f"/diagnostics_agg/bond{namespace}", namespace)
 
         group = load_group(self._base_path, namespace)

@@ -102,7 +102,7 @@ class _Items:
         return True
 
     def report(self, now: float) -> list[DiagnosticStatus]:
-        """Return the header, then a status per item, sorted by name."""
+        """Return the header, followed by a status per item, sorted by name."""
         old = {name for name, item in self._items.items() if 0 < self._timeout < now - item.time}
         if self._discard_stale:
             self._items = {name: item for name, item in self._items.items() if name not in old}
@@ -117,7 +117,7 @@ class _Items:
         was_stale = self._last_level == STALE and now - self._last_change > self._timeout
         if header.level != self._last_level:
             self._last_level, self._last_change = header.level, now
-        # Also omit the header if it has no items and has been stale for longer than the timeout.
+        # Omit the header, too, if it has no items and has been stale for longer than the timeout.
         if self._discard_stale and not items and was_stale:
             return []
         return [header, *(item.status(self.path, item.name in old) for item in items)]
@@ -215,7 +215,7 @@ class DiscardAnalyzer(GenericAnalyzer):
 
 
 class IgnoreAnalyzer:
-    """Accepts and reports nothing. Used to disable some of the parameters."""
+    """An analyzer that accepts and reports nothing. Used to disable a section of the parameters."""
 
     path = name = ""
 

@@ -1,4 +1,4 @@
-"""Configurations that a module defines itself, instead of a .cfg file from which catkin_make generates the module."""
+"""Configurations that a module defines itself, without a .cfg file; and the end of a server."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import GroupTree, Val
 from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.parameter_generator_catkin import (
     ParameterGenerator,
 )
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
 
-__all__ = ["Definition"]
+__all__ = ["Definition", "close_server"]
 
 
 class Definition(ParameterGenerator):
@@ -53,3 +54,10 @@ class Definition(ParameterGenerator):
 
     def _values(self, key: Literal["default", "min", "max", "level", "type"]) -> dict[str, Any]:
         return {each["name"]: each[key] for each in self.group.get_parameters()}
+
+
+def close_server(server: Server) -> None:
+    """Close a server's service and topics. In ROS, a server lives as long as its node."""
+    server.set_service.shutdown()
+    server.descr_topic.unregister()
+    server.update_topic.unregister()

@@ -22,12 +22,14 @@ def claim_joint(hardware: Resources, context: ControllerContext, interface: Inte
 
 
 def claim_group(hardware: Resources, context: ControllerContext, interface: Interface) -> list[Joint]:
-    """Return the joints of the parameter ``joints``. Raise ControllerError if there are none."""
+    """Return the joints of the parameter ``joints``. Raise ControllerError if there are none, or one twice."""
     names = context.parameters.names("joints")
     if names is None:
         raise ControllerError(f"Failed to getParam 'joints' (namespace: {context.namespace}).")
     if not names:
         raise ControllerError("List of joint names is empty.")
+    if len(set(names)) < len(names):
+        raise ControllerError(f"A joint is listed twice in {names} (namespace: {context.namespace}).")
     try:
         return [hardware.joint(name, interface) for name in names]
     except HardwareError as error:
@@ -43,8 +45,9 @@ class CommandTopic:
     def __init__(self, context: ControllerContext, joints: int, *, is_group: bool) -> None:
         """Subscribe to Float64MultiArray for a group of joints, else to Float64."""
         self.values: Sequence[float] = (0.0,) * joints
+        self._name = f"{context.namespace}/command"
         self._subscriber = rospy.Subscriber(
-            f"{context.namespace}/command",
+            self._name,
             Float64MultiArray if is_group else Float64,
             self._receive_group if is_group else self._receive,
             queue_size=1,
@@ -71,6 +74,4 @@ class CommandTopic:
         if all(map(math.isfinite, values)):
             self.values = values
         else:
-            rospy.logwarn_throttle(
-                1.0, f"Command on {self._subscriber.resolved_name} is not finite: {list(values)}. Ignoring."
-            )
+            rospy.logwarn_throttle(1.0, f"Command on {self._name} is not finite: {list(values)}. Ignoring.")

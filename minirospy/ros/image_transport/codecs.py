@@ -34,7 +34,7 @@ _BRIDGE = CvBridge()
 
 
 class CodecError(ValueError):
-    """Raised if the transport does not support the image, or the bytes are not an image."""
+    """Raised if the transport does not support the image, or the data is not a valid image."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,10 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed(message: CompressedImage) -> Image:
-    """Decode a compressed image to the encoding named in its format. Raise CodecError if the bytes are not such an image."""
+    """Decode a compressed image to the encoding named in its format.
+
+    Raise CodecError if the data is not a valid image in that format.
+    """
     pixels = _decoded(bytes(message.data))
     encoding, semicolon, rest = message.format.partition(";")
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
@@ -119,7 +122,7 @@ def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
         b = 1.0 - a / settings.depth_max
         with np.errstate(all="ignore"):
             inverse = np.clip(np.nan_to_num(np.float32(a) / pixels + np.float32(b)), 0, 65535)
-            # NaN, and depths beyond the maximum, become 0.
+            # NaN and depths beyond the maximum become 0.
             pixels = np.where(pixels < settings.depth_max, inverse, 0).astype(np.uint16)
     elif depth == "int32":
         raise CodecError(f"depths are 32 bit floats or 16 bit integers, not {image.encoding}")
@@ -134,7 +137,10 @@ def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed_depth(message: CompressedImage) -> Image:
-    """Decode a compressed depth image; missing depths are 0 or NaN. Raise CodecError if the bytes are not such an image."""
+    """Decode a compressed depth image; missing depths become 0 or NaN.
+
+    Raise CodecError if the data is not a valid depth image.
+    """
     import numpy as np
 
     encoding, _, rest = message.format.partition(";")

@@ -79,7 +79,10 @@ def main() -> int:
 
 
 def _warn_without_library() -> None:
-    """Warn if the image library is missing. Nothing else would report this, because no image is encoded without a subscriber."""
+    """Warn if the image library is missing.
+
+    Otherwise nothing would report it, because images are only encoded for subscribers.
+    """
     try:
         require_library()
     except ValueError as error:
@@ -98,7 +101,7 @@ def list_main() -> int:
 
 
 class Republisher:
-    """Republishes images with one or more transports; images are encoded only for transports with subscribers."""
+    """Republishes images with one or more transports, and encodes them only for transports that have subscribers."""
 
     def __init__(self, source: str, source_kind: str, target: str, kinds: Sequence[str]) -> None:
         self._kind = source_kind
@@ -139,7 +142,7 @@ class Republisher:
         made: Image | CompressedImage = image
         if kind != "raw":
             made = _ENCODERS[kind](image, self._settings(kind))
-        # Publish the serialized bytes, so that the received image's sequence number is kept.
+        # Publish the serialized bytes, to keep the received image's sequence number.
         buffer = BytesIO()
         made.serialize(buffer)
         passed = AnyMsg()

@@ -78,8 +78,8 @@ class LinuxDevice:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # The first events report the current state, but after the first open() they may report the state at the
-            # last close(), so open the device twice.
+            # The first events report the current state, but after the first open() they may report that at the last close().
+            # So open the device twice.
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
@@ -172,7 +172,7 @@ class PygameDevice:
             ) from None
         self._pygame: Any = pygame
         pygame.init()
-        # Initialize again to find a joystick that was plugged in after the last initialization.
+        # Initialize again, to find a joystick that was plugged in since the last initialization.
         pygame.joystick.quit()
         pygame.joystick.init()
         count = pygame.joystick.get_count()
@@ -230,7 +230,7 @@ class PygameDevice:
 def state_events(
     before: Sequence[tuple[int, int, int]], after: Sequence[tuple[int, int, int]]
 ) -> list[Event]:
-    """Return the events that lead from state ``before`` to the next; the initial events if ``before`` is empty."""
+    """Return the events that lead from state ``before`` to ``after``, or the initial events if ``before`` is empty."""
     if not before:
         return [Event(kind | EVENT_INIT, number, value) for kind, number, value in after]
     return [Event(*each) for old, each in zip(before, after, strict=True) if old != each]

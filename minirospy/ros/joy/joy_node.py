@@ -28,7 +28,7 @@ _LOOK_SECONDS = 0.2  # maximum seconds until the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-# seconds after which to restart motors: half as long as the device runs them per command
+# seconds after which to restart the motors: half the time for which the device runs them per command
 _RUMBLE_SECONDS = 0.5
 
 
@@ -214,7 +214,7 @@ class Motors:
         self._wanted = strong, weak
 
     def run(self, device: Device, now: float) -> None:
-        """Apply the requested state to the device, and restart motors before the device stops them. ``now`` is in seconds."""
+        """Apply the requested state to the device; restart the motors before the device stops them. ``now`` is in seconds."""
         wanted = self._wanted
         if wanted == self._running and (wanted == (0.0, 0.0) or now < self._again):
             return

@@ -81,7 +81,7 @@ class Joystick:
         self._published(now + _FIRST_SECONDS)
 
     deadline: float | None
-    """When to publish the state if no event occurs; None to publish only on events."""
+    """The time at which to publish the state if no event occurs; None to publish only on events."""
 
     def handle(self, event: Event, now: float) -> bool:
         """Process an event; return whether to publish the state immediately. Raise ValueError if the event's type is unknown."""
@@ -105,7 +105,7 @@ class Joystick:
         return False
 
     def is_due(self, now: float) -> bool:
-        """Return whether it is time to publish the state; if so, set the next deadline."""
+        """Return whether it is time to publish the state. If so, set the next deadline."""
         if self.deadline is None or now < self.deadline:
             return False
         self._published(now)
@@ -125,7 +125,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # Until it is moved, a trigger reports 0, although its rest position is 1.
+        # A trigger reports 0 until it is moved, although its rest position is 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = MAX_VALUE * self._options.deadzone

@@ -19,7 +19,7 @@ _EV_FF = 0x15
 _FF_RUMBLE = 0x50
 _FF_GAIN = 0x60
 _MAX_MAGNITUDE = 0xFFFF
-_MILLISECONDS = 1000  # milliseconds that an effect lasts; joy_node restarts an effect before it ends
+_MILLISECONDS = 1000  # duration of an effect; joy_node restarts the effect before it ends
 
 # Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16, the union with the two magnitudes.
 _EFFECT = struct.Struct("=HhHHHHHxxHH")
@@ -53,7 +53,7 @@ def pack_event(code: int, value: int) -> bytes:
 
 
 class Rumble:
-    """An event device's motors. All methods raise RumbleError if the motors cannot be used."""
+    """An event device's motors. All methods raise RumbleError if the motors do not work."""
 
     def __init__(self, path: str) -> None:
         self._path = path

@@ -66,8 +66,8 @@ class MapSettings(NamedTuple):
 def read_settings(text: str) -> MapSettings:
     """Return the settings in a map's YAML file. If they are invalid, raise MapError with the real program's message."""
     try:
-        # Load all scalars as strings, because yaml-cpp differs from YAML 1.1: it accepts `1e-3` as a number, and
-        # rejects `false`.
+        # Load all scalars as strings.
+        # yaml-cpp differs from YAML 1.1: it accepts `1e-3` as a number and rejects `false`.
         found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -132,7 +132,7 @@ def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
     """
     values, has_alpha = pixels
     channels = values.shape[2]
-    # In mode trinary the alpha channel counts as one more color, as in the real program.
+    # In trinary mode the alpha channel counts as another color, as in the real program.
     averaged = channels - 1 if has_alpha and settings.mode is not Mode.TRINARY else channels
     grey = values[..., :averaged].sum(axis=2, dtype=np.float64) / averaged
     if settings.negate:
@@ -161,7 +161,7 @@ def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians. Like tf2's getEulerYPR, return 0 if the pitch is a right angle.
+    """Return the rotation about z in radians. Like tf2's getEulerYPR, return 0 if the pitch is +/-90 degrees.
 
     Also return 0 for the unset quaternion 0, 0, 0, 0. The real program writes `-nan`, which no map_server can read.
     """

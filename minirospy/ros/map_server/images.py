@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CELLS", "ImageError", "Pixels", "read_image"]
 
-# maximum number of cells in a map: a message has at most 4 GiB, which is also the size of 2**30 pixels with 4
-# channels
+# maximum number of cells in a map: a message has at most 4 GiB, the size of 2**30 pixels with 4 channels
 MAX_CELLS = 2**30
 
 _HEADER_NUMBER = re.compile(rb"(?:\s|#[^\n]*\n)*(\d+)")
@@ -135,7 +134,7 @@ def _pixels_of(image: Image.Image) -> Pixels:
     if image.mode == "1":
         return Pixels(_array(image.convert("L"))[..., None], has_alpha=False)
     colours = _array(image.convert("RGB"))
-    # In mode `scale` the last channel is used as alpha, even if it is a color.
+    # Mode `scale` uses the last channel as alpha, even if it is a color.
     return Pixels(colours[..., ::-1] if image.format in _REVERSED_FORMATS else colours, has_alpha=False)
 
 
@@ -143,7 +142,7 @@ def _has_alpha(image: Image.Image) -> bool:
     if image.mode in ("LA", "RGBA", "PA", "La", "RGBa"):
         return True
     transparency = image.info.get("transparency")
-    # SDL_image keeps palette indices if exactly one color is transparent.
+    # SDL_image keeps the palette indices if exactly one color is transparent.
     return isinstance(transparency, bytes) and not (
         set(transparency) <= {0, 255} and transparency.count(0) < 2
     )

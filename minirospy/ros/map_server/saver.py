@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The file name without suffix, and the thresholds: lowest occupancy of occupied cells, highest of free cells."""
+    """The file name without suffix, and the thresholds: minimum occupancy of occupied cells, maximum of free cells."""
 
     name: str = "map"
     occupied: int = 65
@@ -72,8 +72,7 @@ def main() -> int:
         if not str(error):
             print(_USAGE)
             return 1
-        # Print to stderr instead of logging: no node is running yet, and reporting this error must not require a
-        # master.
+        # Print to stderr instead of logging: no node is running yet, and a master must not be needed to report this error.
         print(f"map_saver: ERROR: {error}", file=sys.stderr)
         return 1
     if options is None:

@@ -121,7 +121,7 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
     x, y, yaw = settings.origin
     info.origin.position.x, info.origin.position.y = x, y
     info.origin.orientation.z, info.origin.orientation.w = quaternion_of_yaw(yaw)
-    # The message is serialized directly from the array, without creating a list of numbers.
+    # Serialize the message directly from the array, without creating a list of numbers.
     grid.data = to_grid(pixels, settings)  # type: ignore[assignment]
     return grid
 
@@ -142,8 +142,7 @@ class MapServer:
 
     def _show(self, settings: MapSettings) -> None:
         grid = load_map(settings)
-        # In simulated time, wait for the first time from the simulation; otherwise, the map would have a zero time
-        # stamp.
+        # In simulated time, wait for the first clock message; otherwise the map's time stamp would be zero.
         while not rospy.Time.now() and not rospy.is_shutdown():
             time.sleep(_CLOCK_SECONDS)
         grid.info.map_load_time = rospy.Time.now()

@@ -25,7 +25,9 @@ def main() -> int:
     rospy.init_node("loopback")
     try:
         rate = rospy.get_param("~rate", 100.0)
-        return run(_hardware(), float(rate) if isinstance(rate, (int, float)) else 0.0)
+        if not isinstance(rate, (int, float)):
+            raise HardwareError(f"parameter ~rate must be a number of cycles per second, not {rate!r}")
+        return run(_hardware(), rate)
     except (HardwareError, UrdfError, ValueError) as error:
         rospy.logfatal("%s", error)
         return 1

@@ -47,11 +47,11 @@ class RobotFrames:
         return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
 
     def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
-        """Yield the poses of links whose joints have a given position, or mimic a joint that has one."""
+        """Yield the poses of links whose joints have a position in the message, or mimic a joint that has one."""
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }
-        # Repeat, because a joint may mimic a joint that itself mimics another joint.
+        # Repeat, because a joint may mimic a joint that mimics another one.
         waiting = {name: mimic for name, mimic in self._mimics.items() if name not in known}
         while found := [name for name, mimic in waiting.items() if mimic.joint in known]:
             for name in found:

@@ -17,7 +17,7 @@ NAMES = (
     "robot_description", "rate", "dependent_joints", "use_mimic_tags", "use_smallest_joint_limits", "source_list", "zeros",
     "delta", "publish_default_positions", "publish_default_velocities", "publish_default_efforts",
 )  # fmt: skip
-"""The parameters to read. A private parameter takes precedence over the one in the node's namespace; for zeros, both are read."""
+"""The parameters to read. A private one takes precedence over one in the node's namespace; for zeros, both are read."""
 
 
 class JointParameters(NamedTuple):
@@ -62,7 +62,7 @@ def read_parameters(param: Callable[[str, object], object], zeros: Sequence[obje
 
 
 def _zero(zeros: Sequence[object], joint: str) -> float | None:
-    """Return a joint's zero position from the first tree that contains the joint.
+    """Return a joint's zero position, taken from the first tree that contains the joint.
 
     Slashes in the joint's name separate tree levels.
     """

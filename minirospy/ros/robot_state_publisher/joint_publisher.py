@@ -55,7 +55,7 @@ class JointPublisher:
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        # Read both trees, because a joint that is missing in the private tree may be in the other.
+        # Read both trees, because a joint missing from the private tree may be in the other.
         zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
         found = read_parameters(param, zeros)
         self.lock = threading.Lock()

@@ -92,7 +92,10 @@ class StateValues:
 
 
 class JointStates:
-    """The joints in the description's order: adjustable joints in ``free``, the others with their dependency."""
+    """The joints, in the order of the robot description.
+
+    ``free`` has those that the user can move; the others mimic another joint.
+    """
 
     def __init__(
         self, names: Sequence[str], free: dict[str, FreeJoint], dependent: Mapping[str, Dependent]
@@ -105,7 +108,7 @@ class JointStates:
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
         """Return a joint's dependency on an adjustable joint. Raise JointError if the dependencies form a cycle."""
         if name not in dependent:
-            # The joint has no limits and was omitted with a warning, so its parent "" does not exist.
+            # The joint has no limits and was omitted with a warning. Its parent is "", which does not exist.
             return Dependent("")
 
         rule = dependent[name]

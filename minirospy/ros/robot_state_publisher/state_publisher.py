@@ -24,7 +24,7 @@ from minirospy.ros.robot_state_publisher.frames import LinkPose, RobotFrames, pr
 __all__ = ["StatePublisher", "main"]
 
 _AHEAD = rospy.Duration(0, 500_000_000)
-"""Fixed frames on /tf are stamped this far ahead, so that they are valid until the next message."""
+"""Fixed frames on /tf are stamped this far in the future, so that they stay valid until the next message."""
 
 _OLD = rospy.Duration(30)
 _CONNECT_SECONDS = 0.5
@@ -50,7 +50,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Warn, in ROS's words, about features of a robot that frames cannot represent."""
+    """Warn, in ROS's words, about features of a robot that frames cannot express."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -90,7 +90,7 @@ class StatePublisher:
             self._tf_static.publish(TFMessage(self._stamped(frames.fixed(), rospy.Time.now())))
         else:
             self._timer = rospy.Timer(self._period, self._publish_fixed, reset=True)
-        # Wait so that existing subscribers also receive the first frames.
+        # Wait for existing subscribers to connect, so that they receive the first frames.
         self._tf.wait_for_subscribers(timeout=_CONNECT_SECONDS)
         self._subscriber = rospy.Subscriber(
             "joint_states", JointState, self.publish, queue_size=1, tcp_nodelay=True

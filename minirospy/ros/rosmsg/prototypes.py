@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 MAX_DEFAULT_NON_FLOW_ITEMS = (
-    4  # maximum number of entries in a dictionary or list; after a longer one, flat values are in braces
+    4  # maximum number of entries in a dictionary or list; above it, flat values are printed in braces
 )
 _USAGE_ERROR = getattr(os, "EX_USAGE", 1)
 _NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte", "char"}
@@ -54,9 +54,9 @@ class RosMsgProtoArgsException(Exception):
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes objects with `__slots__`, such as messages, as dictionaries."""
+    """Dumps objects that have `__slots__`, such as messages, as dictionaries."""
 
-    keeps_order: ClassVar[bool] = False  # else the fields are sorted by name
+    keeps_order: ClassVar[bool] = False  # if False, the fields are sorted by name
 
     def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> yaml.MappingNode:
         if self.keeps_order:
@@ -88,14 +88,14 @@ def dump(
                 field = _filled(value, name)
             if not inspect.ismethod(field) and not inspect.isfunction(field):
                 entries[name] = field
-        # PyYAML reads this attribute for each of the following nodes.
+        # PyYAML reads this attribute for each node that follows.
         if len(entries) > MAX_DEFAULT_NON_FLOW_ITEMS:
             dumper.default_flow_style = flow_style
         node: yaml.Node = dumper.represent_dict(entries)
         return node
 
     class Dumper(_Dumper):
-        """Writes messages with the arguments of this call."""
+        """Writes messages, formatted according to one call's arguments."""
 
     Dumper.add_representer(OrderedDict, yaml.SafeDumper.represent_dict)
     Dumper.add_representer(None, represent)  # type: ignore[arg-type]

@@ -46,13 +46,12 @@ _MAX_BYTES = 256 * 1024
 Longer messages are dropped, so that no node can fill the memory of the master's process.
 """
 
-_MAX_SUBSCRIBERS = 200
-"""Maximum number of subscribers to /rosout_agg. It is limited because each may queue a message of maximum size."""
-
 _LARGE, _MAX_LARGE = 16 * 1024, 100
-"""Size in bytes, and number of messages: larger messages are not sent to a subscriber with this many queued messages."""
+"""Size in bytes, and number of messages: a message larger than this is not sent to a subscriber with that many queued
+messages.
+"""
 
-STEP_LETTERS = 1024  # characters of text to write per step; escaping one may take a microsecond
+STEP_LETTERS = 1024  # characters of text to process per step; escaping one may take a microsecond
 
 
 class RosoutNode:
@@ -103,7 +102,7 @@ class RosoutNode:
     async def close(self) -> None:
         """Unregister from the master. Idempotent."""
         await self.node.close()
-        # A pending read completes once its connection is closed.
+        # Once its connection is closed, a pending read completes.
         while self._turns:
             await asyncio.sleep(0)
         self._limited_log.close()
@@ -153,7 +152,7 @@ class RosoutNode:
         for link in self._aggregated.links:
             if len(whole) <= _LARGE or link.waiting < _MAX_LARGE:
                 link.send(whole)
-            # Yield to the event loop, because there may be many messages, and a large one takes time.
+            # Yield to the event loop: there may be many messages, and a large one takes time.
             yield None
         if self._file:
             yield from self._write(self._file, body)
@@ -196,7 +195,7 @@ def _bytes_of(message: Message) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """Convert a Python logger's name to ROS's style, ``ros`` and its children, as in roscpp nodes."""
+    """Convert a Python logger's name to ROS's style (``ros`` and its children), as in roscpp nodes."""
     return "ros" + name.removeprefix("minirospy")
 
 

@@ -86,7 +86,7 @@ def _cells(
                 field = convert_getattr(value, name, type_)
                 yield from _cells(field, f"{path}.{name}", time_offset, field_filter)
     elif type(value) in (list, tuple) and len(value):
-        # As in ROS, the first element's type decides: a list of lists has no cells.
+        # As in ROS, the type of the first element decides, so a list of lists has no cells.
         first = value[0]
         if type(first) in (*_PLAIN, str) or isinstance(first, TVal):
             for index, each in enumerate(value):
@@ -143,7 +143,7 @@ def array_index_or_slice(index_string: str) -> int | slice:
 
 
 def ascii_table(header: Sequence[str], cols: Mapping[str, list[Any]]) -> str:
-    """Return a table with a rule below the header row. As in ROS, the columns in ``cols`` are padded in place."""
+    """Return a table with a rule below the header row. As in ROS, pad the columns in ``cols`` in place."""
     widths = {name: max(len(name), *(len(each) for each in cols[name])) for name in header}
     for name in header:
         cols[name][:] = [str(each).ljust(widths[name]) for each in cols[name]]

@@ -150,7 +150,7 @@ def argv_publish(
 
 
 def wait_for_subscriber(pub: Publisher[Message], timeout: float) -> None:
-    """Wait until a publisher has a subscriber, or for at most ``timeout`` seconds."""
+    """Wait until a publisher has a subscriber, for at most ``timeout`` seconds."""
     import rospy
 
     end = time.monotonic() + timeout
@@ -219,7 +219,7 @@ def file_yaml_arg(filename: str) -> Callable[[], Iterator[list[Any]]]:
 def stdin_yaml_arg() -> Iterator[Any]:
     """Yield each YAML document on stdin; a line with three hyphens ends a document. Stop at the end of stdin or at shutdown."""
     lines: list[str] = []
-    # A document without an end is ignored, because it may be incomplete.
+    # Ignore a document without an end, which may be incomplete.
     for line in _lines_of_stdin():
         if line.strip() != "---":
             lines.append(line)
@@ -249,7 +249,7 @@ def _lines_of_stdin() -> Iterator[str]:
     while not rospy.is_shutdown():
         if not select.select([descriptor], [], [], 1.0)[0]:
             continue
-        # Do not use readline(): the lines that it buffers are invisible to select().
+        # Do not use readline(): select() does not see the lines that it buffers.
         data = os.read(descriptor, 1 << 16)
         if not data:
             return
@@ -290,7 +290,7 @@ def param_publish(
     pauses = rospy.Rate(rate) if rate is not None else None
     published: object = None
     while not rospy.is_shutdown():
-        # After this call, the master notifies the node of changes to the parameter, so the cached value is current.
+        # From this call on, the master notifies the node of changes to the parameter, so the cached value is current.
         value = rospy.get_param_cached(param_name)
         if not isinstance(value, dict | list):
             raise ROSTopicException(f"Parameter [{param_name}] in not a valid type")

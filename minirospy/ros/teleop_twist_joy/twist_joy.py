@@ -40,7 +40,7 @@ class Direction(NamedTuple):
 
 @dataclass(frozen=True)
 class TeleopOptions:
-    """The buttons, and a Direction per velocity component: linear (x, y, z) and angular (yaw, pitch, roll)."""
+    """The buttons, and a Direction for each component of the velocity: linear (x, y, z) and angular (yaw, pitch, roll)."""
 
     enable_button: int = 0
     enable_turbo_button: int = -1
@@ -91,7 +91,7 @@ class JoyTeleop:
         self._has_stopped = False
 
     def velocity(self, axes: Sequence[float], buttons: Sequence[int]) -> Velocity | None:
-        """Return the velocity to publish. After the buttons are released, return zero velocity once, then None."""
+        """Return the velocity to publish. After the buttons are released, return zero velocity once and then None."""
         if self._is_held(buttons, self._options.enable_turbo_button):
             return self._moving(axes, is_fast=True)
         if self._is_held(buttons, self._options.enable_button):

@@ -46,13 +46,13 @@ e/c : increase/decrease only angular speed by 10%
 CTRL-C to quit
 """
 
-_HELP_EVERY = 15  # number of speed changes between repeats of the help text
+_HELP_EVERY = 15  # number of speed changes between repetitions of the help text
 
 _QUIT = "\x03"
 
 
 class Direction(NamedTuple):
-    """The signs of the motion: forward, left and up, and the turn to the left."""
+    """A direction of motion: the sign (-1, 0 or 1) of x (forward), y (left), z (up) and yaw (left turn)."""
 
     x: int = 0
     y: int = 0
@@ -180,7 +180,7 @@ class _Output:
             self._changed.notify()
 
     def close(self) -> None:
-        """Publish a zero velocity as the last message."""
+        """Publish zero velocity as the last message."""
         with self._changed:
             self._is_closed = True
             self._publish(Motion(0, 0, 0, 0))
@@ -225,7 +225,7 @@ def main() -> int:
         rospy.logerr("%s", error)
         return 1
     except OSError:
-        # The terminal window was closed, so no more keys can arrive.
+        # The terminal window is closed, so no more keys can arrive.
         rospy.signal_shutdown("the terminal is closed")
     except rospy.ROSInterruptException:
         pass

@@ -42,7 +42,7 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2  # if the node is suspended for longer than this, in seconds, it skips the missed steps
+_LATE_SECONDS = 0.2  # seconds; after a longer suspension, the node skips the missed steps
 
 _T = TypeVar("_T")
 
@@ -93,7 +93,7 @@ class Simulator:
             if not rospy.has_param(f"~background_{part}"):
                 rospy.set_param(f"~background_{part}", usual)
         self.world = World(_background())
-        # Serialises changes to the set of turtles; meanwhile, the world continues to step.
+        # Serialises changes to the set of turtles; the world continues to step in the meantime.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
         self._services: list[rospy.Service[object]] = []
@@ -115,7 +115,7 @@ class Simulator:
         due = time.monotonic()
         while not rospy.is_shutdown():
             with contextlib.suppress(rospy.ROSException):
-                # _step() raises an exception if the node is shutting down.
+                # _step() raises an exception while the node is shutting down.
                 self._step()
             due += STEP_SECONDS
             late = time.monotonic() - due
@@ -165,8 +165,7 @@ class Simulator:
         with self._changing:
             with self.lock:
                 self.world.remove_all()
-            # Reuse the topics of an earlier turtle with the same name, so that their subscribers receive every
-            # message.
+            # Reuse the topics of an earlier turtle with the same name, so that their subscribers receive every message.
             first = self._add(self.world.spawn_first)
             for name in set(self._ends) - {first}:
                 self._remove(name)
@@ -177,7 +176,7 @@ class Simulator:
         def spawn() -> str:
             spaces = {rospy.resolve_name(name) for name in self.world.names}
             if request.name and rospy.resolve_name(request.name) in spaces:
-                # The new name may be another spelling of an existing name, such as /turtle1.
+                # The new name may be another spelling of an existing one, such as /turtle1.
                 raise WorldError(f"A turtled named [{request.name}] already exists")
             return self.world.spawn(request.name, request.x, request.y, request.theta)
 

@@ -23,7 +23,7 @@ _PERIOD_SECONDS = 0.1
 _LINES_BESIDE = 4  # number of terminal lines reserved for the log and the picture's frame
 
 _ROWS = range(8, 41)
-"""Allowed numbers of rows: fewer would show too little, more would take too much CPU time."""
+"""Allowed numbers of rows: fewer show too little, more take too much CPU time."""
 
 _ARROWS, _ASCII_ARROWS = "→↗↑↖←↙↓↘", ">/^\\</v\\"
 _STYLES = ("bright_green", "bright_yellow", "bright_red", "bright_cyan", "bright_magenta", "bright_white")
@@ -144,7 +144,7 @@ class Screen:
 
         console = Console(file=own_output())
         if console.is_dumb_terminal:
-            # Draw nothing, because a dumb terminal cannot move the cursor up.
+            # Draw nothing: a dumb terminal cannot move the cursor up.
             self._ended.set()
         self._live = Live(console=console, auto_refresh=False)
         if not self._ended.is_set():

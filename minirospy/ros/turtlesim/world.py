@@ -18,9 +18,9 @@ __all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velo
 
 BACKGROUND = Color(69, 86, 255)  # background if the parameters set no other colour
 
-STEP_SECONDS = 0.016  # seconds between two steps
+STEP_SECONDS = 0.016  # seconds between steps
 
-_COMMAND_SECONDS = 1.0  # seconds that a velocity command stays in effect
+_COMMAND_SECONDS = 1.0  # seconds for which a velocity command stays in effect
 
 _PIXELS_PER_METRE = 45.0
 

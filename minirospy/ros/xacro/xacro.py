@@ -4,7 +4,7 @@
 import os
 import sys
 
-# Prevent this folder from hiding the package xacro.
+# Do not let this folder hide the package xacro.
 _HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:] = [folder for folder in sys.path if os.path.abspath(folder) != _HERE]
 

@@ -1,4 +1,4 @@
-"""Find the dead nodes, whose port refuses connections, for a master that is nearly full."""
+"""Find the dead nodes, whose ports refuse connections, when a master is nearly full."""
 
 from __future__ import annotations
 

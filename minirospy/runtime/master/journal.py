@@ -1,4 +1,4 @@
-"""The master's journal on disk, from which another master restores the state if this one is killed.
+"""The master's journal on disk. If this master is killed, the next one restores the state from it.
 
 There is one file per user and port, ``ROS_HOME/master/journal-PORT``. Each record is written, without fsync, before
 the caller gets its response, so kill -9 loses nothing that was confirmed. A power cut may lose the last seconds, but it
@@ -34,7 +34,7 @@ _STEP_RECORDS = 200
 RETRY_SECONDS = 30.0  # seconds before writing the journal again after a failure
 
 _BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
-"""The errors from locking a file that another process has locked; Windows raises the last two."""
+"""The errors raised by locking a file that another process has locked; Windows raises the last two."""
 
 
 class JournalBusyError(Exception):
@@ -88,14 +88,13 @@ class Journal:
         self._failed_at: float
         self.trouble = ""  # the reason why the journal is not being written, or ""
 
-        # The numbers of the large values that are being stored, and the last number used.
+        # The numbers of the large values that are being stored, and the last number assigned.
         self._stored: set[int] = set()
         self._number = 0
         # During an incremental rewrite: the records appended since it started, and the new file's descriptor.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Counts the incremental rewrites that finished or were abandoned, so that a rewrite can detect that it was
-        # abandoned.
+        # Counts the rewrites in steps that have finished or been abandoned; a rewrite compares it to see if it was abandoned.
         self._rewrites = 0
 
     @property
@@ -155,8 +154,7 @@ class Journal:
             # On Windows, the file may already be closed.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # Remove the incomplete new file to free space on a full disk, because appending to the old file may need
-            # it.
+            # Remove the incomplete new file to free space on a full disk: appending to the old file may need it.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise
@@ -171,8 +169,8 @@ class Journal:
         try:
             if record[0] == "put":
                 if record[2] not in self._stored:
-                    # The disk failed in the meantime, and the parts of the value were lost with the old file, so
-                    # write everything again.
+                    # The disk failed in the meantime, and the parts of the value were lost with the old file.
+                    # Write everything again.
                     self.rewrite()
                     return
                 self._stored.discard(record[2])
@@ -185,7 +183,7 @@ class Journal:
             self._log_trouble()
 
     def store(self, value: object) -> Steps[int]:
-        """Write a large value in parts; return the number that a "put" record uses to refer to it. Never raises."""
+        """Write a large value in parts; return the number by which a "put" record refers to the value. Never raises."""
         while self._is_rewriting:
             yield PAUSE
 
@@ -234,7 +232,7 @@ class Journal:
                     return
             size += self._write_since(self._second)
 
-            # Sync in a thread: syncing may take long, and other writes to the file wait for it.
+            # Sync in a thread: a sync can be slow, and other writes to the file wait for it.
             syncing = _Sync(self._second)
             syncing.start()
             while syncing.is_alive():
@@ -297,7 +295,7 @@ class Journal:
                 self._new_path.unlink()
 
     def retry(self) -> None:
-        """Write the current state if the last failed attempt was at least half a minute ago. Never raises."""
+        """Write the current state if the last attempt failed at least half a minute ago. Never raises."""
         if self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
             self.start()
             if not self.trouble:
@@ -391,7 +389,7 @@ def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
 
 
 class _Sync(threading.Thread):
-    """A thread that syncs a file, which may take long; ``error`` is the disk's error, if any."""
+    """A thread that syncs a file, which can be slow; ``error`` is the disk's error, if any."""
 
     def __init__(self, file: int) -> None:
         super().__init__(name="minirospy-journal-sync", daemon=True)
@@ -450,11 +448,11 @@ def _locked(path: Path, journal: Path) -> int:
 
 
 def boot_id() -> str:
-    """Return an identifier that changes only when this machine reboots."""
+    """Return an identifier of this machine's current boot; it only changes on a reboot."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
     except OSError:
         import psutil
 
-        # On systems other than Linux the boot time is computed from the current time, and varies by about a second.
+        # On other systems the boot time is computed from the current time, so it varies by about a second.
         return str(round(psutil.boot_time() / 60))

@@ -20,7 +20,7 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 FLUSH_SECONDS = 0.5
-# Maximum number of characters to collect, because writing megabytes in one call would block the master
+# Maximum number of buffered characters; writing megabytes in one call would block the master
 _MAX_PENDING = 64 * 1024
 
 
@@ -30,23 +30,23 @@ class LogFileHandler(RotatingFileHandler):
     Otherwise another user could predict the log file's name and create a link there.
     """
 
-    def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """Open ``path``. If ``most_bytes`` is 0, there is no size limit. Raise OSError if the file cannot be opened."""
-        super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
+    def __init__(self, path: Path, max_bytes: int = 0, older_files: int = 0) -> None:
+        """Open ``path``. If ``max_bytes`` is 0, there is no size limit. Raise OSError if the file cannot be opened."""
+        super().__init__(path, maxBytes=max_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:
         return cast("TextIOWrapper", private_files.open_text(Path(self.baseFilename), "a"))
 
 
 class LogFile(LogFileHandler):
-    """The log file ``path``, of at most ``most_bytes``, with up to three rotated files.
+    """The log file ``path``, of at most ``max_bytes``, with up to three rotated files.
 
     Used as a logging handler, it writes warnings and errors immediately. :meth:`line` and :meth:`text` add plain strings
     and must be called on the loop.
     """
 
-    def __init__(self, path: Path, most_bytes: int, name: str) -> None:
-        super().__init__(path, most_bytes, older_files=3)
+    def __init__(self, path: Path, max_bytes: int, name: str) -> None:
+        super().__init__(path, max_bytes, older_files=3)
         self.setFormatter(_Formatter(self._stamp))
         self._line_head = f"[{name}][INFO] "
         self._lines: list[str] = []
@@ -117,8 +117,8 @@ class LogFile(LogFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master. Discard the stream: its unwritten data would make closing it
-                # fail again.
+                # A full disk must not stop the master.
+                # Discard the stream; closing it normally would fail again because of its unwritten data.
                 if self.stream:
                     with contextlib.suppress(OSError, ValueError):
                         self.stream.close()
@@ -136,6 +136,6 @@ class _Formatter(logging.Formatter):
         return self._stamp(record.created)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's
-        # Peers choose the names and URIs in the message: escape them, so that they cannot start another line.
+        # Escape the names and URIs in the message: peers choose them, and must not be able to start another line.
         record.message = escaped(record.message)
         return super().formatMessage(record)

@@ -1,4 +1,4 @@
-"""The master: its server, its calls to nodes, its journal, and, after a killed master, the check whether nodes still exist.
+"""The master: its server, its calls to nodes, its journal, and the check for dead nodes after it replaces a killed master.
 
 ``core/graph/master_api.py`` computes the responses.
 """
@@ -49,8 +49,7 @@ _MAX_CONCURRENT_CHECKS = 100
 QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 LOCK_SECONDS = 3.0
-# Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's
-# lock
+# Seconds between attempts to lock the journal: the system may release a killed master's port before the lock
 _LOCK_PAUSE = 0.02
 
 # maximum age of a killed master's journal at which a new master still resumes its session
@@ -82,7 +81,7 @@ class Master(MasterApi):
         access: Access | None = None,
         fresh: bool = False,
         timeout: float = 3.0,
-        most_clients: int = 4000,
+        max_clients: int = 4000,
         same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
@@ -96,9 +95,9 @@ class Master(MasterApi):
         super().__init__()
         self.host = host
         self.calls = 0
-        # The serialized response to getSystemState, and the registry's change count when it was serialized.
+        # The serialized response to getSystemState, and the registry's change count at that time.
         self._state = (-1, Serialized(()))
-        # Startup messages for the user: what was recovered, and what could not be.
+        # Messages to show the user at startup: what was recovered, and what could not be.
         self.news: list[str] = []
         self._started = time.monotonic()
         self._journal_path = journal
@@ -110,7 +109,7 @@ class Master(MasterApi):
             self.serve,
             bind_host=bind_host,
             port=port,
-            most_idle=most_clients,
+            max_idle=max_clients,
             access=access,
             known_as=_names_of(host, bind_host) if same_host else (),
         )
@@ -136,7 +135,7 @@ class Master(MasterApi):
     def session(self) -> str:
         """The /run_id of the continued session; "" if the session is new."""
         found = self.parameters.get("/run_id") if self.parameters.has("/run_id") else ""
-        # Check the id: it becomes a folder name, and any node may have set it.
+        # Check the id, which any node may have set: it becomes a folder name.
         return found if isinstance(found, str) and re.fullmatch(r"[\w-]{1,64}", found) else ""
 
     @property
@@ -146,8 +145,8 @@ class Master(MasterApi):
         return self.parameters.has(key) and self.parameters.get(key) is True
 
     async def start(self) -> None:
-        """Bind the port, recover a killed master's state, and serve. Raise OSError if the port cannot be bound."""
-        # Bind the port first: of two masters that start together, the one that gets the port also gets the journal.
+        """Bind the port, recover a killed master's state, and start serving. Raise OSError if the port cannot be bound."""
+        # Bind the port first: if two masters start together, the one that gets the port also gets the journal.
         self.server.listen()
         try:
             nodes = await self._open_journal() if self._journal_path else {}
@@ -209,7 +208,7 @@ class Master(MasterApi):
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # Another client's request has serialized the state while this request was queued.
+            # While this request was queued, another client's request has serialized the state.
             return self._state[1]
 
         changes = self.registry.changes
@@ -221,7 +220,7 @@ class Master(MasterApi):
         return state
 
     def notify(self, action: Notice) -> None:
-        """Send the notification to the node that it is for."""
+        """Send the notification to its node."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
@@ -306,7 +305,7 @@ class Master(MasterApi):
             # Another master has locked the journal.
             busy = error
         except OSError:
-            # The journal may still be readable. :meth:`Journal.start` then determines whether it is writable.
+            # The journal may still be readable. :meth:`Journal.start` determines later whether it is writable.
             pass
 
         if busy:
@@ -389,7 +388,7 @@ class Master(MasterApi):
             await rpc.close()
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
-        """Forget dead nodes; send the remaining nodes the notifications that they may have missed."""
+        """Remove dead nodes, and send the others the notifications that they may have missed."""
         rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_MAX_CONCURRENT_CHECKS)
 
         async def check(name: str, uri: str) -> bool:
@@ -411,7 +410,7 @@ class Master(MasterApi):
         _log.warning("of %s %d answer, the others are forgotten", _many(found, "recovered node"), sum(found))
 
     async def _sweep(self) -> None:
-        """When the registrations are nearly full, forget the nodes whose port refuses connections.
+        """When the table of registrations is nearly full, remove the nodes whose ports refuse connections.
 
         Otherwise the master would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
@@ -440,7 +439,7 @@ class Master(MasterApi):
 
 
 async def _lock(journal: Journal) -> None:
-    """Lock the journal; if another process has locked it, retry for a moment. The caller has bound the port."""
+    """Lock the journal, retrying for a moment if another process has locked it. The caller has bound the port."""
     from minirospy.runtime.master.journal import JournalBusyError
 
     end = time.monotonic() + LOCK_SECONDS
@@ -456,7 +455,7 @@ async def _lock(journal: Journal) -> None:
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:
-    """Return whether the node still responds at its URI. Any response counts, except another node's name."""
+    """Return whether the node still responds at its URI. Any response counts, unless it gives another node's name."""
     for _ in range(tries):
         try:
             answer = await rpc.call(uri, "getName", "/master", timeout=timeout)

@@ -1,4 +1,4 @@
-"""The master's calls to nodes: in order for each node, and concurrent for different nodes, so that none delays another."""
+"""The master's calls to nodes: sequential for each node, but concurrent across nodes, so that no node delays another."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ _SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starti
 # Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
 MAX_PARAMETERS = 32
 
-# maximum total size in bytes of large calls in progress; the others are queued
+# maximum total size in bytes of the large calls in progress; further ones are queued
 _LARGE_BYTES = 32 * 1024 * 1024
 
-# maximum size in bytes of a node's response to a notification; its contents are ignored
+# maximum size in bytes of a node's response to a notification, whose contents are ignored
 _MAX_ANSWER = 65536
 
 
@@ -67,14 +67,14 @@ class _Backlog:
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
     parameters: int = 0  # number of pending parameter notifications
-    # Dict from topic to the earliest time at which its next notification may be sent
+    # The earliest time at which each topic's next notification may be sent
     pauses: dict[object, float] = field(default_factory=dict)
     timer: asyncio.TimerHandle | None = None
 
 
 @dataclass(eq=False, slots=True)
 class _Line:
-    """A queue of nodes to call; at most ``most`` are called concurrently."""
+    """A queue of nodes to call, at most ``most`` of them concurrently."""
 
     most: int
     under_way: int = 0
@@ -82,7 +82,7 @@ class _Line:
 
 
 class Notifier:
-    """Sends notifications to nodes. Nodes that did not respond to the last notification share a few call slots.
+    """Sends notifications to nodes. Nodes that did not respond to their last notification share a few call slots.
 
     Only the newest list of a topic's publishers, or value of a parameter, is queued: older ones are obsolete. Processing a
     very long list costs the receiver time, so if a topic has thousands of publishers, the next list is sent after a pause.
@@ -96,11 +96,11 @@ class Notifier:
         self.rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
-        """Dict from the URI of a node on this loop to the function to call with a topic and its publishers, instead of an
-        XML-RPC call.
+        """For each node on this loop: the function to call, with a topic and its publishers, instead of an XML-RPC call.
+        Keyed by URI.
         """
         self.nodes: dict[str, _Backlog] = {}
-        # Dict from (URI, topic) to the earliest time at which its next notification may be sent, earliest first.
+        # The earliest time at which each (URI, topic)'s next notification may be sent, earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
         self.line = _Line(MAX_CONCURRENT_CALLS)
@@ -111,10 +111,10 @@ class Notifier:
 
         # The last serialized update: cached, because all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
-        # The last serialized large update, of a topic or a parameter.
+        # The last serialized large update of a topic or parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
-        # The queued large calls, the bytes of those in progress, and whether one is being serialized.
+        # The queued large calls, the total bytes of those in progress, and whether one is being serialized.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
         self._is_writing = False
@@ -169,7 +169,7 @@ class Notifier:
         await self.rpc.close()
 
     def _summarize(self, node: _Backlog) -> None:
-        """Replace the notifications for many parameters with one for each key that the node subscribed to."""
+        """Replace the notifications for many parameters with one for each key that the node has subscribed to."""
         for key in [key for key, notice in node.notices.items() if isinstance(notice, ParameterUpdate)]:
             del node.notices[key]
         for name in self._state.subscribed_parameters(node.uri):
@@ -181,7 +181,7 @@ class Notifier:
         self._start_soon()
 
     def _start_soon(self) -> None:
-        # Do not start the calls immediately: the registering node gets its response first.
+        # Do not start the calls immediately, so that the registering node gets its response first.
         if not self._starts_soon:
             self._starts_soon = True
             asyncio.get_running_loop().call_soon(self._start)
@@ -230,12 +230,12 @@ class Notifier:
     def _call_later(
         self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> None:
-        """Send a large notification as soon as the limit for large calls allows it."""
+        """Send a large notification as soon as the limit for large calls permits."""
 
         def start() -> None:
             self._turns.start(self._call_in_steps(node, line, notice, count))
 
-        # Call nodes that responded to the last notification first.
+        # First call the nodes that responded to their last notification.
         (self._large.append if line is self.suspect_line else self._large.appendleft)(start)
         self._start_large()
 
@@ -309,7 +309,10 @@ class Notifier:
             self._start_soon()
 
     def _go_on(self, node: _Backlog) -> None:
-        """Queue the node if it has a notification to send. Otherwise set a timer for the end of its first pause, if any."""
+        """Queue the node if it has a notification that may be sent now.
+
+        Otherwise set a timer for the end of its first pause, if any.
+        """
         if node.timer:
             node.timer.cancel()
             node.timer = None

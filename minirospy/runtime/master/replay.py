@@ -19,7 +19,7 @@ __all__ = ["Replay", "changes_to", "forget_node"]
 
 
 class Replay:
-    """Applies a journal's records in order."""
+    """Applies the records of a journal, in order."""
 
     def __init__(self, registry: Registry, parameters: ParameterTree) -> None:
         self._registry = registry
@@ -81,7 +81,7 @@ def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[o
     The state is copied immediately, so it may change while the returned changes are read.
     """
     uris, types = registry.nodes(), registry.topic_types()
-    # Each of these results is a copy.
+    # Each of these calls returns a copy.
     publications, subscriptions = registry.publications(), registry.all_subscriptions()
     offers, subscribed = list(registry.offers()), list(parameters.subscriptions())
     tree = parameters.get("/")
@@ -96,6 +96,6 @@ def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[o
 
 
 def forget_node(registry: Registry, parameters: ParameterTree, name: str, uri: str) -> list[Notice]:
-    """Forget everything that the node ``name`` at ``uri`` has registered; return the notifications to send."""
+    """Remove everything that the node ``name`` at ``uri`` has registered; return the notifications to send."""
     parameters.unsubscribe_node(name, uri)
     return list(registry.forget(name, uri))

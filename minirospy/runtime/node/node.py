@@ -31,7 +31,8 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-MAX_IDLE = 200  # maximum number of idle connections to the Slave API; a node's peers keep about one each
+# maximum number of idle connections to the Slave API; each of a node's peers keeps about one
+MAX_IDLE = 200
 
 # seconds after an unsubscription during which the master may still send lists of publishers
 _STALE_SECONDS = 5.0
@@ -68,7 +69,7 @@ class Node:
         self.services: dict[str, ServiceServer] = {}
         # topics unsubscribed from recently, each with its timer
         self._left: dict[str, asyncio.TimerHandle] = {}
-        # Topics whose publishers will be requested again from the master
+        # Topics whose publishers will be requested from the master again
         self._requesting: dict[str, asyncio.TimerHandle] = {}
 
         self.uri = ""
@@ -87,7 +88,7 @@ class Node:
         }
         self.registrations = Registrations(name, environment, tables, self.rpc, self.workers, watch_seconds)
         self.parameters = self.registrations.parameters
-        """The parameters that this node has subscribed to. The subscribing code adds them."""
+        """The parameters that this node has subscribed to, added by the code that subscribes."""
         self.when_registered_again = self.registrations.when_registered_again
         """Functions that register additional state.
 
@@ -129,7 +130,7 @@ class Node:
             bind_host=host,
             port=xmlrpc_port,
             ports=ports,
-            most_idle=MAX_IDLE,
+            max_idle=MAX_IDLE,
             access=self._access,
             known_as=(self.environment.uri_host,) if self.environment.same_host else (),
         )
@@ -143,14 +144,14 @@ class Node:
         self.registrations.uri, self.registrations.service_uri = self.uri, self.service_uri
         self.registrations.watch()
         if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
-            # Run this in a thread, because resolving a host name may block.
+            # Run this in a thread, because resolving a host name can block.
             await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
 
     async def close(self, *, announces: bool = True) -> None:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
         Waits for the master (see :meth:`Registrations.close`), or until :meth:`stop_unregistering` is called. If the master
-        does not respond, the remaining registrations stay in it. With ``announces``, a line is logged if this takes long.
+        does not respond, the remaining registrations stay in it. With ``announces``, a line is logged if this is slow.
         """
         if self._closed:
             return
@@ -168,8 +169,8 @@ class Node:
             return_exceptions=True,
         )
 
-        # Close the Unix socket before the port: otherwise the next server on that port could not bind the socket's
-        # name.
+        # Close the Unix socket before the port.
+        # Otherwise the next server on that port could not bind the socket's name.
         await close_all([self.unix_listener.close, self.listener.close])
         tables = (self.publications, self.subscriptions, self.services)
         close_each([part.close for table in tables for part in table.values()])
@@ -289,7 +290,7 @@ class Node:
         if subscription:
             subscription.publishers_changed(uris)
             if topic in self._left and topic not in self._requesting:
-                # The list may be for the previous subscription, because rosmaster queues its updates.
+                # The list may be for an earlier subscription, because rosmaster queues its updates.
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 
@@ -308,13 +309,13 @@ class Node:
         self.registrations.request_again(topic)
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
-        """Serve a connected peer; its header specifies a topic or service."""
+        """Serve a peer that has connected; its header names a topic or service."""
         try:
             fields = await tcp.receive_header(sock, memory=self._header_memory)
         except (OSError, WireError):
             if not self._closed:
                 raise
-            sock.close()  # the master has already notified the peer that this node is leaving
+            sock.close()  # the master has already told the peer that this node is leaving
             return
 
         if "service" in fields:

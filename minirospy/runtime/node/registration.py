@@ -1,4 +1,4 @@
-"""A node's registrations: those that the master has, and those that the node needs.
+"""A node's registrations: those that the master has, and those that it should have.
 
 Registrations are ordered, retried until the master accepts them, repeated after it has restarted, and removed when the
 node closes. Source: http://wiki.ros.org/ROS/Master_API.
@@ -32,16 +32,16 @@ from minirospy.runtime.transport.workers import InOrder, Workers
 __all__ = ["Registrations"]
 
 _log = logging.getLogger(__name__)
-# Time limit in seconds for a call. It is long, because many nodes that start together on a small computer delay each
-# other
+# Time limit in seconds for a call; long, because many nodes that start together on a small computer delay each other
 _CALL_SECONDS = 30.0
 
-# Time limit in seconds for the check whether this node is registered. It is short, because the check is repeated soon
+# Time limit in seconds for checking whether this node is registered. It is short, because the check is repeated soon
 _LOOK_SECONDS = 5.0
 
 SILENT_SECONDS, STILL_SILENT_SECONDS = 10.0, 2.0
-"""A closing node gives up if the master sends no response for this many seconds; the shorter limit applies if the master
-was already silent before. The total time is not limited, because the node waits for a busy master that still responds.
+"""A closing node gives up after this many seconds without a response from the master; the shorter limit applies if the
+master was already silent before. There is no limit on the total time: the node waits for a busy master that still
+responds.
 """
 
 _CLOSING_CALL_SECONDS = 3600.0
@@ -53,7 +53,7 @@ _MAX_CALLS_PER_MULTICALL = 100  # maximum number of unregistrations per system.m
 
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
-"""The kind of a registration, as in the names of the master's methods ("Publisher"), and the topic or service name."""
+"""A registration's kind, named as in the master's methods ("Publisher"), and the name of its topic or service."""
 _Call: TypeAlias = tuple[str, tuple[object, ...]]
 """A method of the Master API, and its arguments after the caller id."""
 
@@ -88,19 +88,19 @@ class Registrations:
         self._environment = environment
         self._tables = tables
         self.rpc = rpc
-        # If no thread can be started, the functions stay queued, and the watch continues.
+        # If no thread can be started, keep the functions queued, and continue to watch the master.
         self._again = InOrder(workers)
         self.watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
-        """The object registered with the master, keyed by kind and name; None if the call failed or has no response yet."""
+        """The objects registered with the master, keyed by kind and name; None marks a call that failed or is in progress."""
         self.taken: set[_Key] = set()
-        """Services that another node has registered since, so that the master's entry belongs to that node."""
+        """Services that another node has registered since, so the master's entry is that node's."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
-        self._answered = 0.0  # time of the master's last response, by the loop's clock
+        self._answered = 0.0  # time of the master's last response, on the loop's clock
         self._closed = False
 
     def watch(self) -> None:
@@ -108,10 +108,10 @@ class Registrations:
         self.watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
-        """Unregister everything and register nothing more. The first call is sent before anything else is done.
+        """Unregister everything, and refuse further registrations. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
+        response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this is slow.
         """
         self._closed = True
         if self.watching:
@@ -147,7 +147,7 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> object:
-        """Look up this node's address, or one of its services' addresses.
+        """Look up the address of this node or of one of its services.
 
         Raise MasterUnreachableError or RpcError if the look-up fails.
         """
@@ -157,12 +157,12 @@ class Registrations:
             self._is_master_silent = True
             raise MasterUnreachableError(self._environment.master_uri) from error
         if self._closed:
-            # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the response.
+            # Before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the response.
             raise asyncio.CancelledError
         return found
 
     def request_again(self, topic: str) -> None:
-        """Register a subscription again, because the last list of publishers from the master may be outdated."""
+        """Register a subscription again, because the publishers last received from the master may be outdated."""
         key = ("Subscriber", topic)
         if self._known.get(key):
             self._known[key] = None
@@ -192,8 +192,8 @@ class Registrations:
     def _has_registered(self, task: asyncio.Task[None]) -> None:
         self._registering.discard(task)
         if not task.cancelled():
-            # Retrieve the task's error, because asyncio logs unretrieved ones. A waiting caller also receives the
-            # error; without a caller it is ignored, because the call is retried.
+            # Retrieve the task's exception, because asyncio logs exceptions that are never retrieved.
+            # A caller that is waiting also receives it. Otherwise it is ignored: the call will be retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -208,7 +208,7 @@ class Registrations:
                 self._known[key] = None
                 method, args = self._unregistration(key)
                 await self.call(method, *args)
-                # The check after a master's restart may have removed the entry already.
+                # The check after a master's restart may already have removed the entry.
                 self._known.pop(key, None)
 
     def _wanted(self, key: _Key) -> _Part | None:
@@ -264,7 +264,8 @@ class Registrations:
             try:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
-                        # As in ROS, a service belongs to the node that registered it last, so this entry tells us nothing.
+                        # As in ROS, a service belongs to the node that registered it last.
+                        # The entry therefore says nothing about this node's registration.
                         self.taken.add(asked)
                         continue
                 else:
@@ -275,8 +276,8 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # A missing entry proves nothing if it has been unregistered since, or if the name is illegal, because
-                # the master always refuses illegal names.
+                # A missing entry proves nothing if the name has been unregistered since.
+                # It also proves nothing for an illegal name, which the master always refuses.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
             except RpcError as error:
@@ -293,8 +294,7 @@ class Registrations:
                 for function in self.when_registered_again:
                     self._again.start(function)
             elif has_forgotten:
-                # Log this only once per master: from now on, the master no longer counts as one that had registered
-                # this node.
+                # Log this only once per master: after this, the node counts as never registered with this master.
                 _log.warning("the master does not know this node, and refuses to")
 
     async def register_all(self, *, again: bool = False) -> None:
@@ -303,7 +303,7 @@ class Registrations:
         for key in dict.fromkeys([*keys, *self._known]):
             if key in self.taken and self._wanted(key):
                 continue
-            # A registration that the master never accepts must not block the others.
+            # One registration that the master always refuses must not block the others.
             try:
                 await self.update(key, again=again)
             except RpcError as error:
@@ -311,7 +311,7 @@ class Registrations:
 
     async def _unregister_all(self, *, announces: bool) -> None:
         """Unregister everything that the node has registered with the master, in as few calls as possible."""
-        # If a name has a call in progress, unregister it after that call, which might otherwise register it again.
+        # If a call for a name is in progress, unregister the name after that call, which could otherwise register it again.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
         calls = [self._unregistration(key) for key in self._known if key not in under_way]
         calls += [("unsubscribeParam", (self.uri, parameter)) for parameter in self.parameters]
@@ -375,7 +375,7 @@ class Registrations:
             if not isinstance(answers, list) or len(answers) != len(part):
                 answers = [None] * len(part)
             for (method, args), answer in zip(part, answers, strict=True):
-                # Call the methods individually if the batch failed, for example because it was too long.
+                # If the batch fails, for example because it is too long, make the calls one by one.
                 if not isinstance(answer, list):
                     with contextlib.suppress(RpcFault, RpcProtocolError, RpcRefused):
                         await self.call(method, *args)

@@ -59,7 +59,7 @@ class ServiceClient:
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
-        # Serialize before connecting, so that the header has arrived when the server first reads from the connection.
+        # Serialize before connecting: the server then finds the header on its first read from the connection.
         header = serialize_header(fields)
         self._sock = _connected(parse_service_uri(uri), timeout, same_host=same_host)
 
@@ -83,8 +83,7 @@ class ServiceClient:
         responses need only one wait. If the server sends no header, it has not started to process the request.
         """
         try:
-            # Do this only on a Unix socket, because only minirospy's servers use those: rospy may lose data that
-            # arrives together with a header.
+            # Only do this on a Unix socket, which only minirospy uses: rospy may lose data that arrives together with a header.
             if request is not None and len(request) < _RECEIVE and self._sock.family not in sockets.FAMILIES:
                 self._send(request)
                 self._is_asked = True
@@ -115,8 +114,8 @@ class ServiceClient:
 
     def has_ended(self) -> bool:
         """Return whether the server has disconnected and would not read another request."""
-        # A server sends data only in response to requests, so a readable socket means end of file. The poll object is
-        # reused, because each call does this check.
+        # A server sends data only in response to requests, so a readable socket means end of file.
+        # Reuse the poll object, because each call does this check.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:
@@ -203,7 +202,7 @@ class Reader:
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # The peer closed a connection with unread data, which also counts as end of file.
+            # The peer closed the connection with unread data, which also counts as end of file.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:
@@ -235,7 +234,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
         sockets.tune(sock)
         return sock
 
-    # The URI contains an IP address, as most service URIs do, so no resolver is needed.
+    # If the URI contains an IP address, as most service URIs do, no resolver is needed.
     sock = socket.socket()
     try:
         sockets.tune(sock)

@@ -48,7 +48,8 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 Handler = Callable[[memoryview, Header], bytes]
-"""A function from the request's bytes and the client's header to the response's bytes. It may raise ServiceException.
+"""A function that takes the request's bytes and the client's header, and returns the response's bytes. It may raise
+ServiceException.
 
 Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays open.
 """
@@ -107,7 +108,7 @@ class ServiceServer:
         return None
 
     async def _refuse_call(self, sock: socket.socket, error: Exception) -> None:
-        """Respond to a client's call with the reason for refusing it, after the client's header was accepted."""
+        """Respond to a client's call with the reason for refusing it; the client's header has already been accepted."""
         try:
             head = await asyncio.wait_for(_receive(sock, REQUEST_HEAD), sockets.HANDSHAKE_SECONDS)
             length = parse_request_head(head)
@@ -119,7 +120,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Stop serving. Clients with a call in progress still get their responses; all other clients are disconnected."""
+        """Stop serving. Calls in progress still get their responses; all other clients are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:
@@ -160,7 +161,7 @@ class ServiceServer:
             raise WireError(f"no memory for a request of {size} bytes") from None
 
     def _client_failed(self, error: OSError | WireError, fields: Header) -> None:
-        """Log why a client was disconnected; if the client simply disconnected, log at level debug."""
+        """Log why a client was disconnected. If it disconnected by itself, log at level debug."""
         is_refused = isinstance(error, WireError) and not isinstance(error, PeerEndedError)
         log = self._refusals.warning if is_refused else _log.debug
         log("service %s: client %s is disconnected: %s", self.name, fields.get("callerid"), error)
@@ -182,7 +183,7 @@ class ServiceServer:
         except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
             text = type(error).__name__
         if not isinstance(error, Exception):
-            # str(error) may be empty or only a number, so prepend the exception's type.
+            # str(error) may be empty or just a number, so prepend the exception's type.
             text = f"{type(error).__name__}: {text}".removesuffix(": ")
         return serialize_failure(ServiceException(f"error processing request: {text}"))
 
@@ -248,11 +249,11 @@ class LoopServiceServer(ServiceServer):
         try:
             return serialize_response(await self._async_handler(request, fields))
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
-            # asyncio would end the loop, and with it everything that the node does, if a task raised SystemExit.
+            # A task that raises SystemExit would end the asyncio loop, and with it everything that the node does.
             return self._failure(error)
         except asyncio.CancelledError:
-            # Either this task was cancelled, or an operation that the handler awaited; only Python 3.11 and later can
-            # distinguish the two.
+            # Either this task or an operation that the handler awaited was cancelled.
+            # Only Python 3.11 and later can tell the two apart.
             if not self._closed:
                 _log.error("service %s: the handler of a call was cancelled", self.name)
                 with contextlib.suppress(OSError):
@@ -343,7 +344,7 @@ def _never_called(_: memoryview, __: Header) -> bytes:
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:
-    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer closes earlier."""
+    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer closes the connection before that."""
     loop = asyncio.get_running_loop()
     try:
         buffer = bytearray(count)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SlaveApi", "connection_text"]
 
-# Matches the shutdown reason that rosmaster and minirospy's master send when another node takes over the name
+# Matches the shutdown reason that rosmaster and minirospy's master send to a node whose name another node has taken over
 _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 
 
@@ -117,7 +117,7 @@ class SlaveApi:
         subscriptions = [
             [
                 subscription.topic,
-                # The number of lost messages is unknown, which is reported as -1.
+                # The number of lost messages is unknown; report it as -1.
                 [[link.number, link.received_bytes, link.received, -1, True] for link in subscription.links],
             ]
             for subscription in list(self._node.subscriptions.values())
@@ -218,7 +218,7 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
             kind = type(entry).__name__
             return [ERROR, f"Error: invalid arguments: {kind!r} object is not subscriptable", []]
         if isinstance(entry, dict):
-            # XML-RPC keys are strings, so rospy fails with this message when it looks up the key 0.
+            # XML-RPC keys are strings, so rospy's look-up of the key 0 fails with this message.
             return [FAILURE, "Internal failure: 0", []]
         if not entry:
             kind = "list" if isinstance(entry, list) else "string"
@@ -229,6 +229,6 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
 
 
 def connection_text(link: InLink | OutLink) -> str:
-    """Return a connection's description; `rosnode info` prints its numbers. For a Unix socket it has no port."""
+    """Return a connection's description, from which `rosnode info` prints the ports. A Unix socket has no port."""
     on = f" on port {link.local_port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

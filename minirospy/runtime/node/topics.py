@@ -52,11 +52,10 @@ _log = logging.getLogger(__name__)
 
 SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a master that has lost its state
 
-# Number of failures after which a publisher that refuses connections is reported; one that is shutting down has
-# exited before that
+# Number of failures before a publisher that refuses connections is reported; one that is shutting down is gone by then
 _WARN_AFTER = 3
 
-# maximum number of log lines about publishers with invalid responses; the rest are only counted
+# maximum number of log lines about publishers that send invalid responses; further ones are only counted
 _REFUSALS_LOGGED = 10
 
 # seconds within which a publisher's unreachable topics are combined in one log line
@@ -67,12 +66,12 @@ _LEAVE_SECONDS = 10.0
 _WORKED_SECONDS = 5.0
 
 Deliver = Callable[[Frame, Header], None]
-"""A function that is called with each message's bytes, and its publisher's connection header."""
+"""A function that is called with each message's bytes and the publisher's connection header."""
 
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options to deliver a subscription's messages, of up to ``most`` bytes, in steps on the loop. ``start`` runs the steps.
+    """Options to deliver a subscription's messages of up to ``most`` bytes in steps on the loop. ``start`` runs the steps.
 
     A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """
@@ -108,7 +107,7 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[OutLink, ...] = ()
-        # Total bytes of the messages that had a subscriber, including length prefixes; each message counts once
+        # Total bytes of the messages that had any subscriber, including length prefixes; each message counts once
         self.sent_bytes = 0
         # number of subscribers that the master listed when the publication was registered
         self.expected = 0
@@ -124,7 +123,7 @@ class Publication:
     def publish(self, frame: bytes | LargeFrame) -> None:
         """Send one frame to every subscriber."""
         if self.latch:
-            # Ensure that a subscriber that connects now receives the frame exactly once: either here or in accept().
+            # A subscriber that connects now must receive the frame exactly once, either here or in accept().
             with self._latch_lock:
                 self._latched = frame
                 links = self.links
@@ -139,7 +138,7 @@ class Publication:
                 link.wait()
 
     def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Reply to a subscriber's header as node ``caller_id`` and start sending to it. If refused, return the reason.
+        """Reply as node ``caller_id`` to a subscriber's header and start sending to it. If refused, return the reason.
 
         Call this on the loop.
         """
@@ -162,11 +161,10 @@ class Publication:
 
         for other in self.links:
             if other.peer == link.peer and other.waiting:
-                # A node connects only once per topic, so it has lost the old link, and no longer receives frames on
-                # it.
+                # A node has only one connection per topic, so it has lost the old link and no longer receives frames on it.
                 other.close()
-        # A subscriber that has received the header expects all messages published after that, so the link accepts
-        # frames before the header is sent.
+        # A subscriber that has received the header expects all messages published from then on.
+        # The link must therefore accept frames before the header is sent.
         with self._latch_lock:
             self.links += (link,)
             latched = self._latched if self.latch else None
@@ -211,7 +209,7 @@ class InLink:
     latched: Frame | None = None  # the last message from a latching publisher
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
-    # True if the publisher was removed from the master's list and added again while the link was open
+    # True if the master's list dropped the publisher and listed it again while the link was open
     returned: bool = False
 
     @property
@@ -245,14 +243,14 @@ class Unreachable:
     """
 
     def __init__(self) -> None:
-        # A list may contain a thousand publishers that refuse: logging all of them would block the loop for 0.2 s.
+        # A list may contain a thousand publishers that refuse; logging them all would block the loop for 0.2 s.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """Dict from a publisher's URI to its topics, and to the error and the advice for the first topic."""
+        """For each publisher, by URI: its topics, and the error and the advice for the first topic."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher after a moment, in one line with its other unreachable topics."""
+        """Log an unreachable publisher after a short delay, in one line with its other unreachable topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
@@ -323,7 +321,7 @@ class Subscription:
         self._header_memory = header_memory
         self._on_loop = on_loop or isinstance(deliver, InTurns)
 
-        self.lists = 0  # number of lists of publishers received
+        self.lists = 0  # number of publisher lists received
         self.plan = SubscriptionPlan()
         self._named: list[str] = []
         self.settling: asyncio.TimerHandle | None = None
@@ -337,7 +335,7 @@ class Subscription:
         self.on_connected: list[Callable[[], object]] = []  # called on the loop when a publisher is connected
         self.on_ended: list[
             Callable[[], object]
-        ] = []  # called on the loop when the connection to a publisher has ended
+        ] = []  # called on the loop when a connection to a publisher has closed
         self._closed = False
 
     @property
@@ -412,7 +410,7 @@ class Subscription:
         task = self.connecting.pop(uri, None)
         if task:
             task.cancel()
-        # Remove the link immediately: it closes only when its reader has detected the end of the connection.
+        # Remove the link immediately; it does not close until its reader has detected the end of the connection.
         link = self._links.pop(uri, None)
         if link:
             link.close()
@@ -458,8 +456,8 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and it may be the last one, so retry now: the publisher may
-                # accept.
+                # A newer list arrived after this refusal, and it may be the last one.
+                # Retry now, because the publisher may accept.
                 self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
@@ -467,8 +465,7 @@ class Subscription:
             self.retry(uri, error)
         else:
             if self._closed or self.connecting.get(uri) is not asyncio.current_task():
-                # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the last
-                # byte.
+                # Before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the last byte.
                 link.sock.close()
                 return
 
@@ -517,7 +514,7 @@ class Subscription:
                 self.type,
                 self._caller_id,
                 tcp_nodelay=self.tcp_nodelay,
-                # Send peers on other hosts only ROS 1's header fields.
+                # Send only ROS 1's header fields to peers on other hosts.
                 split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
             )
             await tcp.send_header(sock, fields)
@@ -526,7 +523,7 @@ class Subscription:
         except BaseException:
             sock.close()
             raise
-        # Like rospy, include the sent header in the count.
+        # Like rospy, count the sent header as well.
         link = InLink(uri, address, sock, header, received_bytes=len(serialize_header(fields)))
         # Third-party nodes omit the topic, but user code reads it.
         header.setdefault("topic", self.topic)
@@ -538,8 +535,8 @@ class Subscription:
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # Connecting to the Unix socket failed, so the two processes are isolated from each other, for example by
-            # a sandbox: use TCP.
+            # The Unix socket does not connect: the processes are isolated from each other, for example by a sandbox.
+            # Use TCP.
             host, port = unix.host, unix.port
         else:
             host, port = _tcpros_address(answer, uri, self.topic)
@@ -554,7 +551,7 @@ class Subscription:
             deliver(frame, header)
 
         def on_latched_frame(frame: Frame) -> None:
-            # Copy a small frame, because it is in a buffer that the next receive overwrites.
+            # Copy a small frame, because the next receive overwrites its buffer.
             link.latched = frame if len(frame) > CHUNK else bytes(frame)
             on_frame(frame)
 
@@ -568,7 +565,7 @@ class Subscription:
         except (OSError, WireError) as error:
             link.fault = error
         except MemoryError:
-            # There is not enough memory for the message, or for an object that a callback allocates.
+            # There is not enough memory for the message or for an object that a callback allocates.
             link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):
@@ -585,13 +582,12 @@ class Subscription:
         del self._links[link.uri]
         self._notify_ended()
         if link.returned:
-            # The closed connection belonged to the publisher's previous registration; connect to its current one
-            # immediately.
+            # The closed connection belonged to the publisher's previous registration; connect to its current one now.
             self.start_connecting(Connect(link.uri))
             return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
-            # Log one line and disconnect, because everything after the error in such a stream is also invalid.
+            # Log one line and disconnect: after an error, the rest of the stream is invalid, too.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
             self.plan.worked(link.uri)
@@ -612,8 +608,8 @@ class Subscription:
             return
 
         nameless = isinstance(cause, socket.gaierror)
-        # Publishers that are shutting down refuse or disconnect, so report other errors immediately: a timeout
-        # indicates a wrong address or a firewall.
+        # Publishers that are shutting down refuse connections or disconnect.
+        # Report all other errors immediately: a timeout indicates a wrong address or a firewall.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self.plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
@@ -622,7 +618,7 @@ class Subscription:
 
 
 def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return advice: the host that has the wrong address, and the variable that sets it."""
+    """Return advice that names the host with the wrong address, and the variable that sets the address."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     if isinstance(error, RpcTimeout):
@@ -654,7 +650,10 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
 
 
 class _NoPublisher(WireError):
-    """The response cannot come from a publisher. A retry would fail again, and rospy does not retry either."""
+    """The response cannot come from a publisher.
+
+    Do not retry, because a retry would fail again; rospy does not retry either.
+    """
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:

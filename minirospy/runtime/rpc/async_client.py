@@ -37,14 +37,14 @@ KEEP_SECONDS = 10.0
 # 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
 
-# Matches nearly all node URIs and avoids a complete parse, which costs as much as the call
+# Matches nearly all node URIs, and saves a complete parse, which costs as much as the call
 _USUAL_URI = re.compile(r"http://([A-Za-z0-9._-]+):([1-9][0-9]{0,3}|[1-5][0-9]{4})(/[A-Za-z0-9._/-]*)?")
 
 _Address = tuple[str, int]
 
 
 class AsyncRpcClient:
-    """Calls methods on any server; a few connections to each server stay open for a while and are reused."""
+    """Calls methods on any server. A few connections to each server stay open for a while to be reused."""
 
     def __init__(self, *, same_host: bool = True, max_answer: int = MAX_BODY) -> None:
         """Create the client.
@@ -127,7 +127,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Remove a connection that has closed from the idle ones."""
+        """Remove a closed connection from the idle ones."""
         connection.close()
         kept = self.idle[connection.address]
         kept.remove(connection)
@@ -135,7 +135,7 @@ class AsyncRpcClient:
             del self.idle[connection.address]
 
     def _close_idle(self) -> None:
-        """Close connections that have not been used for a while, because each may occupy a thread in the server."""
+        """Close connections that have not been used for a while, because each one may occupy a thread of the server."""
         loop = asyncio.get_running_loop()
         end = loop.time() - KEEP_SECONDS / 2
         for connection in [each for kept in self.idle.values() for each in kept if each.used < end]:
@@ -155,8 +155,7 @@ class _Connection:
         self._loop = loop
         self.sock = sock
         self.address = address
-        # Register the file descriptor and not the socket: asyncio formats an unregistered socket as a string, which
-        # is slow.
+        # Register the file descriptor instead of the socket: asyncio formats an unregistered socket as a string, which is slow.
         self._fd = sock.fileno()
         self.call: Call | None = None
         self.reader = HttpReader(client.max_answer)
@@ -174,7 +173,7 @@ class _Connection:
         self._loop.add_writer(self._fd, function)
 
     def stop_writing(self) -> None:
-        """Stop calling the function that :meth:`write_on` has registered."""
+        """Stop calling the function that :meth:`write_on` registered."""
         self._loop.remove_writer(self._fd)
 
     def close(self) -> None:
@@ -280,11 +279,11 @@ class Call:
             self._end()
 
     def end_late(self) -> None:
-        """Fail the call because its time limit has passed."""
+        """Fail the call because its time limit has expired."""
         self.fail(TimeoutError("timed out"))
 
     def fail(self, error: Exception) -> None:
-        """Fail the call, and report the error. Idempotent."""
+        """Fail the call with an error. Idempotent."""
         if not isinstance(error, TimeoutError | asyncio.TimeoutError):
             unreachable = RpcUnreachable(self._uri, explain(error) or "the connection was closed")
         elif self._connection and not self._left:
@@ -309,7 +308,7 @@ class Call:
             self._answered(messages[0], is_all=len(messages) == 1 and reader.is_idle)
 
     def broken(self, error: Exception) -> None:
-        """Close this connection and try another one."""
+        """Close this connection and try another."""
         self._close()
         if self._is_kept and isinstance(error, ConnectionError | EOFError):
             # The peer has closed this idle connection, so retry on a new one.
@@ -366,8 +365,7 @@ class Call:
                 self.fail(error)
             else:
                 if not self._done:
-                    # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the
-                    # connection.
+                    # Before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the connection.
                     sock.close()
                     return
                 self._use(self._connected_by(sock))
@@ -385,7 +383,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """Send now if the peer is on this machine. Such a connection is open before the loop reports it."""
+        """Send now if the peer is on this machine: such a connection is open before the loop reports it."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)
@@ -419,7 +417,7 @@ class Call:
     def _sent(self, count: int) -> None:
         assert self._connection
         if count < len(self._left):
-            # Slice a view, without copying: a Unix socket accepts a large request in many pieces.
+            # Slice a view to avoid copying: a Unix socket accepts a large request in many pieces.
             self._left = memoryview(self._left)[count:]
             self._write_on(self._send)
         elif self._next < len(self._request):

@@ -1,4 +1,4 @@
-"""A blocking XML-RPC client: it works in the caller's thread and imports no asyncio."""
+"""A blocking XML-RPC client. It works in the caller's thread and does not import asyncio."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
-# Seconds; the kernel accepts connections even for a busy program, so a server that takes longer is considered
-# unreachable
+# Seconds; the kernel accepts connections even for a busy program, so a slower server counts as unreachable
 _CONNECT_SECONDS = 5.0
 
 
@@ -67,7 +66,7 @@ class RpcClient:
             sock = None
         try:
             if sock is not None:
-                # The peer may have closed an idle connection in the meantime: retry on a new one.
+                # The peer may have closed an idle connection in the meantime, so retry on a new one.
                 with contextlib.suppress(ConnectionError, EOFError):
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)

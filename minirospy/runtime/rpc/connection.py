@@ -36,18 +36,19 @@ __all__ = ["Connection", "State"]
 
 _log = logging.getLogger(__name__)
 
-REQUEST_SECONDS = 30.0  # time limit for receiving a started request, and for the client to read an answer
+# time limit for receiving a request that has started, and for the client to read a response
+REQUEST_SECONDS = 30.0
 
 _LINGER_SECONDS = 2.0
 """Keep reading from a refused client for this many seconds; closing earlier resets the connection, and the response is lost."""
 
-_SHORT_BODY = 4096  # bytes; a longer request is read in steps
+_SHORT_BODY = 4096  # bytes; a longer body is read in steps
 
-# Bytes; requests longer than this are read one at a time, because their values may take several times as much memory.
+# Bytes; requests longer than this are processed one by one, because their values may take several times as much memory.
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (
-    # transferred bytes that restart the time limit, because a slow radio link needs long for a large value
+    # transferred bytes after which the time limit starts again, because a large value takes long on a slow radio link
     65536
 )
 
@@ -99,7 +100,7 @@ class Connection:
         self._state: State = _OPEN
 
         self._out = Outbox(sock)
-        # The next request to process. Other requests that arrived with it are still unparsed bytes.
+        # The next request to process. Further requests that arrived with it are still unparsed bytes.
         self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
@@ -110,10 +111,10 @@ class Connection:
         # The steps that process a long request, and the bytes of its body.
         self._work: Steps[None] | None = None
         self._work_bytes = 0
-        # The work changes state, so it is finished even if the client no longer waits for the response.
+        # The work changes state, so finish it even if the client no longer waits for the response.
         self._must_finish = False
         self._held = 0
-        # Set while the socket is read in steps.
+        # Set while the socket is being read in steps.
         self._reading: object | None = None
 
         loop.add_reader(self._fd, self.readable)
@@ -137,7 +138,7 @@ class Connection:
         self._enter(Event.END)
 
     def _enter(self, event: Event) -> bool:
-        """Make the state transition for this event, if there is one, and start or stop reading accordingly.
+        """Make the state transition for an event, if there is one, and start or stop reading accordingly.
 
         Return whether the state changed.
         """
@@ -207,7 +208,7 @@ class Connection:
             return b""
 
     def readable(self) -> None:
-        """Read, unless it is the turn of other connections; then the loop calls this again in its next iteration."""
+        """Read, unless other connections have their turn; the loop then calls this again in its next iteration."""
         if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 
@@ -221,7 +222,7 @@ class Connection:
         self._server.turns.start(self._read_much(reading))
 
     def _read_much(self, reading: object) -> Steps[None]:
-        """Read until nothing is left to read, or until other code has stopped or restarted reading."""
+        """Read until no data is left, or until other code has stopped or restarted reading."""
         while self._reading is reading:
             data = self._receive(_RECEIVE if self._reader.in_chunks else _RECEIVE_MORE)
             if data is None:
@@ -246,7 +247,7 @@ class Connection:
             return
 
         if self._state is _REFUSED:
-            # The client was refused, so ignore all data from now on.
+            # The client was refused: ignore all data from now on.
             if not data:
                 self.end()
             return
@@ -254,7 +255,7 @@ class Connection:
         if data:
             self._server.connections.move_to_end(self)
             if data.endswith(_END_OF_HEAD):
-                # Python clients send the body right after the head, so usually it has arrived by now.
+                # Python clients send the body right after the head, so it has usually arrived by now.
                 data += self._receive() or b""
             self.received(data)
         elif not self._out or not self._enter(Event.END_OF_FILE):
@@ -286,7 +287,7 @@ class Connection:
             self._set_deadline()
 
     def _answer(self, message: HttpMessage) -> None:
-        """Respond to a request immediately, or start a task or steps if that takes longer."""
+        """Respond to a request immediately, or start a task or steps if that would take longer."""
         if message.method != "POST":
             self.refuse(405, "this is an XML-RPC server: send POST")
             return
@@ -473,7 +474,7 @@ class Connection:
         self._server.limit_unread()
 
     def _count_unread(self, more: int) -> None:
-        """Add ``more``, which may be negative, to the number of response bytes that the client has not read."""
+        """Add ``more`` (which may be negative) to the number of response bytes that the client has not read."""
         self._server.unread += more
         if not self._out:
             self._server.slow.pop(self, None)

@@ -4,7 +4,7 @@ How it works
 ------------
 An event leads from one state to the next; an event that the table does not contain for a
 state changes nothing. The state decides whether requests are read, so the shell,
-:mod:`minirospy.runtime.rpc.connection`, starts and stops reading on a transition only. All other data of a connection
+:mod:`minirospy.runtime.rpc.connection`, starts and stops reading only on a transition. All other data of a connection
 belongs to the current request or to the output, and may exist in any state:
 
 - the request: received bytes, the next message, the task or steps that process it. Refusing or closing discards them.
@@ -34,7 +34,7 @@ class State(Enum):
     REFUSED = "received bytes are ignored, until the client closes the connection or the time is over"
     ENDED = "the socket is closed"
 
-    # use object's hash, because Enum's is a Python function that takes longer than a transition
+    # use object's hash: Enum's is a Python function that takes longer than a whole transition
     __hash__ = object.__hash__
 
 

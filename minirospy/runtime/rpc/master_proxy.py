@@ -18,7 +18,7 @@ __all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_
 
 
 class SystemState(NamedTuple):
-    """Publishers, subscribers and service providers: for each, a dict from topic or service name to node names."""
+    """The publishers, subscribers and service providers, each as a dict from topic or service name to node names."""
 
     publishers: dict[str, list[str]]
     subscribers: dict[str, list[str]]
@@ -52,7 +52,7 @@ def unwrap(method: str, answer: object) -> Any:
 
 
 def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
-    """Return the error for a failed call to the master: it does not respond, or this process can open no more sockets."""
+    """Return the error for a failed call to the master: either it does not respond, or this process has run out of sockets."""
     cause = error.__cause__
     if isinstance(error, RpcTimeout):
         return MasterUnreachableError(error.uri, cause=f"{error.why}; {SUSPENDED}")

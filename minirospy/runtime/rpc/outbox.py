@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 __all__ = ["MAX_UNREAD", "Outbox"]
 
-MAX_UNREAD = 256 * 1024  # bytes; a client with more unread bytes gets no further responses
+MAX_UNREAD = 256 * 1024  # bytes; a client that has not read this much gets no further responses
 
 
 class Outbox:

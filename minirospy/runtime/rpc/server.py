@@ -32,12 +32,12 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
-# Maximum total bytes of all clients' incomplete requests and those being read; beyond that the largest are refused
+# Maximum total bytes of all clients' requests that are incomplete or being read; above it, the largest are refused
 MAX_HELD = 72 * 1024 * 1024
-LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are not refused because of MAX_HELD
+LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are never refused because of MAX_HELD
 
-# Maximum bytes of responses that all clients together have not read; beyond that, the client that has not read
-# anything for the longest time is disconnected
+# Maximum bytes of unread responses to all clients together.
+# Above it, disconnect the client that has gone longest without reading.
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 
 _BACKLOG = 4096
@@ -49,19 +49,18 @@ while connecting, then up to 25 s for its request.
 
 _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 1024, 0.015
 _READ_SECONDS = 0.003
-"""Seconds per loop iteration for reading from new connections immediately. The constants above limit how many connections are
-accepted per iteration, and the seconds that accepting may take.
+"""Seconds per loop iteration for reading from connections that were just accepted. The constants above limit how many
+connections are accepted per iteration, and for how many seconds.
 
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
-_ACCEPTS_BETWEEN = 64  # connections to accept before reading from accepted ones
+_ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from them
 
-# Connections to read from before accepting new ones, which takes some 1 ms; thousands may be readable together
+# Number of connections to read before accepting new ones, which takes some 1 ms; thousands may be readable together
 _READS_AT_ONCE = 16
 
-# Maximum number of connections to read from per loop iteration, and the maximum seconds for that; the rest are read
-# first in the next iteration
+# Maximum number of connections to read per loop iteration, and the maximum seconds; the rest are read first in the next one
 _MAX_READS, _READS_SECONDS = 256, 0.01
 
 
@@ -82,7 +81,7 @@ class RpcServer:
         bind_host: str = "127.0.0.1",
         port: int = 0,
         ports: range | None = None,
-        most_idle: int | None = None,
+        max_idle: int | None = None,
         access: Access | None = None,
         known_as: Iterable[str] = (),
     ) -> None:
@@ -90,7 +89,7 @@ class RpcServer:
 
         ``known_as``: host names by which processes on this machine may connect through a Unix socket.
 
-        The ``most_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
+        The ``max_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
         disconnected.
         """
         self.dispatch = dispatch
@@ -107,21 +106,21 @@ class RpcServer:
 
         self._bind_host = bind_host
         self._ports = ports
-        self._most = most_idle
+        self._most = max_idle
         # If only few clients may stay connected, clients that are accepted together may displace each other, so read
         # from each first.
-        self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
+        self._reads_all = max_idle is not None and max_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None
         self._listening: list[socket.socket] = []
-        # Sockets on which accepting is paused briefly.
+        # Sockets on which accepting is briefly paused.
         self._resting: set[socket.socket] = set()
-        # Number of connections read from in this loop iteration, the deadline for reading, and whether it has passed.
+        # Number of connections read in this loop iteration, the deadline for reading, and whether the deadline has passed.
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
-        # Connections to read in the next iteration: new ones, and those that have made a request before.
+        # Connections to read in the next iteration: new ones, and those that have already made a request.
         self._late_new: OrderedDict[Connection, None] = OrderedDict()
         self._late: OrderedDict[Connection, None] = OrderedDict()
 
@@ -147,7 +146,7 @@ class RpcServer:
         try:
             # Accepted sockets inherit this option from the listening one.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            # Listen here, because two sockets may be bound to one port as long as neither listens.
+            # Listen here, because two sockets may be bound to the same port as long as neither listens.
             sock.listen(_BACKLOG)
         except BaseException:
             sock.close()
@@ -187,7 +186,7 @@ class RpcServer:
         asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
     def admit(self, connection: Connection, *, is_new: bool) -> bool:
-        """Return whether to read from a readable connection now. If not, it is read in the next iteration.
+        """Return whether a readable connection should be read now. If not, it is read in the next iteration.
 
         ``is_new``: the connection has made no request yet.
         """
@@ -197,7 +196,7 @@ class RpcServer:
         return False
 
     def drop_late(self, connection: Connection) -> None:
-        """Cancel the read of a connection that is scheduled for the next iteration. Idempotent."""
+        """Cancel the read of a connection, if one is scheduled for the next iteration. Idempotent."""
         self._late_new.pop(connection, None)
         self._late.pop(connection, None)
 
@@ -226,8 +225,8 @@ class RpcServer:
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate between new and other connections (idle ones that disconnect, and busy ones), so that many
-            # connections of one kind do not delay the other kind.
+            # Alternate between new and other connections, so that many of one kind do not delay the other kind.
+            # The others are idle ones that disconnect, and busy ones.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:
@@ -252,8 +251,7 @@ class RpcServer:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                # There are no free file descriptors: close the connection that has been silent for the longest time,
-                # and retry a moment later.
+                # No file descriptors are free: close the connection that has been silent longest, and retry a moment later.
                 self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)
@@ -284,7 +282,7 @@ class RpcServer:
     def log_refusal(self, sock: socket.socket, why: str) -> None:
         """Log a refused request, with a rate limit."""
         try:
-            # A peer connected by a Unix socket has no address.
+            # A peer that is connected by a Unix socket has no address.
             name = sock.getpeername()[0] if sock.family in sockets.FAMILIES else "this machine"
         except OSError:
             name = "a client"
@@ -307,7 +305,7 @@ class RpcServer:
             slowest.end()
 
     def _end_longest_silent(self) -> None:
-        """Close a connection that has been silent for a long time, preferably an idle one."""
+        """Close the connection that has been silent longest; prefer one with no call in progress."""
         longest_silent = list(islice(self.connections, 20))
         if longest_silent:
             next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()

@@ -1,4 +1,4 @@
-"""Run long work on the event loop, for a few milliseconds in each iteration, so that other work is not delayed."""
+"""Run long work on the event loop, a few milliseconds per iteration, so that it does not delay other work."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 _SECONDS = 0.003  # time limit in seconds per loop iteration for all work together
 
-_PAUSE = 0.005  # seconds to pause while all remaining work is blocked
+_PAUSE = 0.005  # seconds to pause if all remaining work is blocked
 
 # maximum number of generators in progress; those not started yet take hardly any memory
 _MAX_IN_PROGRESS = 16
@@ -30,7 +30,7 @@ class Turns:
         self._clock = clock
         self._queue: deque[Steps[None]] = deque()
         self._backlog: deque[Steps[None]] = deque()
-        # The generator that runs alone because it uses much memory, and those queued to run alone later.
+        # The generator that runs alone because it uses much memory, and those waiting to run alone.
         self._alone: Steps[None] | None = None
         self._waiting: deque[Steps[None]] = deque()
         self._running: Steps[None] | None = None
@@ -50,7 +50,7 @@ class Turns:
             if steps in queue:
                 queue.remove(steps)
         self._release(steps)
-        # A generator that cancels itself is in its last step and cannot be closed.
+        # A generator that cancels itself is executing its last step and cannot be closed.
         if steps is not self._running:
             steps.close()
 
@@ -88,7 +88,7 @@ class Turns:
         return self._clock() >= end
 
     def _run(self, steps: Steps[None], end: float) -> bool:
-        """Run ``steps`` until ``end``; return whether work remains."""
+        """Run ``steps`` until the time ``end``; return whether work remains."""
         self._running = steps
         try:
             while True:

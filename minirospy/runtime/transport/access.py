@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import UsageError
 
 if TYPE_CHECKING:
-    # Imported for type checking; at run time only if networks are given, which is rare.
+    # Imported for type checking. At run time it is imported only if networks are given, which is rare.
     from ipaddress import IPv4Network, IPv6Network
 
 __all__ = ["Access", "listening_lines"]
 
 
 class Access:
-    """Allows peers in the given networks, and this machine itself; if no network is given, allows all peers."""
+    """Allows this machine and the peers in the given networks. If no network is given, allows all peers."""
 
     def __init__(self, networks: Iterable[str] = ()) -> None:
         """Allow ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError if one is invalid."""
         self.networks = tuple(_network(text) for text in networks)
-        # Cached decisions, keyed by address. A robot has few peers, and they connect often.
+        # Cached decisions, keyed by address: a robot has few peers, and they connect often.
         self._known: dict[str, bool] = {}
 
     @classmethod
@@ -28,7 +28,7 @@ class Access:
         """Parse networks separated by commas or spaces; "" allows all peers. Raise UsageError if one is invalid."""
         networks = text.replace(",", " ").split()
         if text and not networks:
-            # The text may come from unset variables: an empty list must not allow all peers.
+            # The text may come from unset variables: a list that turns out empty must not allow all peers.
             raise UsageError(f"'{text}' names no network: write as 192.168.65.0/24, or an address")
         return cls(networks)
 

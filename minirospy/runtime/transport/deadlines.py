@@ -1,4 +1,4 @@
-"""Time limits for many operations that nearly always complete in time, with a single loop timer."""
+"""Time limits for many operations, nearly all of which complete in time. Uses a single loop timer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Deadlines(Generic[_T]):
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # The time at which the timer fires, no later than the earliest limit.
+        # The time at which the timer fires; no limit is earlier.
         self._next = 0.0
 
     def __len__(self) -> int:
@@ -38,7 +38,7 @@ class Deadlines(Generic[_T]):
             self._watch(loop, end)
 
     def drop(self, each: _T) -> None:
-        """Remove the limit of an operation that has completed. Idempotent."""
+        """Remove the limit of a completed operation. Idempotent."""
         self._ends.pop(each, None)
 
     def close(self) -> None:
@@ -61,12 +61,12 @@ class Deadlines(Generic[_T]):
         loop = asyncio.get_running_loop()
         now = loop.time()
 
-        # After a stall several limits may have passed: process them in order, not in the order of the calls to set().
+        # After a stall, several limits may have passed. Process them in order of the limits, not of the calls to set().
         late = sorted(
             (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
         )
         for end, _, each in late:
-            # The call for an earlier operation may have completed this operation, or extended its limit.
+            # The call for an earlier operation may have completed this operation or extended its limit.
             if self._ends.get(each) == end:
                 self.drop(each)
                 self._late(each)

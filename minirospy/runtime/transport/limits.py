@@ -22,8 +22,7 @@ def naming_thread_limit() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        # Let other errors pass: Python also raises RuntimeError here while it exits; since 3.13 it raises a separate
-        # class.
+        # Let other errors pass: Python also raises RuntimeError here while it exits (since 3.13, a subclass).
         if sys.is_finalizing() or type(error) is not RuntimeError:
             raise
         if "interpreter shutdown" in str(error):
@@ -32,7 +31,7 @@ def naming_thread_limit() -> Iterator[None]:
 
 
 def is_file_limit(error: BaseException | None) -> bool:
-    """Return whether an error means that this process or machine cannot open more files or sockets."""
+    """Return whether an error means that this process or machine has reached its limit of open files or sockets."""
     return isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE)
 
 
@@ -62,7 +61,7 @@ def _thread_limits() -> list[str]:
             limits.append(f"ulimit -v: {most // 1024} KiB")
     with contextlib.suppress(OSError, IndexError):
         group = Path("/proc/self/cgroup").read_text(encoding="utf-8").strip().rpartition("::")[2]
-        most_tasks = (_CGROUP / group.lstrip("/") / "pids.max").read_text(encoding="utf-8").strip()
-        if most_tasks != "max":
-            limits.append(f"pids.max of {group}: {most_tasks}")
+        max_tasks = (_CGROUP / group.lstrip("/") / "pids.max").read_text(encoding="utf-8").strip()
+        if max_tasks != "max":
+            limits.append(f"pids.max of {group}: {max_tasks}")
     return limits

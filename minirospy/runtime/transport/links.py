@@ -1,4 +1,4 @@
-"""The publisher's end of a link, which is the connection that carries a topic's frames. Any thread may write.
+"""The publisher's end of a link. A link is a connection that carries a topic's frames. Any thread may write.
 
 The subscriber's end is in :mod:`minirospy.runtime.transport.readers`.
 """
@@ -20,9 +20,9 @@ from minirospy.runtime.transport.sockets import FAMILIES, is_writable
 __all__ = ["OutLink"]
 
 _GATHER = 64
-# seconds during which a publishing thread itself writes a large message to the socket
+# seconds for which a publishing thread itself tries to write a large message to the socket
 _PUSH_SECONDS = 0.005
-_PUSH_WAIT_MS = 1  # milliseconds for each wait during that time
+_PUSH_WAIT_MS = 1  # milliseconds per wait during that time
 
 # a frame in an outbox: the whole frame, or the buffers that are not sent yet
 _Waiting = bytes | list[bytes | memoryview]
@@ -165,13 +165,12 @@ class OutLink:
         """Append ``frame`` to the outbox and return True. Return False if the outbox has become empty in the meantime."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
-            # Send from this thread, because a thread that publishes without pause would not let the loop's thread
-            # send.
+            # Send from this thread: a thread that publishes without pause would not let the loop's thread send.
             self._help()
             if not outbox:
                 return False
         if self._is_full():
-            # The first frame may have been partly sent, so it must not be dropped.
+            # The first frame may have been sent in part, so it must not be dropped.
             del outbox[1 if self._begun else 0]
             self.dropped += 1
         outbox.append(frame)
@@ -184,7 +183,7 @@ class OutLink:
         """Send as much as the socket accepts; if the outbox is full, wait briefly for space."""
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # Ignore errors, because the loop detects them.
+            # Ignore errors here; the loop detects them.
             with contextlib.suppress(OSError):
                 while self._outbox:
                     self._write_some()
@@ -204,8 +203,8 @@ class OutLink:
         left = size
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # A socket does not accept a large message in one call, but a peer that is reading frees space within
-            # microseconds. Handing each step to the loop would cost more than waiting here.
+            # A socket does not accept a large message in one call, but a reading peer frees space within microseconds.
+            # Waiting here is cheaper than handing each step to the loop.
             try:
                 left -= self._gather(buffers)
             except (BlockingIOError, InterruptedError):
@@ -274,7 +273,7 @@ class OutLink:
         """Send part of the queue. Raise OSError if the connection has failed."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
-            # A partly sent frame, or a large one, is sent separately, not together with small frames.
+            # Send a large frame, or one that was sent in part, on its own, not together with small frames.
             self._gather(outbox[0])
             self._begun = self._is_reading = True
             if not outbox[0]:

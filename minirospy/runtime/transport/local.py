@@ -20,7 +20,7 @@ __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answe
 PROTOCOL = "UNIXROS"
 _PREFIX = "minirospy-"  # the start of socket names
 
-TRUSTED_USERS = frozenset({0})  # user ids that are trusted in addition to this process's own: root
+TRUSTED_USERS = frozenset({0})  # ids of the users that are trusted in addition to this process's own: root
 
 
 class UnixAddress(NamedTuple):
@@ -32,7 +32,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return a string that is equal in two processes if and only if abstract sockets can connect them; "" if unsupported."""
+    """Return a string that two processes share if and only if abstract sockets can connect them; "" if unsupported."""
     if sys.platform != "linux":
         return ""
     try:
@@ -84,7 +84,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 def parse_answer(answer: object) -> UnixAddress | None:
     """Parse the address in a publisher's response to requestTopic. Return None if it is for another protocol."""
     match answer:
-        # A peer must not be able to choose any other socket on this machine, such as a display's or a message bus's.
+        # A peer must not be able to choose any other socket on this machine, for example a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
             return UnixAddress(name, host, port)
         case _:
@@ -96,8 +96,7 @@ def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.sock
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)
-        # A zero byte makes the socket abstract. Use UTF-8 in any locale, because the two processes may have different
-        # locales.
+        # A leading zero byte makes the socket abstract. Always use UTF-8, because the two processes may have different locales.
         use(sock, b"\0" + name.encode(errors="surrogatepass"))
     except BaseException:
         sock.close()

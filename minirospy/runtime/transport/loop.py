@@ -14,7 +14,7 @@ from minirospy.runtime.transport.limits import naming_thread_limit
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
-CLOSE_SECONDS = 2.0  # seconds that :meth:`LoopThread.close` waits for the loop's tasks to finish
+CLOSE_SECONDS = 2.0  # seconds for which :meth:`LoopThread.close` waits for the loop's tasks to finish
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:
@@ -31,7 +31,7 @@ class LoopThread:
 
     def __init__(self, name: str = "minirospy-loop") -> None:
         self.loop = new_event_loop()
-        # Use a reentrant lock: a signal handler may run while its own thread holds the lock.
+        # Use a reentrant lock: a signal handler may run while its thread holds the lock.
         self._lock = threading.RLock()
         self._is_ending = False
         self._end = asyncio.Event()
@@ -43,7 +43,7 @@ class LoopThread:
             self.loop.close()
             raise
         except BaseException:
-            # Ctrl-C arrived while the thread was starting; the thread closes the loop itself.
+            # Ctrl-C arrived while the thread was starting; the thread itself closes the loop.
             self.post(self._end.set)
             raise
 
@@ -73,7 +73,7 @@ class LoopThread:
 
             def has_ended(task: asyncio.Task[_T]) -> None:
                 if not task.cancelled():
-                    # Mark the exception as retrieved: an interrupted caller never retrieves it.
+                    # Mark the exception as retrieved, because an interrupted caller never retrieves it.
                     task.exception()
                 pending.release()
 
@@ -85,8 +85,9 @@ class LoopThread:
         return functools.partial(self._wait, tasks, pending)
 
     def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
-        # Do not use concurrent.futures.Future: the caller holds its lock during parts of the wait, and the loop needs
-        # that lock, so a signal handler that waits for the loop at such a moment would deadlock.
+        # Do not use concurrent.futures.Future.
+        # Its caller holds a lock during parts of the wait, and the loop needs that lock.
+        # A signal handler that waited for the loop at that moment would deadlock.
         try:
             if not pending.acquire(timeout=-1 if timeout is None else timeout):
                 raise TimeoutError
@@ -118,8 +119,7 @@ class LoopThread:
         finally:
             with self._lock:
                 self._is_ending = True
-            # Let posted calls become tasks here, and finished tasks report their results; otherwise callers would
-            # wait forever.
+            # Let posted calls become tasks and finished tasks report their results; otherwise callers would wait forever.
             self.loop.run_until_complete(asyncio.sleep(0))
             tasks = asyncio.all_tasks(self.loop)
             for task in tasks:

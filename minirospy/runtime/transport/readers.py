@@ -1,4 +1,4 @@
-"""The subscriber's end of a link, which is the connection that carries a topic's frames.
+"""The subscriber's end of a link. A link is a connection that carries a topic's frames.
 
 Frames are read in a worker (:func:`read_frames`) or on the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
 """
@@ -33,10 +33,10 @@ from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive,
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, if frames are read in turns
+_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, for frames that are read in steps
 
 _DRAIN_BYTES = 64 * 1024 * 1024
-# maximum bytes to allocate per receive, so that a large length prefix alone does not allocate much memory
+# maximum bytes to allocate per receive, so that a large length prefix alone cannot make this process allocate much memory
 _CLAIM = 16 * 1024 * 1024
 
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
@@ -91,7 +91,7 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop, for receivers that are so quick that a thread for each would cost more.
+    """Read frames on the loop, for receivers so quick that a thread for each would cost more.
 
     ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
@@ -127,7 +127,7 @@ def watch_frames_in_turns(
     most: int,
     on_left_out: Callable[[], None],
 ) -> None:
-    """Read frames on the loop in steps; ``start_steps`` runs the steps alternately with those of other connections.
+    """Read frames on the loop in steps; ``start_steps`` interleaves the steps with those of other connections.
 
     Frames of more than ``most`` bytes are skipped; ``on_left_out`` is called for each.
     """
@@ -182,7 +182,7 @@ class _FrameSource:
         """
         reader = self._reader
         if self._was_large:
-            # Another large frame is likely, so do not read its first bytes into the buffer for small ones.
+            # Another large frame is likely, so do not read its first bytes into the buffer for small frames.
             word = self._take(LENGTH_BYTES)
             length = parse_length(word)
             if length > CHUNK:
@@ -203,8 +203,8 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # The flag is also False if bytes were ready but this thread had to wait for the GIL, because then other
-        # threads in this process need the GIL.
+        # The flag is also False if bytes were ready but this thread had to wait for the GIL.
+        # Other threads in this process then need the GIL.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count
@@ -259,7 +259,7 @@ class _FrameSource:
 def _deliver_newest(
     source: _FrameSource, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
 ) -> None:
-    """Read as long as frames are ready, then deliver the newest ones."""
+    """Read while frames are ready, then deliver the newest ones."""
     kept: deque[Frame] = deque(maxlen=newest)
     total = 0
     ended = False
@@ -267,7 +267,7 @@ def _deliver_newest(
     while True:
         for frame in frames:
             total += len(frame)
-            # Copy a small frame, because it is in the reader's buffer, which the next receive overwrites.
+            # Copy a small frame, because the next receive overwrites the reader's buffer.
             kept.append(frame if isinstance(frame, bytes) else bytes(frame))
         if total >= _DRAIN_BYTES or not is_readable(source.sock):
             break

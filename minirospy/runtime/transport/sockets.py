@@ -29,15 +29,15 @@ __all__ = [
 
 FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sockets
 
-HANDSHAKE_SECONDS = 10.0  # time limit in seconds for each handshake, because a peer may never respond
+HANDSHAKE_SECONDS = 10.0  # time limit in seconds per handshake, because a peer may never respond
 
 BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process on the same host arrive
 
 KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
-"""Seconds of silence, seconds between probes, number of probes. On macOS the first option is called TCP_KEEPALIVE."""
+"""Seconds of silence before probing (on macOS called TCP_KEEPALIVE), seconds between probes, number of probes."""
 
-# Requested buffer size for a Unix socket in bytes, as much as TCP buffers; Linux limits it to net.core.wmem_max (208
-# kB by default)
+# Buffer size to request for a Unix socket, in bytes; as much as TCP buffers.
+# Linux limits it to net.core.wmem_max (208 kB by default).
 _SEND_BUFFER = 4 * 1024 * 1024
 
 _PEER = struct.Struct("iII")  # layout of the kernel's credentials for a peer, see Peer
@@ -68,7 +68,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def enlarge_send_buffer(sock: socket.socket) -> None:
-    """Let a Unix socket buffer some megabytes, as far as the kernel allows. TCP enlarges its own buffers.
+    """Let a Unix socket buffer some megabytes, or as much as the kernel allows. TCP enlarges its own buffers.
 
     Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process in between.
     """
@@ -116,7 +116,7 @@ def is_writable(sock: socket.socket, milliseconds: int) -> bool:
 
 
 def busy_poll(sock: socket.socket) -> None:
-    """Busy-poll for another process's response, for up to a fifth of a millisecond.
+    """Busy-poll for another process's response, for up to 0.2 ms.
 
     Waking up takes as long as such a response. While polling, this yields the processor to other processes, because the
     peer may need it. Has no effect on a socket that may not be busy-polled.
@@ -134,7 +134,7 @@ def may_busy_poll(sock: socket.socket) -> bool:
 
 
 def busy_receive(sock: socket.socket, space: memoryview) -> int:
-    """Receive data that another process sends within a fifth of a millisecond, by busy-polling.
+    """Receive data that another process sends within 0.2 ms, by busy-polling.
 
     Use it only if ``may_busy_poll`` is true. Raise BlockingIOError if nothing arrives, OSError if the connection fails.
     """
@@ -149,11 +149,11 @@ def busy_receive(sock: socket.socket, space: memoryview) -> int:
 
 
 def _busy_poll(sock: socket.socket, events: int) -> bool:
-    """Poll for ``events`` for up to a fifth of a millisecond; return whether they occurred."""
+    """Poll for ``events`` for up to 0.2 ms; return whether they occurred."""
     poll = _poll(sock, events)
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
-        # Yield first, because the peer may be waiting for this processor.
+        # Yield first, because the peer may need this processor.
         os.sched_yield()
         if poll.poll(0):
             return True

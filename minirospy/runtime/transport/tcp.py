@@ -31,13 +31,12 @@ __all__ = [
     "send_header",
 ]
 
-# Maximum number of handshakes in progress. An additional handshake closes the oldest one, because a genuine handshake
-# takes only milliseconds
+# Maximum number of handshakes in progress. One more closes the oldest, because a genuine handshake takes only milliseconds
 MAX_HANDSHAKES = 200
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
-# maximum total bytes of incomplete headers above _SHORT_HEADER, for all of a node's peers
+# maximum total bytes of incomplete headers longer than _SHORT_HEADER, for all of a node's peers
 _MAX_LONG_HEADERS = 16 * 1024 * 1024
 
 _REFUSALS_LOGGED = 10
@@ -122,7 +121,7 @@ async def send_header(sock: socket.socket, fields: Header) -> None:
     """Send a connection header with these fields."""
     data = serialize_header(fields)
     try:
-        # This does not block, because the header is short, and a new socket's buffer is empty.
+        # This does not block: the header is short, and the buffer of a new socket is empty.
         sent = sock.send(data)
     except (BlockingIOError, InterruptedError):
         sent = 0
@@ -146,7 +145,7 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # Dict from handshake task to the peer's address, in starting order.
+        # The peer's address for each handshake task, in the order of their start.
         self.handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
@@ -197,8 +196,8 @@ class Listener:
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
-            # There are no free file descriptors, or the peer has already disconnected: accepting the next connection
-            # may succeed a moment later.
+            # No file descriptors are free, or the peer has already disconnected.
+            # Accepting the next connection may succeed a moment later.
             self.log_refusal(f"a connection could not be accepted: {explain(error)}")
             if is_file_limit(error):
                 self._end_oldest("this process has no file descriptor left")
@@ -223,7 +222,7 @@ class Listener:
         def done(finished: asyncio.Task[None]) -> None:
             self.handshakes.pop(finished, None)
             if finished.cancelled():
-                # Close the socket here, because the task may have been cancelled before its first step.
+                # Close the socket here, because the task may be cancelled before its first step.
                 peer.close()
 
         task.add_done_callback(done)
@@ -232,7 +231,7 @@ class Listener:
         try:
             await self._accept(peer, address)
         except (_NothingSaidError, BrokenPipeError):
-            # The peer is a node that has exited in the meantime, or a port scan.
+            # The peer is a port scanner, or a node that has exited in the meantime.
             _log.debug("connection from %s: it disconnected before it was answered", address)
             peer.close()
         except (OSError, WireError) as error:
@@ -288,7 +287,7 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has already arrived completely, or None. Most headers have arrived, which saves a task and a timer."""
+    """Return a header if it has already arrived completely, else None. Most have, which saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):
@@ -312,7 +311,7 @@ async def _receive_header(sock: socket.socket, memory: HeaderMemory) -> Header:
 async def _receive_exactly(
     sock: socket.socket, count: int, memory: HeaderMemory, nothing: type[WireError] = WireError
 ) -> bytes:
-    """Return ``count`` bytes. Raise WireError if the peer closes earlier, or ``nothing`` if not a single byte arrived."""
+    """Return ``count`` bytes. Raise ``nothing`` if the peer closes before the first byte, WireError if it closes later."""
     loop = asyncio.get_running_loop()
     data = bytearray()
     taken = 0

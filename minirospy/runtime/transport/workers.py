@@ -26,8 +26,7 @@ class Workers:
 
     def __init__(self) -> None:
         self._work: queue.SimpleQueue[tuple[Callable[..., object], tuple[object, ...]]] = queue.SimpleQueue()
-        # Use a reentrant lock: a signal handler may run a shutdown hook, which starts a worker, while the main thread
-        # holds the lock.
+        # Use a reentrant lock: while the main thread holds it, a signal handler may run a shutdown hook, which starts a worker.
         self._lock = threading.RLock()
         self._idle = 0
 
@@ -38,8 +37,7 @@ class Workers:
         """
         with self._lock:
             if self._idle:
-                # A claimed worker always takes an entry, because a worker that exits without one first removes itself
-                # from the idle workers.
+                # A claimed worker always takes an entry: one that exits without an entry first leaves the idle workers.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
@@ -64,7 +62,7 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # This worker was claimed just as it was about to exit, so its entry is about to arrive.
+                # This worker was claimed just as it was about to exit, so an entry will arrive in a moment.
                 function, args = self._work.get()
 
 
@@ -87,7 +85,7 @@ class InOrder:
         try:
             self._workers.start(self._run)
         except ThreadLimitError as error:
-            # No thread could be started, so the queued functions stay queued until the next call to start().
+            # No thread could be started, so leave the functions queued until the next call to start().
             with self._lock:
                 self._is_running = False
             _log.error("a callback is late: %s", error)

@@ -68,7 +68,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed while the recording starts. The child process must then be stopped, not lost.
+        # If the page is closed while the recording starts, the child process must still be stopped.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -108,7 +108,7 @@ class BagSession(JsonSession):
         self._endpoint = endpoint
         self._bag: OpenBag | None = None
         self._shown: dict[str, int] = {}
-        """Dict from each topic whose messages are sent to the time of the last message sent, or -1 if none was sent."""
+        """The time of the last message sent for each topic that the page shows, or -1 if none has been sent."""
         self._thumbnails: deque[tuple[str, int]] = deque()
         self._sent: dict[str, str] = {}
         handlers: Mapping[str, Handler] = {
@@ -214,7 +214,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # If the client leaves now, cancel only the wait, not the closing of the bag.
+            # If the client disconnects now, cancel only the wait, not the closing of the bag.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:
@@ -234,8 +234,8 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # A step publishes all messages that have the same time. After a seek, the messages at that time are already
-        # shown but not yet published.
+        # A step publishes all messages that have the same time.
+        # After a seek, the messages at that time have been shown but not published.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:
@@ -254,7 +254,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # Publish earlier messages on latched topics, because new subscribers would not receive them otherwise.
+        # Publish the earlier messages of latched topics, because new subscribers would not receive them otherwise.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)

@@ -24,7 +24,7 @@ _MAX_ENTRIES = 50_000
 _MAX_DEPTH = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-"""Names of Windows devices, which cannot be used for files."""
+"""Names of Windows devices, which are not allowed as file names."""
 
 
 class FoundBag(NamedTuple):
@@ -68,7 +68,7 @@ class BagFolder:
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
     def path_of(self, name: str) -> Path:
-        """Return the file of an existing bag, by its name from :meth:`bags`. Raise BagError if it does not exist."""
+        """Return the path of an existing bag, given its name from :meth:`bags`. Raise BagError if it does not exist."""
         if name in self._given:
             return self._given[name]
         parts = name.split("/")
@@ -90,7 +90,7 @@ class BagFolder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Return the file for a new recording. Raise UsageError if the name is invalid or in use."""
+        """Return the path for a new recording. Raise UsageError if the name is invalid or in use."""
         stem = name.removesuffix(suffix)
         if not _NAME.fullmatch(stem) or stem.endswith((".", " ")) or _RESERVED.match(stem):
             raise UsageError(

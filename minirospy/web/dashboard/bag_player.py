@@ -1,4 +1,4 @@
-"""One opened bag: its timeline, and `rosbag play`'s player, which publishes to the dashboard's graph."""
+"""An open bag: its timeline, and `rosbag play`'s player, which publishes to the dashboard's graph."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MAX_WAITING = 200
 
 
 class GraphOutput:
-    """Publishes a player's messages on the loop's graph: the messages on enabled topics, and the clock."""
+    """Publishes a player's messages to the loop's graph: the messages on enabled topics, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
         """Create the output for ``graph``. Must be called on the loop."""
@@ -161,7 +161,7 @@ class GraphOutput:
 
 
 class OpenBag:
-    """An opened bag: a timeline, and a player that is paused at the start. Methods block, so do not call them on the loop.
+    """An open bag: a timeline, and a player that is paused at the start. Methods block, so do not call them on the loop.
 
     ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError if the bag is
     invalid, OSError if it cannot be read.
@@ -199,7 +199,7 @@ class OpenBag:
         return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
 
     def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
-        """For each latched topic among these, return its last message up to ``time``, for late subscribers."""
+        """Return the last message up to ``time`` of each latched topic in ``topics``, for late subscribers."""
         return [
             (topic, message.body)
             for topic in topics

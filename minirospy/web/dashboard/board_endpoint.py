@@ -76,7 +76,7 @@ class BoardSession(JsonSession):
         try:
             directory = BoardDirectory.find(name)
             self._boards = await self.in_thread(directory.names)
-            # Only the owner may open a board that is not running, because this starts a process.
+            # Only the owner may open a board that is not running, because opening it starts a process.
             if name and name not in self._boards and not self.client.is_owner:
                 raise BoardError(
                     f"there is no board [{directory.name}]: {self.client.why_not_owner('start boards')}"
@@ -105,7 +105,7 @@ class BoardSession(JsonSession):
 
     async def _press(self, fields: Fields) -> None:
         pin = _pin(fields["press"])
-        # Record the pin first, so that it is released even if the client leaves before the response.
+        # Record the pin first, so that it is released even if the client disconnects before the response.
         self._pressed.add(pin)
         await self.in_thread(partial(self._opened().press, pin))
 

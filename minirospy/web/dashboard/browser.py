@@ -22,7 +22,9 @@ from minirospy.base.private_files import create_file
 __all__ = ["LinkFile", "has_screen", "link_page", "open_link"]
 
 SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
-"""Browsers that cannot read the temporary folder or hidden folders, but can read other files in the home folder."""
+"""Browsers packaged as snaps: they cannot read the temporary folder or hidden folders, but can read other files in the home
+folder.
+"""
 
 
 def has_screen(environ: Mapping[str, str], platform: str = sys.platform) -> bool:
@@ -86,7 +88,7 @@ def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
 
 
 def _parent() -> Path | None:
-    """Return the parent for the file's folder, or None to use the system's temporary folder."""
+    """Return the folder in which to create the file's folder, or None for the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in SNAPS) and os.access(home, os.W_OK):
         return home

@@ -50,7 +50,7 @@ class Codes:
         return code
 
     def when_ended(self, code: str, action: Callable[[], object]) -> None:
-        """Call ``action`` once, when the code has been used, has expired or has been discarded."""
+        """Call ``action`` once, when the code is used, expires or is discarded."""
         found = self._waiting.get(code)
         if found:
             self._waiting[code] = found._replace(on_end=action)
@@ -81,7 +81,7 @@ class Codes:
             self._forget(code)
 
     def serve(self, exchange: Exchange) -> None:
-        """Respond to a page that sends a code as a bearer token. If the request is refused, the code stays valid."""
+        """Respond to a page that sends a code as a bearer token. The code stays valid if the request is refused."""
         code = exchange.request.headers.get("authorization", "").removeprefix("Bearer ")
         if not self.token_of(code):
             exchange.respond(403, b"this link has been used\n")

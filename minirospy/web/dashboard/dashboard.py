@@ -70,8 +70,8 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         self.codes.close()
         async with AsyncExitStack() as closing:
-            # Close the parts in reverse order, and all of them even if one fails. Players use the bridge's graph
-            # until their sessions end.
+            # Close the parts in reverse order, and all of them even if one fails.
+            # Players use the bridge's graph until their sessions end.
             for part in (
                 self._tools,
                 self._board,

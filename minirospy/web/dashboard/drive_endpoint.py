@@ -1,11 +1,12 @@
 """Driving from the page: publish velocities while the user holds a control, and a zero velocity afterwards.
 
-A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic",
-"axes": [...], "buttons": [...]}`` repeatedly while a control is held, and ``{"leave": topic}`` when it no longer drives
-a topic. The server sends ``{"writes": bool}`` first, ``{"stopped": topic}`` after it has stopped a topic because
-commands stopped arriving, and ``{"error": text, "topic"}``. The last message on each topic is a zero velocity, whether
-the control is released or the connection is lost. If a client stops sending, a separate thread publishes this message
-(:mod:`minirospy.runtime.stop_guard`), even if the event loop is blocked.
+A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s), ``{"topic",
+"axes": [...], "buttons": [...]}``, or ``{"topic", "joints": [name, ...], "positions": [...], "seconds"}`` repeatedly
+while a control is held, and ``{"leave": topic}`` when it no longer drives a topic. The server sends ``{"writes": bool}``
+first, ``{"stopped": topic}`` after it has stopped a topic because commands stopped arriving, and ``{"error": text,
+"topic"}``. The last message on each topic is a zero velocity, or an empty trajectory, with which joints hold their
+positions. It is sent whether the control is released or the connection is lost. If a client stops sending, a separate
+thread publishes it (:mod:`minirospy.runtime.stop_guard`), even if the event loop is blocked.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ __all__ = [
     "DriveEndpoint",
     "DriveSession",
     "Joystick",
+    "Target",
     "Velocity",
     "parse",
 ]
@@ -45,13 +47,14 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""A client that holds a control but sends nothing for this many seconds is considered lost; its topics are stopped."""
+"""Seconds without a command after which a client that holds a control is considered lost; its topics are then stopped."""
 
 _log = logging.getLogger(__name__)
 
 _MAX_TOPICS = 20
 _MAX_VALUES = 100
 _MAX_COMMAND_LENGTH = 20_000  # maximum number of characters in a command
+_MAX_MOTION_SECONDS = 3600.0
 
 _MAX_AXIS = 3.4028234663852886e38  # largest finite float32
 
@@ -90,11 +93,32 @@ class Joystick:
 
 
 @dataclass(frozen=True)
+class Target:
+    """A trajectory_msgs/JointTrajectory with one point: the joints' positions, and the seconds to reach them."""
+
+    joints: tuple[str, ...]
+    positions: tuple[float, ...]
+    seconds: float
+
+    @property
+    def is_zero(self) -> bool:
+        """Return whether the trajectory is empty: the joints hold their positions."""
+        return not self.joints
+
+    def zero(self) -> Target:
+        """Return an empty trajectory."""
+        return Target((), (), 0.0)
+
+
+Held = Velocity | Joystick | Target
+
+
+@dataclass(frozen=True)
 class Command:
-    """A client's command: a topic and the message to publish. The message is None if the client no longer drives the topic."""
+    """A client's command: a topic and the message to publish, or None if the client has released the topic."""
 
     topic: str
-    held: Velocity | Joystick | None
+    held: Held | None
 
 
 def parse(text: str) -> Command:
@@ -124,7 +148,22 @@ def parse(text: str) -> Command:
         if not all(abs(each) <= _MAX_AXIS for each in axes):
             raise ValueError("an axis is from -1 to 1")
         return Command(_topic(fields["topic"]), Joystick(axes, buttons))
+    if names == {"topic", "joints", "positions", "seconds"}:
+        return Command(_topic(fields["topic"]), _target(fields))
     raise ValueError(f"it has {', '.join(sorted(map(str, names)))[:80] or 'nothing'}")
+
+
+def _target(fields: Mapping[str, object]) -> Target:
+    joints = fields["joints"]
+    if not isinstance(joints, list) or not joints or not all(isinstance(each, str) for each in joints):
+        raise ValueError("joints are an array of names")
+    positions = _numbers(fields["positions"])
+    if len(positions) != len(joints):
+        raise ValueError("each joint has one position")
+    (seconds,) = _numbers([fields["seconds"]])
+    if not 0 < seconds <= _MAX_MOTION_SECONDS:
+        raise ValueError(f"a motion lasts up to {_MAX_MOTION_SECONDS:g} seconds")
+    return Target(tuple(joints), positions, seconds)
 
 
 def _topic(value: object) -> str:
@@ -237,7 +276,7 @@ class _Driven:
         graph: SharedGraph,
         guard: StopGuard,
         topic: str,
-        held: Velocity | Joystick,
+        held: Held,
         stopped: Callable[[str], None],
     ) -> None:
         """Advertise the topic. Raise BridgeError if clients may not publish it, or if it has another type."""
@@ -248,15 +287,15 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # The lock protects the following attributes, so that commands on the loop and the guard's zero velocity are
-        # published one after the other.
+        # The lock protects the attributes below.
+        # A command (sent on the loop) and the guard's zero velocity must not be published concurrently.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
         self._joining: asyncio.Task[None] | None = None
 
-    def hold(self, held: Velocity | Joystick) -> None:
-        """Publish a command, and a zero velocity if no further command arrives in time.
+    def hold(self, held: Held) -> None:
+        """Publish a command. Publish a zero velocity if no further command arrives in time.
 
         Raise BridgeError and publish nothing if a later stop cannot be guaranteed.
         """
@@ -264,7 +303,7 @@ class _Driven:
         if held.is_zero:
             self._guard.disarm(self._silent)
         else:
-            # Arm the guard before publishing, so that no command is sent that could not be stopped.
+            # Arm the guard before publishing, so that every published command is followed by a stop.
             self._guard.arm(self._silent, deadline)
         with self._lock:
             self._deadline = deadline
@@ -280,7 +319,7 @@ class _Driven:
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # The task that waits for subscribers publishes the zero velocity; keep the topic open until then.
+            # The task that waits for subscribers still has to publish the zero velocity; it closes the topic afterwards.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()
@@ -297,7 +336,7 @@ class _Driven:
         with contextlib.suppress(RuntimeError):  # the loop has been closed
             self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
-    def _publish(self, held: Velocity | Joystick) -> None:
+    def _publish(self, held: Held) -> None:
         """Publish a command now. If subscribers are still connecting, publish the newest command once they are connected.
 
         The caller must hold the lock.
@@ -321,19 +360,29 @@ class _Message(Protocol):
     def serialize(self, buff: BytesIO) -> None: ...
 
 
-def _type_of(held: Velocity | Joystick) -> InterfaceType:
+def _type_of(held: Held) -> InterfaceType:
     from geometry_msgs.msg import Twist
     from sensor_msgs.msg import Joy
+    from trajectory_msgs.msg import JointTrajectory
 
-    return InterfaceType.of(Twist if isinstance(held, Velocity) else Joy)
+    return InterfaceType.of({Velocity: Twist, Joystick: Joy, Target: JointTrajectory}[type(held)])
 
 
-def _message_of(held: Velocity | Joystick, graph: SharedGraph) -> _Message:
+def _message_of(held: Held, graph: SharedGraph) -> _Message:
+    from genpy import Duration
     from geometry_msgs.msg import Twist, Vector3
     from sensor_msgs.msg import Joy
+    from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
     if isinstance(held, Velocity):
         return Twist(Vector3(*held.values[:3]), Vector3(*held.values[3:]))
-    message = Joy(axes=list(held.axes), buttons=list(held.buttons))
+    message: Joy | JointTrajectory
+    if isinstance(held, Joystick):
+        message = Joy(axes=list(held.axes), buttons=list(held.buttons))
+    else:
+        reached = JointTrajectoryPoint(
+            positions=list(held.positions), time_from_start=Duration.from_sec(held.seconds)
+        )
+        message = JointTrajectory(joint_names=list(held.joints), points=[] if held.is_zero else [reached])
     message.header.stamp = graph.node.now()
     return message

@@ -35,7 +35,7 @@ SECURITY = {
     "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cross-Origin-Resource-Policy": "same-origin",
-    # The browser caches the file but revalidates its ETag at each start, so that releases are never mixed.
+    # The browser caches the file but revalidates it by its ETag on each start, so files of different releases are never mixed.
     "Cache-Control": "no-cache",
 }
 """The page's security headers: no inline scripts, no content from other sites, no embedding in other pages."""

@@ -123,7 +123,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
     # --- joints
 
     def start_work(self) -> None:
-        """Start the task that follows the parameters and publishes.
+        """Start the task that watches the parameters and publishes the joints.
 
         The task runs while there are clients, or always if ``always_publishes`` is set.
         """
@@ -154,7 +154,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
                 publisher, self._publisher = self._publisher, None
                 await publisher.close()
             await wait_until(self._work_changed, end)
-        # Unsubscribe; the task for the next page subscribes again.
+        # Unsubscribe; the next page's task will subscribe again.
         self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
@@ -196,7 +196,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             if (why := why_illegal(topic))
         ]
 
-        # Clients receive each generation only once, so complete its data before incrementing the counter.
+        # Clients receive each generation only once, so increment the counter after the data is complete.
         self._values, self.parameters, self.joints = values, parameters, joints
         self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
         self.generation += 1
@@ -208,7 +208,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return [topic for topic in sources if not why_illegal(topic)]
 
     def _follow(self, topics: Sequence[str]) -> None:
-        """Subscribe to exactly these topics from source_list."""
+        """Subscribe to exactly the topics in source_list."""
         from sensor_msgs.msg import JointState
 
         for task in self._sources:

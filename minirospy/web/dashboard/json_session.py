@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 _MAX_ERROR_LENGTH = 1000
 _VALUE_FACTOR = 4
-"""Memory that a parsed operation uses, in bytes per byte of its JSON string; measured for objects and lists of numbers."""
+"""Memory of a parsed operation, in bytes per byte of its JSON text; measured for objects and lists of numbers."""
 
 _INTERNAL_ERROR = 1011  # WebSocket close code for an internal error, RFC 6455, section 7.4.1
 
@@ -55,13 +55,13 @@ class JsonSession:
     """The operations that require the token, as described in error messages; "" if other clients may use some of them."""
 
     longest: ClassVar[int] = 256_000
-    """Maximum number of characters in an operation, because parsing it delays all clients."""
+    """Maximum number of characters in an operation. Parsing delays all clients, so it must be short."""
 
-    most_waiting: ClassVar[int] = 100
+    max_waiting: ClassVar[int] = 100
     pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
 
     def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
-        """Create the session. ``handlers``: the functions that execute the operations, by name."""
+        """Create the session. ``handlers``: the functions that execute the operations, keyed by operation name."""
         self.client = client
         self.is_ended = False
         self._handlers = handlers
@@ -106,7 +106,7 @@ class JsonSession:
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """Queue an operation."""
-        if len(self._operations) >= self.most_waiting:
+        if len(self._operations) >= self.max_waiting:
             self.send_error("too many operations wait: this one was dropped", fields)
             return
         self._operations.append((name, fields, self._operation_size))
@@ -114,11 +114,11 @@ class JsonSession:
         self._wake.set()
 
     def count(self) -> None:
-        """Charge the memory used for this client to the server's account."""
+        """Charge this client's memory use to the server's budget."""
         self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """Run a blocking function in the session's thread, after previously submitted functions."""
+        """Run a blocking function in the session's thread, after the functions submitted earlier."""
         return await self._loop.run_in_executor(self._thread, work)
 
     def send(self, fields: Fields) -> None:
@@ -219,8 +219,7 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # Log other errors' messages only on the terminal, because they may contain details that clients
-                    # must not see.
+                    # Log other errors' messages only on the terminal: they may contain details that clients must not see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
                     )
@@ -298,7 +297,7 @@ class JsonEndpoint(Generic[_S]):
                 self._loop.call_soon_threadsafe(self.changed)
 
     def spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
-        """Run a coroutine to its end even if its client leaves; :meth:`close` waits for it."""
+        """Run a coroutine to its end even if its client disconnects; :meth:`close` waits for it."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._spawned_ended)
@@ -321,10 +320,10 @@ class JsonEndpoint(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event until the loop's clock reaches ``end``. After a timeout, the clock has certainly passed ``end``."""
-    # Do not use asyncio.wait_for, because before Python 3.12 it may lose a cancellation that coincides with the
-    # event. Add the clock's resolution, because a loop runs timers early by that much, and callers that compare times
-    # would spin until the clock advances.
+    """Wait for an event until the loop's clock reaches ``end``. On a timeout, the clock is guaranteed to be past ``end``."""
+    # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event.
+    # Add the clock's resolution, because a loop may run timers early by that much.
+    # Otherwise, a caller that compares times would spin until the clock advances.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + CLOCK_SECONDS, event.set) if end < math.inf else None
     try:

@@ -31,12 +31,12 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""Poll interval in seconds for a log file that a page shows. Polling is necessary, because files report no changes."""
+"""Poll interval, in seconds, for a log file that a page shows."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""Maximum number of ended launches that are kept, with their last lines."""
+"""maximum number of ended launches to keep, each with its last lines of output"""
 
 _TAIL_BYTES = 64 * 1024
 
@@ -82,14 +82,14 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
             self._restarting.discard(run.id)
 
     def changed(self) -> None:
-        """See :meth:`JsonEndpoint.changed`. Also discards old launches: of those that have ended, only the newest are kept."""
+        """See :meth:`JsonEndpoint.changed`. Also discard all but the newest of the ended launches."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
         for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
         super().changed()
 
     async def close(self) -> None:
-        """End all sessions and all launches and wait until they have ended."""
+        """End all sessions, stop all launches, and wait until the launches have ended."""
         self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
@@ -114,7 +114,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Query this before reading, so that the file contains everything that the node wrote before it exited.
+        # Check for the exit before reading, so that the file contains everything that the node wrote before it exited.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -129,8 +129,8 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return whole lines, because the data may end in the middle of a character. Exceptions: a very long line, and
-        # the last line after the exit.
+        # Return whole lines only, because the data may end in the middle of a character.
+        # Exceptions are a very long line, and the last line after the node's exit.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]
@@ -163,7 +163,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches, if any of them has changed, and the log's new lines."""
-        # Query this before sending, so that a change in the meantime triggers another call.
+        # Check this before sending, so that a change in the meantime triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -243,7 +243,7 @@ class LaunchSession(JsonSession):
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
             self.send(found)
-        # The file may contain more data than one read returns.
+        # One read may not have returned all the data in the file.
         return is_growing or bool(tail.node and text)
 
 

@@ -25,7 +25,7 @@ class LaunchFile(NamedTuple):
 
 
 class LaunchFiles:
-    """The launch files of packages. Methods read folders and block."""
+    """The launch files of packages. The methods read directories, so they block."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
@@ -60,7 +60,7 @@ class LaunchFiles:
 
 
 def _launch_files(folder: Path, packages: set[Path], depth: int) -> Iterator[Path]:
-    """Yield a package's launch files, except those of packages inside it."""
+    """Yield a package's launch files, excluding those of nested packages."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:

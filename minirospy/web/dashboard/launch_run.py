@@ -132,8 +132,7 @@ class LaunchRun:
         self._exited: dict[str, Process] = {}
         self._known: dict[str, Process] = {}
         self._lock = threading.Lock()
-        # Use a daemon thread: if this process exits without stopping the launch, the launcher's guardian process ends
-        # the nodes.
+        # Use a daemon thread: if this process exits without stopping the launch, the launcher's guardian ends the nodes.
         self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
         self._thread.start()
 
@@ -152,7 +151,7 @@ class LaunchRun:
         return self._state in ("stopping", "ended")
 
     def has_exited(self, node: str) -> bool:
-        """Return whether a node was started and is no longer running."""
+        """Return whether a node was started and has exited."""
         process = self._known.get(node)
         return process is not None and not process.is_running
 

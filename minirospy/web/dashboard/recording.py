@@ -21,7 +21,9 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts in seconds for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts for stopping, in seconds. The first is long, because rosbag completes the file after SIGINT, possibly on a slow
+disk.
+"""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Timeouts while no file is open.
@@ -105,15 +107,14 @@ class Recording:
             "rosbag record",
             command,
             environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
-            # `python -m` imports from the working folder first, so avoid a folder that contains the user's own
-            # modules.
+            # Run `python -m` in a folder without the user's modules, because it imports from the working folder first.
             folder=Path(minirospy.__file__).parents[2],
             stdout=subprocess.PIPE,
             log_errors=True,
         )
 
     def _read(self) -> None:
-        """Store the last output lines, and record the time of the exit."""
+        """Keep the last output lines, and record the time of the exit."""
         stream = self._process.popen.stdout
         assert stream
         with stream:
@@ -124,7 +125,7 @@ class Recording:
 
     def state(self) -> RecordingState:
         """Return the current state."""
-        # Query this first, because the size is final only after the exit.
+        # Query the exit status first, because the size is final only after the exit.
         status = self._process.exit_code
         size = 0
         for path in self._paths:

@@ -87,7 +87,7 @@ class RvizSession(JsonSession):
 
     subject: ClassVar[str] = ".rviz files"
     longest: ClassVar[int] = 600_000
-    most_waiting: ClassVar[int] = 20
+    max_waiting: ClassVar[int] = 20
 
     def __init__(self, endpoint: RvizEndpoint, client: WebClient) -> None:
         self._endpoint = endpoint

@@ -36,7 +36,7 @@ _SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
 """Patterns and parsers for values that are not strings. Other YAML 1.1 types (dates, octal numbers) stay strings, as in RViz."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
-"""Strings that need no quotes, unless another parser could read them as numbers."""
+"""Strings that need no quotes, except those that another parser could read as a number."""
 
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
@@ -49,7 +49,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        # If the end of the file is missing, the compiled parser reports the line after the last one.
+        # If the end of the file is missing, the compiled parser reports an error one line after the last line.
         line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
@@ -63,8 +63,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
 def _built(events: Iterator[Event], name: str) -> object:
     """Return the document's value. Raise RvizFileError if it is invalid."""
     result: list[object] = []
-    # The open collections, each with the keys whose values have not been parsed yet; the first collection is the
-    # stream.
+    # The open collections (first the stream), each with the keys whose values have not been parsed yet.
     stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
     for event in events:
         line = event.start_mark.line + 1 if event.start_mark else 0
@@ -122,7 +121,7 @@ def format_rviz(config: Mapping[str, object]) -> str:
 
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
     """Yield the lines for a nonempty map or list at a nesting depth of ``depth``."""
-    # Limit the depth, because each line passes through one generator per level and is indented once per level.
+    # Limit the depth: each line passes through one generator per level and is indented once per level.
     if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):

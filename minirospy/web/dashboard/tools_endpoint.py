@@ -45,7 +45,7 @@ _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
 _MAX_PREVIEW = 200
-"""Maximum characters shown of a value that the user is typing."""
+"""Maximum number of characters to show of a value that the user is typing."""
 
 REPORT_SECONDS = 2.0
 _MAX_CONCURRENT = 4
@@ -58,7 +58,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
         super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
         self.parser = ThreadPoolExecutor(1, "tools-parser")
-        """Parses files one after another, because parsing several at the same time would delay the loop longer."""
+        """Parses one file at a time; parsing several in parallel would delay the loop for longer."""
         self._master_uri = master_uri
         self._tool = tool
         self._watching: set[ToolsSession] = set()
@@ -78,7 +78,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             threads.shutdown(wait=False, cancel_futures=True)
 
     def graph(self) -> Graph:
-        """Return a graph with a separate connection to the master, because calls run in threads."""
+        """Return a graph with its own connection to the master, because calls run in threads."""
         return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
 
     def watch(self, session: ToolsSession) -> None:
@@ -102,7 +102,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # Use one thread, so that after a cancelled survey the next one waits until the first has ended.
+                # Use one thread, so that the next survey waits until a cancelled one has ended.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}
@@ -112,11 +112,11 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             data = _report_of(fields)
             for session in tuple(self._watching):
                 session.report(data)
-            # If nodes respond slowly, pause for longer.
+            # If nodes respond slowly, wait longer before the next survey.
             await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return a dict from topic to the type that the master knows, or ``*`` if the topic only has subscribers to any type."""
+        """Return a dict from topic to the type that the master knows, or ``*`` if all subscribers accept any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 
@@ -130,7 +130,7 @@ class ToolsSession(JsonSession):
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
-    most_waiting: ClassVar[int] = 20
+    max_waiting: ClassVar[int] = 20
 
     def __init__(self, endpoint: ToolsEndpoint, client: WebClient) -> None:
         self._endpoint = endpoint
@@ -161,7 +161,7 @@ class ToolsSession(JsonSession):
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """See :meth:`JsonSession.dispatch`."""
-        if len(self._running) >= self.most_waiting:
+        if len(self._running) >= self.max_waiting:
             self.send_error("too many requests wait for their answers", fields)
             return
         task = asyncio.ensure_future(self.carry_out(name, fields))
@@ -306,7 +306,7 @@ class ToolsSession(JsonSession):
         text = text_of(fields, "text")
 
         def parse() -> object:
-            # An empty string is a value, as on the command line, although it would be null in YAML.
+            # An empty string stays a string, as on the command line; YAML would parse it as null.
             value = parse_value(text) if text.strip() else ""
             check_parameter(value, "the value")
             return value

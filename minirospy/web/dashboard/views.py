@@ -1,4 +1,4 @@
-"""A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
+"""Links to the page's views, and the fields in rqt_plot's arguments. Pure.
 
 A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
 """
@@ -32,6 +32,8 @@ VIEWS = (
     "launch",
     "bag",
     "joints",
+    "controllers",
+    "trajectory",
     "smach",
     "diagnostics",
     "panels",
@@ -69,7 +71,7 @@ def plotted_fields(words: Iterable[str]) -> list[str]:
     """
     found: list[str] = []
     for word in (part for each in words for part in each.split(",") if part):
-        # A colon in brackets belongs to a slice.
+        # A colon in brackets is part of a slice.
         head, *others = _split_colons(word)
         base = head.rpartition("/")[0]
         if not base and not head.startswith("/"):

@@ -26,14 +26,14 @@ class Assets:
     """Reads files by ``package://`` URIs. Methods block."""
 
     def __init__(
-        self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), most_bytes: int = MAX_BYTES
+        self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), max_bytes: int = MAX_BYTES
     ) -> None:
         """Create a reader for files in ``packages`` whose URI matches a regular expression in ``allowed``.
 
         Raise BridgeError if an expression is invalid.
         """
         self._packages = packages
-        self._most_bytes = most_bytes
+        self._max_bytes = max_bytes
         try:
             self._allowed = [re.compile(each, re.IGNORECASE) for each in allowed]
         except re.error as error:
@@ -47,9 +47,9 @@ class Assets:
         except OSError as error:
             raise BridgeError(f"{uri}: {error.strerror}") from None
         size = os.fstat(file.fileno()).st_size
-        if size > self._most_bytes:
+        if size > self._max_bytes:
             file.close()
-            raise BridgeError(f"{uri}: {size} bytes, {self._most_bytes} are allowed")
+            raise BridgeError(f"{uri}: {size} bytes, {self._max_bytes} are allowed")
         return file, size
 
     def _path(self, uri: str) -> Path:

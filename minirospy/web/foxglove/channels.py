@@ -14,7 +14,9 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout in seconds for querying topic types that are not installed. It is short, because all clients wait for the channels."""
+"""Timeout in seconds for querying topic types that are not installed. It is short, because the channels of all clients wait
+for it.
+"""
 
 
 class Channels:
@@ -64,7 +66,7 @@ class Channels:
             else:
                 others[topic] = snapshot.publishers.get(topic, ())
 
-        # If no publisher responds in time, the type will be taken from the first message.
+        # If no publisher responds in time, take the type from the first message.
         found = await graph.texts.of_publishers(others, TYPE_SECONDS)
         new += [
             self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))

@@ -66,7 +66,7 @@ class FoxgloveEndpoint:
 
         self.sessions: set[FoxgloveSession] = set()
         self._options = options or FoxgloveOptions()
-        self._waiting: set[FoxgloveSession] = set()  # clients that have not been sent the channels yet
+        self._waiting: set[FoxgloveSession] = set()  # clients that have not received the channels yet
         self._is_known = False
         self._updating: asyncio.Task[None] | None = None
         self._is_outdated = False
@@ -125,7 +125,7 @@ class FoxgloveEndpoint:
         return [each for each in found if client.may_write or each not in _FOR_WRITERS]
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel whose publisher uses a definition that differs from the installed type's."""
+        """Replace a channel whose publisher uses a definition that differs from the installed one."""
         replaced = self.channels.redefine(channel, header)
         if replaced:
             _log.info(

@@ -22,7 +22,7 @@ class ParameterListener(Protocol):
 
 
 class Parameters:
-    """The graph's parameters. One subscription to the root, at the master, serves all clients."""
+    """The graph's parameters. One subscription, to the root namespace at the master, serves all clients."""
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
@@ -114,8 +114,7 @@ class Parameters:
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # The master's notification does not distinguish a deleted namespace from an empty one, so read the value from
-        # the master.
+        # Query the master for the value: its notification does not distinguish a deleted namespace from an empty one.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):
@@ -127,7 +126,7 @@ class Parameters:
             self._graph.spawn(self._report(tuple(again), emptied))
 
     async def _report(self, names: tuple[str, ...], emptied: str) -> None:
-        """Report current values to subscribers; also report ``emptied`` to clients that subscribe to all parameters."""
+        """Report current values to subscribers, and ``emptied`` to clients that subscribe to all parameters."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
             mine = [each for each in found if each.name in (wanted or (emptied,))]

@@ -246,7 +246,7 @@ class Playback(Protocol):
         """Return the recording's start and end times, in nanoseconds."""
 
     def now(self) -> int:
-        """Return the current playback time, used as messages' timestamp."""
+        """Return the current playback time, which messages use as their timestamp."""
 
     def state(self) -> PlaybackState: ...
 

@@ -42,20 +42,18 @@ __all__ = ["FoxgloveServer", "FoxgloveSession"]
 _log = logging.getLogger(__name__)
 
 _MAX_CALLS = 200
-"""Maximum number of concurrent calls and requests from one client."""
+"""maximum number of concurrent calls and requests from one client"""
 
 _MAX_CHANNELS = 1000
-"""Maximum number of topics that one client may publish, and of its subscriptions, because each subscription receives every
-message.
-"""
+"""Maximum number of topics that one client may publish, and of subscriptions that it may have (each receives every message)."""
 
 _MAX_PARAMETERS = 10_000
-"""Maximum number of parameter names to which one client may subscribe."""
+"""maximum number of parameter names that one client may subscribe to"""
 
-# maximum per client message, because a message may name thousands of nonexistent channels
+# maximum per client message, which may name thousands of nonexistent channels
 _MAX_STATUSES = 100
 _VALUE_FACTOR = 4
-"""Memory that a parsed operation uses, in bytes per byte of its JSON string; measured for objects and lists of numbers."""
+"""Memory of a parsed operation, in bytes per byte of its JSON text; measured for objects and lists of numbers."""
 
 _TIME = "time"  # key of time messages in a client's queue, which keeps only the newest one
 
@@ -74,7 +72,7 @@ class FoxgloveServer(Protocol):
         """Return the capabilities that a client has."""
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel if its publisher's definition differs from that of the installed type."""
+        """Replace a channel if its publisher's definition differs from the installed one."""
 
     def playback_changed(self, state: PlaybackState) -> None:
         """Send a player's state to all clients."""
@@ -259,7 +257,7 @@ class FoxgloveSession:
         if (arrival.header["md5sum"] != md5sum and md5sum != ANY) or (
             not channel.schema.text and md5sum == ANY
         ):
-            # The client decodes with a definition that does not match this publisher's.
+            # The client decodes messages with a definition that does not match this publisher's.
             self._endpoint.definition_differs(channel, arrival.header)
             return
         head = serializing.message_head(subscription_id, arrival.nanoseconds)

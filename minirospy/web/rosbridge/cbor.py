@@ -94,7 +94,7 @@ def typed_array(type_: str, values: Sequence[float]) -> object:
 
 
 def _from_tag(first: Any, second: Any = None, *_: object) -> object:
-    """Convert a typed array to a list. Older versions of cbor2 pass their decoder as first argument."""
+    """Convert a typed array to a list. Old versions of cbor2 pass the decoder as the first argument."""
     tag = first if hasattr(first, "tag") else second
     format_ = _FORMATS.get(tag.tag)
     if format_ is None or not isinstance(tag.value, bytes):

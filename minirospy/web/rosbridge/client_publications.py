@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ClientPublications"]
 
-_LARGE_LATCHED = 100_000  # maximum bytes of a latched message that is kept after its publisher has left
+_LARGE_LATCHED = 100_000  # maximum bytes of a latched message to keep after its publisher has disconnected
 
 
 @dataclass
@@ -94,7 +94,7 @@ class ClientPublications:
         return self._publish_to(published, event)
 
     async def _publish_established(self, event: protocol.Publish) -> None:
-        """Publish on a topic that the client has not advertised, with the type that the topic has in the graph."""
+        """Publish on a topic that the client has not advertised, with the type that the graph has for the topic."""
         type_ = await self._session.type_of(event.topic)
         published = self._open(event.topic, type_, event.latch)
         published.ids.add(None)

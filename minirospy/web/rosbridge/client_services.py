@@ -22,8 +22,8 @@ __all__ = ["ClientServices"]
 
 _log = logging.getLogger(__name__)
 
-_MAX_CALLS = 200  # maximum calls in progress from one client
-_MAX_SERVICES = 200  # maximum services that one client offers
+_MAX_CALLS = 200  # maximum number of concurrent calls from one client
+_MAX_SERVICES = 200  # maximum number of services that one client may offer
 
 
 class ClientServices:
@@ -58,7 +58,7 @@ class ClientServices:
             self._session.count()
 
         self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
-        # Report the memory last, because this closes the client, and cancels the call, if the limit is exceeded.
+        # Report the memory last: if the limit is exceeded, this disconnects the client and cancels the call.
         self._session.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:

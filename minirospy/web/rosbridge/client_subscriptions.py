@@ -57,7 +57,7 @@ class ClientSubscriptions:
         self._add(event)
 
     async def _subscribe_unknown(self, event: protocol.Subscribe, error: BridgeError) -> None:
-        """Subscribe with a type that is not installed here, if it is the topic's type. The publishers send its definition."""
+        """Subscribe with a type that is not installed here, if the topic has that type. The publishers send its definition."""
         with contextlib.suppress(BridgeError):
             if await self._session.type_of(event.topic) == event.type:
                 self._add(event)

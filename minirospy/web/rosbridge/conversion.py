@@ -117,8 +117,7 @@ def _float(found: float) -> float | None:
 
 
 def _floats(found: Sequence[float]) -> list[float | None]:
-    # The sum of finite numbers is finite, unless it overflows, so most arrays can be accepted without checking each
-    # number.
+    # The sum of finite numbers is finite unless it overflows, so checking the sum is enough for most arrays.
     if math.isfinite(sum(found)):
         return list(found)
     return [each if math.isfinite(each) else None for each in found]

@@ -46,7 +46,7 @@ class RosbridgeEndpoint:
         return session
 
     def close(self) -> None:
-        """Stop the threads after the work in progress. Idempotent."""
+        """Stop the threads once the work in progress is done. Idempotent."""
         self.shared.close()
 
     def _left(self, session: RosbridgeSession) -> None:

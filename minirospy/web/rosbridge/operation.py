@@ -32,19 +32,20 @@ __all__ = [
     "type_conflict",
 ]
 
-MAX_TOPICS = 1000  # maximum topics that one client publishes, and maximum topics that it subscribes to
-# Per client: maximum bytes of operations queued behind a blocked one, and also of latched messages
+# maximum number of topics that one client may publish, and maximum number that it may subscribe to
+MAX_TOPICS = 1000
+# Maximum per client: bytes of operations queued behind a blocked one, and bytes of latched messages
 MAX_WAITING_BYTES = 64_000_000
 
 REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, MessageException)
-"""Exceptions in an operation that are reported to the client."""
+"""Exceptions raised by an operation that are reported to the client."""
 
 Work = Coroutine[object, object, None]
-"""The rest of an operation that must wait, for example for the graph."""
+"""The remaining work of an operation that must wait, for example for the graph."""
 
 
 class OperationSession(Protocol):
-    """The interface of the session whose client's operation is being executed, for the handlers."""
+    """The session of the client whose operation is being executed, as the handlers see it."""
 
     @property
     def client(self) -> WebClient: ...
@@ -65,7 +66,7 @@ class OperationSession(Protocol):
 
     @property
     def is_large(self) -> bool:
-        """Return whether the current operation's message is large, so that a thread creates the ROS message."""
+        """Return whether the current operation's message is so large that the ROS message is created in a thread."""
 
     def send(self, fields: Mapping[str, object]) -> None:
         """Send a message that does not belong to a topic."""

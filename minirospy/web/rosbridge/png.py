@@ -16,7 +16,9 @@ from minirospy.base.errors import BridgeProtocolError
 __all__ = ["decode", "encode"]
 
 _MAX_PIXELS = 5_600_000
-"""Maximum pixels in a client's image, which decode to 17 MB of text (3 bytes per pixel); wide characters quadruple the memory."""
+"""Maximum number of pixels in a client's image. They decode to 17 MB of text (3 bytes per pixel), or four times that with
+wide characters.
+"""
 
 
 def encode(text: str) -> str:

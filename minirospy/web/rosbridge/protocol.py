@@ -59,7 +59,9 @@ Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
 _MAX_FRAGMENTS = 2_000
-"""Maximum fragments per message to a client. A client may request fragments of one character, each of which is a message."""
+"""Maximum number of fragments per message to a client. A client may request fragments of one character, each sent as a
+message.
+"""
 
 _LONGEST_ID = 1000
 _SHOWN = 200
@@ -67,7 +69,7 @@ _SHOWN = 200
 
 
 class StatusLevel(IntEnum):
-    """The severity of a status message. A client receives messages up to the level that it has set."""
+    """The severity of a status message. A client sets the level up to which it receives messages."""
 
     NONE = 0
     ERROR = 1
@@ -273,8 +275,8 @@ def _text_of(value: object, most: int) -> str:
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Truncate a value from JSON or CBOR to its first items, because each item takes at least one character."""
-    # The quotes around a string depend on the quotes in it, including those in the part cut off.
+    """Truncate a value from JSON or CBOR to its first items; each item takes at least one character of output."""
+    # The quotes around a string depend on the quotes inside it, even in the part that is cut off.
     if isinstance(value, str) and len(value) > most:
         return value[:most] + "".join(quote for quote in "'\"" if quote in value)
     if isinstance(value, bytes) and len(value) > most:

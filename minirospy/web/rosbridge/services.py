@@ -98,7 +98,7 @@ class ClientService:
         graph.refresh_soon()
 
     async def close(self, why: str) -> None:
-        """Stop offering the service; calls in progress fail with ``why``."""
+        """Stop offering the service; calls in progress fail with the error ``why``."""
         for future in self._waiting.values():
             if not future.done():
                 future.set_exception(ServiceException(why))
@@ -120,7 +120,7 @@ class ClientService:
         future.set_result(response)
 
     async def answered_large(self, event: protocol.ServiceResponse, in_thread: InThread) -> None:
-        """Do the same as :meth:`answered` for a large response, which is converted in a thread."""
+        """Like :meth:`answered`, for a large response, which is converted in a thread."""
         future = self._taken(event)
         try:
             response = await in_thread(lambda: self._response(event)) if event.result else None

@@ -31,10 +31,10 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-# ratio of a parsed operation's memory to that of its text, for objects and lists of numbers
+# ratio of the memory of a parsed operation to that of its text, for objects and lists of numbers
 _VALUE_FACTOR = 4
 
-# maximum bytes from a read-only client, which only subscribes and needs less; each byte may become a value
+# maximum bytes per CBOR message from a read-only client, which only sends small requests; each byte may become a value
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4
@@ -42,7 +42,7 @@ _FAILED = 1011
 
 
 class _Pending(NamedTuple):
-    """The rest of an operation that must wait. ``event`` is None if the work reports its errors itself."""
+    """The remaining work of an operation that must wait. ``event`` is None if the work reports its own errors."""
 
     event: Event | None
     work: Work
@@ -114,7 +114,7 @@ class RosbridgeSession:
         self._subscriptions.close()
         self._publications.close()
         self._services.close()
-        # The session is part of reference cycles: release its memory now, not when they are collected.
+        # The session is part of reference cycles: release its memory now instead of when the garbage collector runs.
         self._inbox.clear()
         self._fragments.clear()
         for task in list(self._tasks):
@@ -136,7 +136,7 @@ class RosbridgeSession:
                 self.client.send_text(message)
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status message if the client has requested this level. Log it if its level is above INFO."""
+        """Send a status message if the client has requested this level. Log it if it is more severe than INFO."""
         if level <= self._level:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:
@@ -174,7 +174,7 @@ class RosbridgeSession:
             self.count()
 
     async def _work(self, first: _Pending, size: int) -> None:
-        """Finish an operation whose message has ``size`` bytes, then execute those that have arrived in the meantime."""
+        """Finish an operation whose message has ``size`` bytes, then execute the operations received in the meantime."""
         try:
             await self._finish(first)
             self._inbox_size -= size
@@ -205,9 +205,9 @@ class RosbridgeSession:
         return self._carry_out(event)
 
     def _begin_large(self, data: str | bytes) -> _Pending | None:
-        """Parse a large message in a thread, so that no other client has to wait. Until then, pause reading from the client."""
+        """Parse a large message in a thread, so that no other client has to wait. Pause reading from the client until then."""
         if not self.client.may_write:
-            # The message comes from joined fragments or a PNG: the connection itself refuses messages of this size.
+            # The message comes from joined fragments or a PNG; the connection itself refuses messages of this size.
             self._refuse_large(data)
             return None
         self.client.pause()
@@ -247,7 +247,7 @@ class RosbridgeSession:
         except REFUSALS as error:
             self._failed(event, error)
             return None
-        # An operation that a fragment completes is separate, and has its own event.
+        # An operation that a fragment completes is a separate operation with its own event.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:

@@ -19,13 +19,13 @@ from minirospy.web.rosbridge.cbor import encode_cbor
 from minirospy.web.rosbridge.services import ClientService
 from minirospy.web.rosbridge.types import ArrivingTypes
 
-__all__ = ["RosbridgeOptions", "RosbridgeShared"]
+__all__ = ["RosbridgeOptions", "RosbridgeShared", "encode_arrival"]
 
 _LOG_LINES = 20
 
-# maximum bytes of a message that is encoded immediately; 8,000 numbers take 8 ms
+# maximum bytes of a message to encode on the loop; 8,000 numbers take 8 ms
 _MAX_QUICK_BODY = 64 * 1024
-# maximum bytes of an image that is encoded immediately; encoding it in base64 takes 3 ms
+# maximum bytes of an image to encode on the loop; base64-encoding it takes 3 ms
 _MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
@@ -49,7 +49,7 @@ class RosbridgeOptions:
 
 
 class _LargeWork:
-    """Runs work on large messages in one thread, one piece of work at a time."""
+    """Runs work on large messages in one thread, one job at a time."""
 
     def __init__(self, name: str) -> None:
         self._name = name  # name of the thread
@@ -59,8 +59,7 @@ class _LargeWork:
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
         """Run ``work`` in the thread and return its result."""
-        # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
-        # immediately.
+        # Do not queue work in the executor: if a client leaves while its work waits here, its message is freed immediately.
         async with self._is_busy:
             if self._is_closed:
                 raise asyncio.CancelledError
@@ -69,7 +68,7 @@ class _LargeWork:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def close(self) -> None:
-        """Stop the thread after the work in progress, and cancel work that is queued. Idempotent."""
+        """Stop the thread once the work in progress is done, and cancel queued work. Idempotent."""
         self._is_closed = True
         if self._thread:
             self._thread.shutdown(wait=False, cancel_futures=True)
@@ -95,7 +94,7 @@ class RosbridgeShared:
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
 
     def close(self) -> None:
-        """Stop the threads after the work in progress. Idempotent."""
+        """Stop the threads once the work in progress is done. Idempotent."""
         self.in_thread.close()
         self.encode.close()
 
@@ -104,7 +103,7 @@ class RosbridgeShared:
         self._encoded.clear()
 
     def release(self, publication: Publication) -> None:
-        """Release a publication after a delay, within which clients may advertise it again."""
+        """Release a publication after a delay, in which clients may advertise it again."""
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
 
     def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
@@ -145,18 +144,18 @@ class RosbridgeShared:
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:
-            made = found[compression] = _encoded(topic, class_, arrival, compression, dump_json)
+            made = found[compression] = encode_arrival(topic, class_, arrival, compression, dump_json)
         return made
 
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Like :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
+        """Like :meth:`encoded`, but encode in a thread, so that only the clients that receive this message wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:
             # The encoding may have been created for another client in the meantime.
-            return found.get(compression) or _encoded(
+            return found.get(compression) or encode_arrival(
                 topic, class_, arrival, compression, dump_json_in_pieces
             )
 
@@ -172,13 +171,14 @@ class RosbridgeShared:
         return known[1]
 
 
-def _encoded(
+def encode_arrival(
     topic: str,
     class_: type[Message] | None,
     arrival: Arrival,
     compression: str,
     dump: Callable[[object], str],
 ) -> bytes:
+    """Return a message encoded for clients; ``dump`` encodes JSON. Raise BridgeError if it cannot be encoded."""
     if compression == "cbor-raw":
         secs, nsecs = divmod(arrival.nanoseconds, 1_000_000_000)
         raw = {"secs": secs, "nsecs": nsecs, "bytes": bytes(arrival.body)}

@@ -18,11 +18,13 @@ _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
 
 MAX_FRAGMENT_BYTES = 64_000_000
-"""Maximum memory for one client's incomplete messages, including overhead: a wide character takes two or four bytes."""
+"""Maximum memory, in bytes, for one client's incomplete messages, including overhead. A wide character takes two or four
+bytes.
+"""
 _MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
-"""Overhead in bytes: of a fragment in addition to its text, and of an incomplete message in addition to its fragments."""
+"""Bytes of overhead of each fragment, beyond its text, and of each incomplete message, beyond its fragments."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Budget:
 class Pacer(Generic[_T]):
     """Limits a topic's rate to one message per ``throttle`` seconds.
 
-    The newest ``queue_length`` messages are queued, older ones are dropped.
+    The newest ``queue_length`` messages are queued; older ones are dropped.
     """
 
     def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:
@@ -135,7 +137,7 @@ class Fragments:
     def __init__(self, timeout: float = 600.0) -> None:
         """Create the collection. ``timeout``: seconds after which an incomplete message is discarded."""
         self._timeout = timeout
-        # The message whose last fragment is oldest comes first.
+        # The messages are ordered by the time of their last fragment, oldest first.
         self._messages: OrderedDict[Hashable, _Parts] = OrderedDict()
         self.size = 0
         """Total bytes of memory of the fragments."""
@@ -167,7 +169,7 @@ class Fragments:
         if len(known.parts) < known.total:
             return None
         self._forget(fragment.id)
-        # One wide character makes every character in the message wide.
+        # One wide character makes all characters of the message wide in memory.
         width = max(map(width_of, known.parts.values()))
         if width * sum(map(len, known.parts.values())) > MAX_FRAGMENT_BYTES:
             raise OperationError(

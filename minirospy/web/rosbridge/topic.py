@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_IDS", "ClientTopic"]
 
 MAX_IDS = 100
-"""Maximum subscriptions of one client to one topic, and maximum advertisements of one topic by one client."""
+"""Maximum number of subscriptions of one client to one topic, and of advertisements of one topic by one client."""
 
 
 class ClientTopic:
@@ -51,7 +51,7 @@ class ClientTopic:
         self._update()
         self._shared.graph.subscribe(self._topic, self._arrived)
         if not is_first:
-            # Cancel the additional subscription, made only to receive the latched messages again.
+            # Cancel the extra subscription, which was only made to receive the latched messages again.
             self._shared.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
@@ -99,8 +99,7 @@ class ClientTopic:
         self._wait()
 
     def _send(self, arrival: Arrival) -> None:
-        # Encode in the client's turn, because encoding a large message, and splitting it into fragments, takes
-        # milliseconds per client.
+        # Encode in the client's turn: encoding and fragmenting a large message takes milliseconds per client.
         self._session.client.in_turn(lambda: self._send_now(arrival), arrival.body)
 
     def _send_now(self, arrival: Arrival) -> None:
@@ -122,7 +121,7 @@ class ClientTopic:
         self._queue(data, self._fragments(data, size, arrival) if size else None, self._merged)
 
     async def _send_large(self, arrival: Arrival, class_: type[Message] | None, merged: Merged) -> None:
-        """Send a message that takes long to encode; the session's other messages wait until it is sent."""
+        """Send a message that is slow to encode; the session's other messages wait until it is sent."""
         try:
             data = await self._shared.encoded_large(self.name, class_, arrival, merged.compression)
             size = self._fragment_size(merged, data)

@@ -34,8 +34,7 @@ def _installed(get: Callable[[str], _Class | None], name: str, kind: str) -> _Cl
     try:
         found = get(name)
     except Exception as error:
-        # Importing a third-party message module may raise anything. Report that error as the reason why the type is
-        # unknown.
+        # Importing a third-party message module may raise any exception. Report it as the reason why the type is unknown.
         raise _unknown(
             name, kind, f"{type(error).__name__}: {error}" if _is_foreign(error) else str(error)
         ) from error
@@ -70,7 +69,10 @@ def _is_installed(package: str) -> bool:
 
 
 class ArrivingTypes:
-    """Classes for publishers' messages: the installed class if its md5sum matches, else one generated from the definition."""
+    """Classes for received messages.
+
+    Uses the installed class if the publisher's md5sum matches; otherwise generates one from the publisher's definition.
+    """
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message] | None] = {}

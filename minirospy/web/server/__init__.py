@@ -1,1 +1,1 @@
-"""WebSocket and HTTP, without ROS: listeners, connections, output queues, and limits on who may connect."""
+"""WebSocket and HTTP, without ROS: listeners, connections, output queues, and limits on clients."""

@@ -22,7 +22,7 @@ The process stays below 400 MB, including copies while it handles a message.
 """
 
 LARGE_PIECE = 32_768
-"""Minimum size in bytes of a large piece, which is counted only once even if it is queued for many clients."""
+"""Minimum size, in bytes, of a large piece. A large piece is counted only once even if it is queued for many clients."""
 
 Piece = bytes | memoryview | bytearray
 
@@ -33,13 +33,13 @@ class Share:
     def __init__(self, account: Account, address: str, shed: Callable[[], object]) -> None:
         self.address = address
         self.is_owner = False
-        """True once the client has proved to be the owner. Its share is then the last to be reduced."""
+        """True once the client has proved to be the owner. Its memory is then reduced last."""
         self.size = 0
         """Bytes that only this client uses."""
         self.large = 0
-        """Bytes of the large pieces queued for this client. Other clients may have queued the same pieces."""
+        """Total bytes of the large pieces queued for this client. Other clients may share the same pieces."""
         self.shed = shed
-        """Releases some or all of the client's memory."""
+        """called to release some or all of the client's memory"""
         self._account = account
 
     @property
@@ -76,7 +76,9 @@ class Account:
         """Number of times that a client had to release memory."""
         self._shares: set[Share] = set()
         self.holders: Counter[int] = Counter()
-        """Number of times that each large piece is queued, keyed by the object's id. The object exists while it is queued."""
+        """Number of queues that contain each large piece, keyed by the object's id. The id is valid because a queue keeps
+        the object alive.
+        """
         self._is_enforcing = False
 
     def open(self, address: str, shed: Callable[[], object]) -> Share:
@@ -119,7 +121,7 @@ class Account:
     def enforce(self) -> None:
         """Make clients release memory until the total is within the limit."""
         if self._is_enforcing:
-            return  # releasing memory calls this method recursively
+            return  # releasing memory calls this method again
         self._is_enforcing = True
         try:
             while self.total > self.limit:
@@ -130,7 +132,7 @@ class Account:
                 self.shed += 1
                 share.shed()
                 if share.weight >= before:
-                    # The client has released nothing: remove it, so that it is not chosen forever.
+                    # The client has not released anything: remove it, so that it is not chosen again and again.
                     self.close(share)
         finally:
             self._is_enforcing = False

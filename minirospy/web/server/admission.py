@@ -1,12 +1,12 @@
-"""Select the connection to close for a new one if the maximum number of connections is reached. Pure.
+"""Select a connection to close when a new one arrives and the maximum number is reached. Pure.
 
-An attacker occupies connections: it opens them and sends no request, or is served and then sends nothing, or only occasionally
-a little. It has few addresses and no token. Therefore connections are closed in this order:
+An attacker occupies connections: it opens them and sends no request, or is served and then sends nothing, or only a little
+now and then. It has few addresses and no token. Therefore connections are closed in this order:
 
-1. a connection without a request that is older than some seconds, or whose address has too many such connections; 2. a
-client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
-3. for an address with few connections, a client of an address that has more than half of all connections; 4. for the
-owner, any client of another user.
+1. a connection without a request, if it is older than some seconds or its address has too many such connections;
+2. a client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
+3. for an address with few connections, a client of an address that has more than half of all connections;
+4. for the owner, any client of another user.
 
 A client is closed only for a connection whose rights are at least equal.
 """
@@ -24,15 +24,15 @@ __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 
 # seconds within which a client should send its request; a browser opens some connections in advance
 SILENT_SECONDS = 5.0
-# maximum connections per address that have sent no request and are younger than SILENT_SECONDS; a browser opens six
+# maximum connections per address that are younger than SILENT_SECONDS and have sent no request; a browser opens six
 MAX_SILENT = 16
-# seconds without traffic after which a client is idle; pages send or receive something more often
+# seconds without traffic after which a client counts as idle; the dashboard's pages send or receive something more often
 IDLE_SECONDS = 30.0
-FEW = 8  # an address has few connections if it has less than an eighth of all connections
+FEW = 8  # an address has few connections if it holds less than an eighth of all connections
 
 
 class Rank(IntEnum):
-    """A connection's rights, as far as they are known."""
+    """A connection's rank by its rights, as far as they are known."""
 
     SILENT = 0
     """The client has sent no request yet."""
@@ -66,7 +66,7 @@ _O = TypeVar("_O", bound=Occupant)
 
 
 def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O | None:
-    """Return the connection to close for a new one from ``peer``, or None if there is none."""
+    """Return the connection to close so that ``peer`` can connect, or None if there is none."""
     found = list(occupants)
     silent = [each for each in found if each.rank is Rank.SILENT]
     old = [each for each in silent if now - each.active >= SILENT_SECONDS]

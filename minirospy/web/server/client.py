@@ -55,7 +55,7 @@ class Limits:
 
     message: int = 64_000_000
     read_only_message: int = 64 * 1024
-    """Maximum bytes in a message from a read-only client, which subscribes but sends no large messages."""
+    """Maximum bytes per message from a read-only client, which subscribes but does not send large messages."""
     memory: int = MAX_BYTES
     """Maximum memory, in bytes, used for all clients together; see account.py."""
     messages_a_second: int = 20_000
@@ -65,12 +65,14 @@ class Limits:
     connections_a_second: float = 50.0
     connection_burst: int = 500
     reserve: int = 32
-    """Number of connections that may exceed ``connections`` until their request is known."""
+    """Number of connections allowed above ``connections`` until their request is known."""
     handshake_seconds: float = 30.0
-    """Seconds for the handshake. A browser opens connections in advance and uses them within ten seconds, so this is longer."""
+    """Seconds for the handshake. Longer than the ten seconds within which a browser uses a connection that it opened in
+    advance.
+    """
     ping_seconds: float = 20.0
     silent_seconds: float = 60.0
-    """Seconds after which a client that responds to no ping, or reads nothing, is disconnected."""
+    """Seconds after which a client is disconnected if it responds to no ping or reads no data."""
 
 
 class HttpRequest(NamedTuple):
@@ -83,7 +85,7 @@ class HttpRequest(NamedTuple):
     peer_port: int = 0
     address: str = ""
     port: int = 0
-    """The client's port (``peer_port``), and the server's address and port, for this connection; see Endpoints in pipe.py."""
+    """The client's port, then the server's address and port; see Endpoints in pipe.py."""
 
 
 class Session(Protocol):
@@ -113,7 +115,7 @@ HttpHandler = Callable[["Exchange"], None]
 
 
 class ClientConnection(Protocol):
-    """The connection to a client, as :class:`WebClient` and :class:`Exchange` use it."""
+    """The part of a client's connection that :class:`WebClient` and :class:`Exchange` use."""
 
     @property
     def is_open(self) -> bool: ...
@@ -196,7 +198,7 @@ class WebClient:
         )
 
     def holds(self, count: int) -> None:
-        """Set the memory, in bytes, that the session uses for the client's queued or current messages."""
+        """Record how many bytes of memory the session uses for the client's queued and current messages."""
         self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
@@ -221,7 +223,7 @@ class WebClient:
         self._connection.queue.discard(key)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Run ``work``, which takes long, in the client's turn.
+        """Run ``work``, which is slow, in the client's turn.
 
         ``work`` uses ``message``, whose bytes are counted until then.
         """

@@ -60,7 +60,7 @@ _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 
 On loopback any program may write; the dashboard's page has the owner's token.
 """
-# weight until the request is known; low, so that established clients do not wait for 250 handshakes
+# weight until the request is known; low, so that 250 handshakes do not delay established clients
 _NEW_WEIGHT = 0.25
 
 
@@ -120,7 +120,7 @@ class Connection:
         self.session: Session | None = None  # set from a WebSocket's handshake until the connection closes
         self.client: WebClient | None = None  # set once a WebSocket's handshake is complete
         self.exchange: Exchange | None = None  # set from the request for a page until the connection closes
-        # the client's access rights; set by the listener when it admits the request
+        # the client's rights; the listener sets them when it admits the request
         self.rank = Rank.SILENT
         self.active = now  # when the connection was opened, or last received a message or sent one
         # bytes of incomplete messages, and of the message that the session is processing
@@ -139,12 +139,12 @@ class Connection:
         self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
         self._is_held_back = False  # True if the client has used up its frame quota for the current second
-        self._is_paused = False  # True while the session works on an earlier message, see hold()
-        self._worked_on = 0  # bytes of the message that the session works on
+        self._is_paused = False  # True while the session is processing a message, see hold()
+        self._worked_on = 0  # size in bytes of the message that the session is processing
         self._are_jobs_held = False  # True while a job continues in a thread; see hold_jobs()
-        self._held = 0  # bytes that the session uses for the client; see session_holds()
+        self._held = 0  # bytes of memory that the session uses for the client; see session_holds()
         self._is_in_turn = False  # True while _work() runs
-        # Calls _handshake_late at first, later the check of an open connection, and finally _abort for a closing one.
+        # Calls _handshake_late at first, then the periodic check of the open connection, and _abort while closing.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
 
     @property
@@ -178,7 +178,7 @@ class Connection:
         if self.exchange:
             return  # a connection has only one request
         self._websocket.feed(data)
-        # Read a large message in large pieces, unless other clients are waiting for their turns.
+        # Read a large message in large pieces, unless other clients are waiting for their turn.
         is_alone = len(data) >= SMALL_READ and not self.site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
         if self._is_held_back or self._is_paused or self.site.turns.start(self.turn):
@@ -205,7 +205,7 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
-        # The connection is part of reference cycles: release its memory now, not when they are collected.
+        # The connection is part of reference cycles: release its memory now instead of when the garbage collector runs.
         self._jobs.clear()
         self._output.end()
         self.site.account.close(self.share)
@@ -271,7 +271,7 @@ class Connection:
     # --- called by the session
 
     def hold(self, *, is_held: bool) -> None:
-        """Stop or continue handling frames while the session processes one. Unread data stays in the client's socket."""
+        """Stop or continue handling frames while the session processes a message. Unread data stays in the socket's buffer."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()
@@ -304,7 +304,7 @@ class Connection:
             self.site.turns.start(self.turn)
 
     def session_holds(self, count: int) -> None:
-        """Set the memory, in bytes, that the session uses for the client."""
+        """Record how many bytes of memory the session uses for the client."""
         self._held = count
         if self._phase is not _Phase.ENDED:
             self._count()
@@ -312,7 +312,7 @@ class Connection:
     # --- handling the client's input
 
     def _work(self, end: float) -> bool:
-        """Do work for the client until the time ``end``; return whether more is left."""
+        """Do work for the client until the time ``end``. Return True if any work is left."""
         self._is_in_turn = True
         try:
             return self._do_jobs(end) or self._handle_frames(end)
@@ -339,7 +339,10 @@ class Connection:
         return False
 
     def _handle_frames(self, end: float) -> bool:
-        """Handle frames until the time ``end``; return whether more are left within the client's quota for this second."""
+        """Handle frames until the time ``end``.
+
+        Return True if frames remain that the client's quota for this second still allows.
+        """
         if self.client is None:
             self._parse_head()
         websocket, rate, time_of = self._websocket, self._websocket.rate, self.loop.time
@@ -367,8 +370,8 @@ class Connection:
     def framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
-            # Only the newest ping needs a response (RFC 6455, 5.5.3), so at most one is queued for a client that
-            # reads nothing.
+            # Queue at most one ping response, even for a client that does not read.
+            # Only the newest ping needs one (RFC 6455, 5.5.3).
             self.stream(_PONG, (frame_head(_PONG, len(event.data)), event.data), newest_only=True)
         elif event:
             self._deliver(event)
@@ -415,8 +418,8 @@ class Connection:
     def _parse_head(self) -> None:
         try:
             request = self._websocket.next_request()
-            # If the target or Origin is not a URL, or has a thousand fields, refuse the client instead of leaving it
-            # connected.
+            # Refuse the client if its target or Origin is not a URL or its query has a thousand fields.
+            # The exception must not leave it connected.
             found = self._admitted(read_head(request)) if request else None
         except ValueError as error:
             found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")
@@ -499,7 +502,7 @@ class Connection:
         self._count()
 
     def _count(self) -> None:
-        """Report the memory that only this client uses. As a result, clients (even this one) may have to release memory."""
+        """Charge the memory that only this client uses. This may make clients, even this one, release memory."""
         self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:

@@ -1,4 +1,4 @@
-"""Files that are sent to clients in pieces: a worker reads each piece after the client has received the one before.
+"""Files that are sent to clients in pieces: a worker reads a piece once the client has received the previous one.
 
 Thus a mesh of 60 MB uses the memory of only one piece for each client, even if many clients request it and read nothing.
 """
@@ -17,7 +17,7 @@ __all__ = ["PIECE_BYTES", "FileAnswer", "FileSender"]
 
 _log = logging.getLogger(__name__)
 
-# bytes to read at a time: enough that a worker's overhead is small, but little memory for 256 clients
+# bytes per read: large enough to keep the worker's overhead low, small enough for 256 clients at a time
 PIECE_BYTES = 128 * 1024
 
 

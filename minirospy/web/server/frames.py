@@ -1,4 +1,4 @@
-"""The protocol class of the library ``websockets``, modified to stop after each frame. Source: RFC 6455."""
+"""The library ``websockets``' protocol class, modified to stop after each frame. Source: RFC 6455."""
 
 from __future__ import annotations
 

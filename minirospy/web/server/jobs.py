@@ -11,7 +11,7 @@ from minirospy.web.server.account import LARGE_PIECE, Piece, Share
 __all__ = ["Jobs"]
 
 _MAX_JOBS = 1000  # maximum jobs of one client, each of which refers to a message that is not encoded yet
-_JOB_BYTES = 500  # bytes of memory for a job: 290 were measured, plus the record of the job's message
+_JOB_BYTES = 500  # bytes of memory per job: 290 were measured, plus the record of the job's message
 
 Work = Callable[[], None]
 

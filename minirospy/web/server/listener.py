@@ -193,7 +193,7 @@ class Listener:
             self._connected(sock, str(address[0]))
 
     def _rest(self, listening: socket.socket) -> None:
-        """Stop accepting for a second, because the listening socket stays readable, and the loop would spin."""
+        """Stop accepting for a second. The listening socket stays readable, so the loop would spin otherwise."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(listening)
 
@@ -246,7 +246,7 @@ class Listener:
         now = asyncio.get_running_loop().time()
         while found := displaced(peer, rank, occupants, now):
             if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):
-                found.rank = Rank.OWN  # looked up only here, because it is rarely needed
+                found.rank = Rank.OWN  # determined only here, because it is rarely needed
                 continue
             _log.info("%s gives way to %s", found.peer, peer)
             found.give_way()
@@ -276,7 +276,7 @@ def _refuse(sock: socket.socket, answer: bytes) -> None:
         sock.send(answer)
         sock.shutdown(socket.SHUT_WR)
     with contextlib.suppress(OSError):
-        # Read first, because closing a socket with unread data resets the connection, and the response is lost.
+        # Read first: closing a socket with unread data resets the connection, and the response would be lost.
         sock.recv(_REQUEST)
     sock.close()
 

@@ -1,4 +1,4 @@
-"""Detect WebSocket clients that are gone: they do not respond to pings, or read nothing. Pure."""
+"""Detect dead WebSocket clients: those that do not respond to pings or do not read. Pure."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ class Verdict(Enum):
 
 
 class Liveness:
-    """The time of the last data from a client, and whether it was pinged since. Times are seconds of one clock."""
+    """The time of the last data from a client, and whether it has been pinged since.
+
+    Times are in seconds, all on the same clock.
+    """
 
     def __init__(self, silent_seconds: float, now: float) -> None:
-        self.received = now  # time of the last data from the client
+        self.received = now  # time when the client last sent data
         self._silent_seconds = silent_seconds
         self._is_pinged = False  # True after a ping, until data arrives
 
@@ -41,8 +44,7 @@ class Liveness:
         """Return the action to take now for the client."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
-        # Check that a ping was sent: after the machine was suspended, the last data is old although no ping is
-        # unanswered.
+        # Check that a ping was sent: after a suspension of the machine, the last data is old even if no ping is unanswered.
         if self._is_pinged and now - self.received > self._silent_seconds:
             return Verdict.SILENT
         if is_full:

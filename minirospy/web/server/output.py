@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Output"]
 
-_BATCH_BYTES = 256 * 1024  # maximum bytes of small messages to combine in one write
+_BATCH_BYTES = 256 * 1024  # maximum bytes of small messages to combine into one write
 _BATCH_PIECES = 128
 # maximum bytes to write to a fast-reading client before the loop's next iteration
 _PUMP_BYTES = 1024 * 1024
@@ -43,7 +43,7 @@ class Output:
         self._loop = loop
         self._on_written = on_written
         self._file: FileSender | None = None  # the file that is being sent
-        # pieces that the pipe has not sent yet; the large ones count in the share
+        # pieces that the pipe has not sent yet; the client's share counts the large ones
         self._in_pipe: list[Piece] = []
         self._is_scheduled = False  # True from schedule() until the loop's next iteration
         self._is_closing = False  # set by close_when_sent()
@@ -56,7 +56,10 @@ class Output:
 
     @property
     def size(self) -> int:
-        """Return the bytes queued for this client only. Large pieces are not included: the client's share counts them."""
+        """Return the number of bytes queued for this client only.
+
+        Large pieces are excluded: the client's share counts them.
+        """
         queue = self.queue
         size = queue.size + queue.answers - queue.large
         if self._pipe.is_full:
@@ -146,8 +149,7 @@ class Output:
         piece = file.take()
         if piece is None:
             if file.has_failed:
-                # Close the pipe, because the size has been sent and the client would mistake any further data for the
-                # file.
+                # Close the pipe: the size has been sent, and the client would mistake any further data for the file.
                 self.abort()
             return None
         if file.is_done:

@@ -54,7 +54,7 @@ def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
     try:
         return _by_query(*ends)
     except (OSError, AttributeError, struct.error):
-        # This system does not support sock_diag, or does not allow it.
+        # The system does not support sock_diag or does not permit it.
         return _by_table(*ends)
 
 
@@ -74,8 +74,7 @@ def _by_query(end: _End, other_end: _End) -> int | None:
         answer = asking.recv(4096)
     kind = _MESSAGE.unpack_from(answer)[1]
     if kind != _SOCK_DIAG_BY_FAMILY:
-        # The response is an error; a missing socket and a query that the kernel does not support cause the same
-        # error.
+        # The response is an error, which is the same for a missing socket and for a query that the kernel does not support.
         return _by_table(end, other_end)
     if len(answer) < _ANSWER_SIZE or answer[_MESSAGE.size + 1] == _LISTEN:
         return None

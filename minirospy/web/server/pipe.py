@@ -105,7 +105,7 @@ class PlainPipe:
         return _endpoints(self._sock)
 
     def write(self, pieces: Sequence[Piece]) -> None:
-        """Send pieces, and store the part that the kernel does not accept at present."""
+        """Send pieces; store what the kernel does not accept yet."""
         if self._is_closing:
             return
         was_full = bool(self._rest)
@@ -179,8 +179,7 @@ class PlainPipe:
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         with contextlib.suppress(OSError):
-            # Shut down first: closing a socket with unread data resets the connection, and the peer could lose data
-            # sent to it.
+            # Shut down first: closing a socket with unread data resets the connection, and the peer could lose data sent to it.
             self._sock.shutdown(socket.SHUT_WR)
         self._sock.close()
         self._events.ended()

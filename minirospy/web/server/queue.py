@@ -1,4 +1,4 @@
-"""The output queue of one client: limited in size, oldest first, and always with the newest message of each topic.
+"""The output queue of one client: first in, first out, limited in size. It always keeps the newest message of each topic.
 
 Pure. A message is queued under a key (its topic or subscription). If the limit is exceeded, the key's own oldest message
 is dropped, then the oldest message of the key with the most bytes, so that a camera does not displace small messages.
@@ -34,7 +34,7 @@ _FILE_BYTES = 1000
 
 
 class _Entry(NamedTuple):
-    """A message or, if the key is None, a response; ``size``: bytes of its pieces and of the entry."""
+    """A message, or a response if the key is None; ``size``: bytes of its pieces and of the entry."""
 
     key: Hashable | None
     pieces: tuple[Piece, ...] | FileAnswer
@@ -74,7 +74,7 @@ class SendQueue:
         self.dropped = 0
         """Number of messages that were dropped in favour of newer ones."""
         self.dropped_of: Counter[Hashable] = Counter()
-        """Number of dropped messages, keyed by key, for the keys in use."""
+        """Number of dropped messages per key, for the keys in use."""
         self._share = share
         self._entry_bytes = entry_bytes
         self._number = 0
@@ -87,7 +87,7 @@ class SendQueue:
 
     @property
     def is_overrun(self) -> bool:
-        """Return whether more responses are queued than a client that reads them could ever have."""
+        """Return whether more responses are queued than is possible for a client that reads them."""
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:

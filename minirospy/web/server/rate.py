@@ -9,7 +9,7 @@ from typing import NamedTuple
 __all__ = ["MAX_ADDRESSES", "ConnectionRate"]
 
 MAX_ADDRESSES = 1000
-"""Maximum number of addresses to store; beyond that, the address that connected longest ago is forgotten."""
+"""Maximum number of addresses to store. Above it, the address whose last connection is oldest is forgotten."""
 
 
 class _Bucket(NamedTuple):
@@ -35,7 +35,7 @@ class ConnectionRate:
         return len(self._buckets)
 
     def admits(self, address: str) -> bool:
-        """Return whether an address may open a connection now, and count the connection."""
+        """Count a connection from an address; return whether it is allowed now."""
         now = self._clock()
         tokens, since = self._buckets.pop(address, _Bucket(self._burst, now))
         tokens = min(self._burst, tokens + (now - since) * self._a_second)

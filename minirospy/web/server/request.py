@@ -22,7 +22,7 @@ __all__ = ["RequestHead", "read_head", "refusal_response"]
 _EXTRA_HEADERS: Mapping[int, Mapping[str, str]] = {
     401: {"WWW-Authenticate": "Bearer"},
     503: {"Retry-After": "5"},
-}  # additional headers of a refusal, by its status
+}  # additional headers of a refusal, keyed by status
 
 
 class RequestHead(NamedTuple):

@@ -5,7 +5,7 @@ together use less than half of the time; beyond that it is queued, and each iter
 milliseconds of it.
 
 There are two queues, like the classes in a multilevel feedback scheduler: one for interactive clients, which send little
-at a time and then nothing until they receive a response, and one for bulk clients, whose work never ends or takes long.
+and then wait for the response, and one for bulk clients, whose work never ends or takes a long time.
 Interactive clients are served first, so that none of them waits for a slice of each of 250 clients that flood the server;
 bulk clients get at least a fifth of the time.
 
@@ -30,20 +30,21 @@ __all__ = ["FairTurns", "Share", "cpu_meter"]
 _log = logging.getLogger(__name__)
 
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
-# seconds of one client's work before the next client's work; with 250 clients the wait is 25 ms
+# seconds of work for one client before the next client's turn; with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# pieces of work after which a client is no longer new; until then, its work is expected to take as long as that of
-# other new clients
+# number of jobs for which a client counts as new: each is expected to take as long as those of other new clients
 NEW_PIECES = 8
-EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work that takes less
-IMMEDIATE_SHARE = 0.5  # share of the time for work that starts without being queued
-# Maximum burst of an interactive client in slices, 1 ms in total: a request takes 0.1 to 0.5 ms, 64 kB of empty
-# frames take 100 ms. A new client has one slice, and gets one more with each short burst, so that 250 new clients
-# that flood the server each get one slice, and are then served after its other clients.
+EXPECTED_DECAY = 0.9  # factor by which the expected seconds decay after each job that takes less
+IMMEDIATE_SHARE = 0.5  # fraction of the time for work that starts without being queued
+# Maximum burst of an interactive client in slices, 1 ms in total.
+# A request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms.
+# A new client has one slice, and gets one more with each short burst.
+# If 250 new clients flood the server, each gets one slice; after that, its other clients are served first.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
-BULK_SHARE = 0.2  # minimum share of the time for bulk clients, even while interactive clients use the rest
+# minimum fraction of the time for bulk clients, even while interactive clients use the rest
+BULK_SHARE = 0.2
 
 Work = Callable[[float], bool]
 """A function that works until a time of the clock; it returns whether more work is left."""
@@ -97,7 +98,7 @@ class _FairQueue:
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
-        # tag of the work that was started last, or the highest tag if the queue was empty then
+        # tag of the work that was started last; if the queue was empty then, the highest tag
         self.served = 0.0
         self.highest = 0.0  # highest tag of a client that was served
 
@@ -135,7 +136,7 @@ class FairTurns:
         self._bulk = _FairQueue()
         self._bulk_credit = 0.0  # seconds for which bulk clients are served first
         self._numbers = itertools.count()
-        self._is_running = False  # True while a client's work runs
+        self._is_running = False  # True while a client's work is running
         self._is_scheduled = False  # True from call_soon() until the callback runs
 
     def __len__(self) -> int:
@@ -181,7 +182,7 @@ class FairTurns:
         queue = self._queue_of(share)
         queue.update()
         if queue is not share.queue:
-            # Tags of one queue are meaningless in the other queue.
+            # A tag of one queue has no meaning in the other.
             share.queue = queue
             share.tag = queue.served
         share.is_queued = True
@@ -199,7 +200,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If several clients would end at the same tag, serve the one that has used less time first.
+        # If several clients would end at the same tag, serve the one that has used the least time first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 
@@ -214,8 +215,7 @@ class FairTurns:
             queue = self._next_queue()
             end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
-                # A new client's work is now expected to take longer than when this client was queued, so queue it
-                # again.
+                # A new client's work is now expected to take longer than when this work was queued, so requeue it.
                 self._push(share, start)
                 continue
             share.is_queued = False
@@ -235,7 +235,7 @@ class FairTurns:
 
     def _update_bulk_credit(self, queue: _FairQueue, seconds: float) -> None:
         change = -seconds * (1 - BULK_SHARE) if queue is self._bulk else seconds * BULK_SHARE
-        # Limit the credit in both directions, so that time used long ago does not count.
+        # Bound the credit from above and below, so that time used long ago does not count.
         most = self._turn_seconds
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 

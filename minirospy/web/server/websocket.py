@@ -180,6 +180,7 @@ def _select(
     return select(names)  # type: ignore[return-value]
 
 
-# The library logs each frame at DEBUG, and logs headers, which contain tokens. This logger is not in the hierarchy of
-# loggers, so that no configuration of them can show its messages, which are all below CRITICAL.
+# The library logs each frame at DEBUG, and headers, which contain tokens.
+# This logger is not part of the logging hierarchy, and drops everything below CRITICAL.
+# Its messages therefore never appear, whatever the logging configuration.
 _QUIET = logging.Logger(__name__, logging.CRITICAL)

@@ -36,7 +36,7 @@ _A_TURN = 50
 
 
 class _Closing(Protocol):
-    """A part to close together with the republisher."""
+    """A part that is closed together with the republisher."""
 
     async def close(self) -> None: ...
 
@@ -100,7 +100,7 @@ class Republisher:
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         task.add_done_callback(self._reporter.of_task)
-        # A rosbridge client subscribes without a type, so the master must know the topic before the response is sent.
+        # A rosbridge client subscribes without giving a type, so the master must know the topic before the response is sent.
         await publisher
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}

@@ -22,9 +22,9 @@ __all__ = ["VideoPages"]
 
 SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
-"""Maximum number of concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
+"""Maximum number of concurrent feeds (one per topic and encoding). Each feed encodes every image."""
 _MAX_KEPT = 32_000_000
-"""Maximum total bytes of the encoded images that feeds store for new clients. Images that exceed it are not stored."""
+"""Maximum total bytes of the encoded images that feeds keep for new clients. Images beyond that are not kept."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -45,7 +45,9 @@ class _Feed:
     def __init__(self, graph: SharedGraph, request: VideoRequest, shared: _Shared) -> None:
         self.listeners: list[Listener] = []
         self.last: File | BridgeError | None = None
-        """The last encoded image, so that a new client of a slow or latched topic need not wait for the next one."""
+        """The last encoded image, sent to new clients so that they need not wait for the next one on a slow or latched
+        topic.
+        """
 
         self._graph = graph
         self._request = request
@@ -213,7 +215,7 @@ class VideoPages:
         self, exchange: Exchange, request: VideoRequest, start: Callable[[], None]
     ) -> None:
         graph = await self._look(exchange)
-        # If the client has disconnected in the meantime, do not start, because nothing would end the stream.
+        # If the client has disconnected in the meantime, do not start: nothing would end the stream.
         if graph is None or not exchange.is_open:
             return
         topic = self._graph.node.resolve(request.topic)

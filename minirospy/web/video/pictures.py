@@ -24,10 +24,9 @@ _FASTEST_PNG = 1
 MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarged image
 _LENGTH = struct.Struct("<I")
 _STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
-# Number of leading bytes of a file to search for the image's size, because other data, such as a preview, may precede
-# it.
+# Number of leading bytes of a file in which to search for the image's size; other data, such as a preview, may precede it.
 _HEAD_BYTES = 100_000
-# rows of a numeric image to scale at a time; as 64-bit numbers they take eight times the memory
+# number of rows of a numeric image to scale per step; as 64-bit numbers they take eight times the memory
 _ROWS = 256
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
@@ -60,8 +59,7 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
     except Exception as error:  # image libraries raise many types of exceptions for invalid data
         why: object = error
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
-            # Do not include the install command, which contains the server's interpreter path: clients receive this
-            # text.
+            # Clients receive this text, so do not include the install command, which contains the interpreter's path.
             why = "it needs OpenCV or Pillow: install minirospy[images] on the server"
         raise BridgeError(f"the image cannot be shown: {why}") from error
 
@@ -78,7 +76,7 @@ def _is_as_wanted(data: bytes, picture: Picture) -> bool:
 
 
 def _colors(image: Pixels, encoding: str) -> Pixels:
-    """Return an image as 8-bit gray or BGR; numeric images are scaled to their largest value."""
+    """Return an image as 8-bit gray or BGR; a numeric image is scaled to its largest value."""
 
     if encoding in ("mono8", "bgr8", "8UC1", "8UC3"):
         return image
@@ -111,7 +109,7 @@ def _scaled(image: Pixels) -> Pixels:
 
 
 def work_of(type_: str, body: bytes | memoryview) -> int:
-    """Return the number of pixels to process for a serialized message, as far as it is known in advance."""
+    """Return the number of pixels to process for a serialized message, as far as it can be determined in advance."""
     if type_ != COMPRESSED:
         return len(body) // 3
     try:

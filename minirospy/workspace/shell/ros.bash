@@ -304,11 +304,12 @@ _ros_complete_zsh() {
 _ros_commands() {
     printf '%s\n' roscd rospd rosls rosed roscat roscp rosmv minirospy rosrun roslaunch rostopic rosnode rosservice rosparam \
         rosmsg rossrv rosbag rosconsole rosgraph rosclean rosversion rospack rostest catkin_make roscore rosmaster \
-        roslaunch-deps roslaunch-logs rosstack rosdep rosmsg-proto roswtf rqt rqt_bag rqt_console rqt_graph \
-        rqt_image_view rqt_launch rqt_logger_level rqt_plot rqt_publisher rqt_reconfigure rqt_robot_monitor \
-        rqt_robot_steering rqt_runtime_monitor rqt_service_caller rqt_tf_tree rqt_top rqt_topic rviz smach_viewer \
-        rosunit xacro check_urdf urdf_to_graphviz urdf_to_graphiz catkin_test_results catkin_make_isolated catkin \
-        catkin_create_pkg catkin_init_workspace catkin_find catkin_find_pkg catkin_topological_order
+        roslaunch-deps roslaunch-logs rosstack rosdep rosmsg-proto roswtf rqt rqt_bag rqt_console \
+        rqt_controller_manager rqt_graph rqt_image_view rqt_joint_trajectory_controller rqt_launch rqt_logger_level \
+        rqt_plot rqt_publisher rqt_reconfigure rqt_robot_monitor rqt_robot_steering rqt_runtime_monitor \
+        rqt_service_caller rqt_tf_tree rqt_top rqt_topic rviz smach_viewer rosunit xacro check_urdf urdf_to_graphviz \
+        urdf_to_graphiz catkin_test_results catkin_make_isolated catkin catkin_create_pkg catkin_init_workspace \
+        catkin_find catkin_find_pkg catkin_topological_order
 }
 
 if [ -n "${ZSH_VERSION:-}" ]; then

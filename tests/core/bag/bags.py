@@ -1,7 +1,8 @@
-"""Build bags of any shape, record by record: the test chooses the messages in each chunk, and their order."""
+"""Build bags of any shape, record by record. The test chooses the messages of each chunk and their order."""
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -12,11 +13,12 @@ from minirospy.core.bag.encoding import (
     encode_chunk_info,
     encode_connection,
     encode_index_data,
-    encode_message_header,
     message_prefixes,
 )
-from minirospy.core.bag.records import MAGIC, BagHeader, Chunk, ChunkInfo, Connection
+from minirospy.core.bag.records import MAGIC, BagHeader, Chunk, ChunkInfo, Connection, Record
 
+_TIME_AND_SIZE = struct.Struct("<III")  # the end of a message's header, and the size of its body
+_ENTRY = struct.Struct("<III")
 STRING = "string data\n"
 STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
@@ -64,7 +66,7 @@ def make_bag(
                 data += encode_connection(by_id[number])
             entries.setdefault(number, []).append((time, len(data)))
             data += (
-                message_prefixes(number)[layout] + encode_message_header(number, time, len(body))[34:] + body
+                message_prefixes(number)[layout] + _TIME_AND_SIZE.pack(*divmod(time, 10**9), len(body)) + body
             )
 
         packed = compress(compression, data)
@@ -81,3 +83,20 @@ def make_bag(
         parts += [encode_connection(each) for each in stored.values()]
         parts += [encode_chunk_info(info) for info in infos]
     return b"".join(parts)
+
+
+class Index(NamedTuple):
+    """One connection's index of a chunk: pairs of time and offset."""
+
+    connection: int
+    entries: list[tuple[int, int]]
+
+
+def parse_index(record: Record, data: bytes) -> Index:
+    """Parse an index record and its data."""
+    assert record.uint32("ver") == 1
+    entries = [
+        (seconds * 10**9 + nanoseconds, offset) for seconds, nanoseconds, offset in _ENTRY.iter_unpack(data)
+    ]
+    assert record.uint32("count") == len(entries)
+    return Index(record.uint32("conn"), entries)

@@ -1,4 +1,4 @@
-"""Damaged bags result in a one-line error, or in messages that were in the bag; never in other messages, a hang or a crash."""
+"""Damaged bags yield a one-line error or messages that were in the bag; never other messages, a hang or a crash."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_flipped_byte_never_gives_another_message(
     start = [*range(spaces), *range(spaces, 4096, 64)]
     places = start if part == "start" else range(max(len(data) - 4096, 4096), len(data))
 
-    # Otherwise threads that decompress in advance would be started ten thousand times.
+    # Otherwise, the threads that decompress in advance would be started ten thousand times.
     monkeypatch.setattr(reading, "THREADS", 0)
     for at in places:
         damaged = data[:at] + bytes((data[at] ^ 0xFF,)) + data[at + 1 :]
@@ -195,7 +195,7 @@ def chunk_places(data: bytes) -> list[tuple[int, int, int]]:
 
 
 def spoilt(data: bytes, kind: str) -> bytes:
-    """Return a bag whose fourth chunk is damaged, so that its records are no longer consecutive."""
+    """Return a bag with a damaged fourth chunk, after which the records are no longer consecutive."""
     start, body, end = chunk_places(data)[3]
     lengths = {
         "header length": (start, start + 4, b"\xff" * 4),
@@ -368,7 +368,7 @@ def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_time_that_no_index_holds_costs_its_chunk_alone(closed: bool) -> None:
-    # A time of 32-bit seconds and nanoseconds may exceed the 32-bit range once nanoseconds are normalized below a
+    # A time of 32-bit seconds and nanoseconds may leave the 32-bit range once its nanoseconds are normalized below a
     # billion.
     last = (2**32 - 1) * 10**9 + 999_999_999
     data = make_bag([[Given(0, last, b"\1\0\0\0a")], [Given(0, 5, b"\1\0\0\0b")]], closed=closed)

@@ -18,6 +18,7 @@ from minirospy.base.errors import BagFormatError
 from minirospy.core.bag import records
 from minirospy.core.bag.compression import BZ2, COMPRESSIONS, NONE, decompress
 from minirospy.core.bag.writer import BagWriter, Buffer, Continued
+from tests.core.bag.bags import Index, parse_index
 
 SECOND = 10**9
 MESSAGES = 40
@@ -56,7 +57,7 @@ class Parsed:
         stream = io.BytesIO(data)
         assert stream.readline() == records.MAGIC
         self.messages: list[tuple[int, int, bytes]] = []
-        self.indexes: list[records.IndexData] = []
+        self.indexes: list[Index] = []
         self.connections: list[records.Connection] = []
         self.chunks: list[records.ChunkInfo] = []
         self.compressions: list[str] = []
@@ -67,7 +68,7 @@ class Parsed:
             elif record.op == records.OP_CHUNK:
                 self._add_chunk(records.parse_chunk_header(record), body)
             elif record.op == records.OP_INDEX_DATA:
-                self.indexes.append(records.parse_index_data(record, body))
+                self.indexes.append(parse_index(record, body))
             elif record.op == records.OP_CONNECTION:
                 self.connections.append(records.parse_connection(record, body))
             else:
@@ -116,7 +117,7 @@ def test_indexes_are_in_the_order_of_time() -> None:
     bag = Parsed(stream.getvalue())
 
     assert [body for _, _, body in bag.messages] == [b"5", b"3", b"4"]
-    assert [entry.time // SECOND for entry in bag.indexes[0].entries] == [3, 4, 5]
+    assert [time // SECOND for time, _ in bag.indexes[0].entries] == [3, 4, 5]
     assert (bag.chunks[0].start_time, bag.chunks[0].end_time) == (3 * SECOND, 5 * SECOND)
     assert bag.chunks[0].counts == {number: 3}
 
@@ -378,7 +379,7 @@ def test_chunk_that_has_been_compressed_is_written_without_another_message() -> 
     stream = io.BytesIO()
     with ThreadPoolExecutor(1) as executor:
         writer = BagWriter(
-            stream, chunk_threshold=0, compression=BZ2, executor=executor, most_waiting=sys.maxsize
+            stream, chunk_threshold=0, compression=BZ2, executor=executor, max_waiting=sys.maxsize
         )
         writer.write(writer.add_connection("/t", header("/t")), 1, b"x" * 1000)
     writer.write_ready()

@@ -284,6 +284,13 @@ struct Tested : Base {
     successful_joint_traj_.reset();  // else a new goal inherits the joints that had reached the old one
     goalCB(handle);
   }
+  bool query(control_msgs::QueryTrajectoryState::Request& request, control_msgs::QueryTrajectoryState::Response& response) {
+    return queryStateService(request, response);
+  }
+  vector<double> states() {
+    return {desired_state_.time_from_start, current_state_.time_from_start, desired_state_.acceleration[0],
+            desired_state_.acceleration[1], state_error_.velocity[0], state_error_.velocity[1]};
+  }
   void cancel() {
     if (rt_active_goal_) cancelCB(actionlib::GoalHandle(rt_active_goal_->gh_));
   }
@@ -338,6 +345,23 @@ static void print(const trajectory_msgs::JointTrajectory& message) {
   printf("]");
 }
 
+static void print(const char* name, const vector<control_msgs::JointTolerance>& tolerances) {
+  printf(", \"%s\": [", name);
+  for (size_t i = 0; i < tolerances.size(); ++i) {
+    auto& each = tolerances[i];
+    printf("%s[\"%s\", %.9g, %.9g]", i ? ", " : "", each.name.c_str(), each.position, each.velocity);
+  }
+  printf("]");
+}
+
+static vector<control_msgs::JointTolerance> make_tolerances() {
+  vector<control_msgs::JointTolerance> tolerances;
+  double values[] = {-1, 0, draw(0.01, 0.1)}, velocities[] = {-1, 0, draw(0.1, 3)};
+  for (const char* name : {"b", "x", "a"})
+    if (chance(0.2)) tolerances.push_back({name, values[pick(3)], velocities[pick(3)], 0});
+  return tolerances;
+}
+
 static string escaped(const string& text) {
   string result;
   for (char c : text) if (c == '\n') result += "\\n"; else result += c;
@@ -372,7 +396,7 @@ static void run(bool is_first) {
   tested.init(&tested.hardware, handle, handle);
   ros::Time time(BEGIN, 0);
   tested.starting(time);
-  vector<double> commands;
+  vector<double> commands, states;
   vector<string> outcomes;
   vector<bool> reported;
   const char* between = "";
@@ -389,13 +413,35 @@ static void run(bool is_first) {
         auto message = make_message(next);
         printf("\"kind\": \"%s\", ", kind < 0.3 ? "command" : "goal");
         print(message);
-        printf("}");
         if (kind < 0.3) tested.command(message);
-        else { control_msgs::FollowJointTrajectoryGoal goal; goal.trajectory = message; tested.send(goal); }
+        else {
+          control_msgs::FollowJointTrajectoryGoal goal;
+          goal.trajectory = message;
+          goal.path_tolerance = make_tolerances();
+          goal.goal_tolerance = make_tolerances();
+          if (chance(0.3)) goal.goal_time_tolerance.fromSec(draw(-0.2, 0.3));
+          print("path", goal.path_tolerance);
+          print("goal", goal.goal_tolerance);
+          printf(", \"goal_time\": %ld", (long)goal.goal_time_tolerance.toNSec());
+          tested.send(goal);
+        }
+        printf("}");
       }
+    } else if (tick > 45 && chance(0.02)) {
+      control_msgs::QueryTrajectoryState::Request request;
+      control_msgs::QueryTrajectoryState::Response response;
+      request.time = time + ros::Duration(draw(-0.3, 0.6));
+      printf("%s\n  {\"tick\": %d, \"kind\": \"query\", \"time\": %ld, \"state\": [", between, tick,
+             (long)request.time.toNSec());
+      between = ",";
+      if (tested.query(request, response)) {
+        print(response.position); printf(", "); print(response.velocity); printf(", "); print(response.acceleration);
+      }
+      printf("]}");
     }
     time = next;
     tested.update(time, ros::Duration(0, TICK));
+    if (tick % 10 == 0) for (double each : tested.states()) states.push_back(each);
     for (size_t g = 0; g < tested.goals.size(); ++g) {
       reported.resize(tested.goals.size());
       auto& goal = *tested.goals[g].state;
@@ -415,6 +461,7 @@ static void run(bool is_first) {
   }
   printf("],\n  \"start\": "); print(start);
   printf(",\n  \"commands\": "); print(commands);
+  printf(",\n  \"states\": "); print(states);
   printf(",\n  \"outcomes\": [");
   for (size_t i = 0; i < outcomes.size(); ++i) printf("%s%s", i ? ", " : "", outcomes[i].c_str());
   printf("]}");
@@ -429,7 +476,7 @@ int main(int count, char** words) {
 """
 
 
-def main(repository: str, runs: int = 60) -> None:
+def main(repository: str, runs: int = 50) -> None:
     """Compile and run."""
     show = ["git", f"--git-dir={repository}"]
     listed = subprocess.run(

@@ -184,6 +184,14 @@ def test_joint_without_a_controller_is_left_alone() -> None:
     assert bench.position(7.0) == 7.0
 
 
+@pytest.mark.parametrize("start", [-1.25, 1.25])
+def test_joint_outside_its_limits_comes_back_without_a_jump(start: float) -> None:
+    bench = Bench(Interface.POSITION, JointLimits(-1.0, 1.0, velocity=1.0), start)
+    sign = 1 if start > 0 else -1
+    expected = [1.15 * sign, 1.05 * sign, 1.0 * sign, 1.0 * sign]
+    assert [bench.position(5.0 * sign) for _ in range(4)] == pytest.approx(expected)
+
+
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=30), st.floats(-0.9, 0.9))
 def test_no_command_leaves_the_limits_or_jumps(commands: list[float], start: float) -> None:
     limits = JointLimits(-1.0, 1.0, velocity=2.0)

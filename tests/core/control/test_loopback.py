@@ -46,28 +46,58 @@ def test_transmissions_choose_joints_and_interfaces() -> None:
     assert warnings == ["transmission 'u': the robot has no movable joint 'nope', so it is skipped"]
 
 
+def test_mimic_joint_with_a_transmission_follows_only_while_no_controller_has_it() -> None:
+    transmissions = [Transmission("t", "s", name, (Interface.POSITION,)) for name in ("left", "right")]
+    robot = hardware(*transmissions)
+    left, right = robot.joints["left"], robot.joints["right"]
+    assert right.interfaces == {Interface.POSITION}
+    left.active, left.position_command = Interface.POSITION, 0.02
+    robot.read(NOW, PERIOD)
+    assert (left.position, right.position) == (0.02, pytest.approx(0.14))
+    right.active, right.position_command = Interface.POSITION, 0.03
+    robot.read(NOW, PERIOD)
+    assert right.position == 0.03
+
+
+def test_initial_position_without_an_effect_is_named() -> None:
+    warnings: list[str] = []
+    transmissions = [Transmission("t", "s", "elbow", (Interface.EFFORT,))]
+    LoopbackHardware(ROBOT, transmissions, {"elbow": 1.0, "shoulder": 1.0}, warnings.append)
+    assert warnings == ["the initial position of joint 'shoulder' is ignored, because it has no transmission"]
+
+
 def test_position_command_is_reached_within_the_limits() -> None:
     robot = hardware(shoulder=0.5)
     shoulder, _, left, right = robot.joints.values()
     assert shoulder.position == 0.5
     shoulder.active = left.active = Interface.POSITION
     shoulder.position_command, left.position_command = 0.51, 7.0
-    robot.write(NOW, PERIOD)
+    robot.read(NOW, PERIOD)
     assert (shoulder.position, shoulder.velocity) == (0.51, pytest.approx(1.0))
     assert (left.position, right.position) == (0.05, pytest.approx(0.2))
     shoulder.position_command = math.nan
-    robot.write(NOW, PERIOD)
+    robot.read(NOW, PERIOD)
     assert (shoulder.position, shoulder.velocity) == (0.51, 0.0)
+
+
+def test_velocity_counts_for_the_period_in_which_the_joint_moved() -> None:
+    robot = hardware()
+    elbow = robot.joints["elbow"]
+    elbow.velocity_command, elbow.active = 2.0, Interface.VELOCITY
+    robot.write(NOW, PERIOD)
+    assert elbow.position == 0.0
+    robot.read(NOW, Duration(0, 30_000_000))
+    assert (elbow.position, elbow.velocity) == (pytest.approx(0.06), pytest.approx(2.0))
 
 
 def test_joint_without_a_controller_stands_still() -> None:
     robot = hardware()
     elbow = robot.joints["elbow"]
     elbow.velocity_command, elbow.active = 2.0, Interface.VELOCITY
-    robot.write(NOW, PERIOD)
+    robot.read(NOW, PERIOD)
     assert (elbow.position, elbow.velocity) == (pytest.approx(0.02), pytest.approx(2.0))
     elbow.active = None
-    robot.write(NOW, PERIOD)
+    robot.read(NOW, PERIOD)
     assert (elbow.position, elbow.velocity) == (pytest.approx(0.02), 0.0)
 
 
@@ -77,7 +107,7 @@ def test_effort_moves_a_damped_mass(cycles: int) -> None:
     elbow = robot.joints["elbow"]
     elbow.effort_command, elbow.active = 2.0, Interface.EFFORT
     for _ in range(cycles):
-        robot.write(NOW, Duration(0, 1_000_000_000 // cycles) if cycles > 1 else Duration(1))
+        robot.read(NOW, Duration(0, 1_000_000_000 // cycles) if cycles > 1 else Duration(1))
     # v' = F - v, from rest: v = F (1 - e^-t), x = F (t - 1 + e^-t)
     assert elbow.velocity == pytest.approx(2.0 * (1 - math.exp(-1)))
     assert elbow.position == pytest.approx(2.0 * math.exp(-1))

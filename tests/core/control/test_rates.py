@@ -57,3 +57,12 @@ def test_publish_rate_is_required() -> None:
     with pytest.raises(ControllerError, match=r"^Parameter 'publish_rate' not set$"):
         PublishRate.read(Parameters("/c", {"publish_rate": "50"}))
     assert due(PublishRate.read(Parameters("/c", {"publish_rate": 50})), 1000, 6) == [1030, 1050]
+
+
+def test_the_rate_can_change() -> None:
+    rate = PublishRate(20.0)
+    rate.start(Time(1))
+    rate.set(0.0)
+    assert due(rate, 1010, 20) == []
+    rate.set(10.0)
+    assert due(rate, 1210, 20) == [1210, 1220, 1310]

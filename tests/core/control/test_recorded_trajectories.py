@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,12 @@ import pytest
 
 from minirospy.core.control.goal import CANCELLED, MonitoredGoal
 from minirospy.core.control.trajectory import ErrorCode, JointTolerances, Point, TrajectoryError
-from minirospy.core.control.trajectory_follower import FollowedJoint, JointsError, TrajectoryFollower
+from minirospy.core.control.trajectory_follower import (
+    FollowedJoint,
+    GoalTolerance,
+    JointsError,
+    TrajectoryFollower,
+)
 from minirospy.core.graph.goals import GoalEvent
 
 RUNS: list[dict[str, Any]] = json.loads(
@@ -63,17 +69,26 @@ class Run:
                 self.active.finish(CANCELLED)
                 self.report(tick)
             return
+        if event["kind"] == "query":
+            states = self.follower.sample(event["time"]) or []
+            for values, right in zip(zip(*states, strict=True), event["state"], strict=True):
+                assert values == pytest.approx(right, rel=1e-6, abs=1e-4)
+            return
 
         goal = MonitoredGoal() if event["kind"] == "goal" else None
         if goal:
             self.goals.append(goal)
         points = [Point(*values) for values in event["points"]]
         names = list(event["names"])
+        tolerances = None
         try:
             if goal:
                 self.follower.columns(names)
+                path, end = ([GoalTolerance(*each) for each in event[kind]] for kind in ("path", "goal"))
+                tolerances = self.follower.goal_tolerances(path, end, event["goal_time"])
             if points:
-                self.follower.request_plan(self.follower.plan(names, points, event["stamp"]), goal)
+                plan = self.follower.plan(names, points, event["stamp"], tolerances)
+                self.follower.request_plan(plan, goal)
             else:
                 self.follower.request_hold(goal)
         except TrajectoryError as error:
@@ -97,6 +112,7 @@ def test_commands_and_outcomes_are_those_of_ros(number: int) -> None:
     positions, velocities, time = list(recorded["start"]), [0.0, 0.0], 100 * SECOND
     run.follower.start(time, positions, velocities)
     commands: list[float] = []
+    states: list[float] = []
 
     for tick in range(1, CYCLES + 1):
         if tick in events:
@@ -104,11 +120,23 @@ def test_commands_and_outcomes_are_those_of_ros(number: int) -> None:
         time += TICK
         run.follower.update(time, TICK, positions, velocities)
         run.report(tick)
-        before, positions = positions, [position * 0.99 for position in run.follower.positions]
-        velocities = [(now - then) * 100.0 for now, then in zip(positions, before, strict=True)]
         if tick % RECORDED_EVERY == 0:
             commands += run.follower.positions
+            states += run.follower.times_from_start()
+            states += run.follower.accelerations
+            states += run.follower.velocity_errors
+        before, positions = positions, [position * 0.99 for position in run.follower.positions]
+        velocities = [(now - then) * 100.0 for now, then in zip(positions, before, strict=True)]
 
-    key = [(outcome[0], outcome[1]) for outcome in recorded["outcomes"]]
-    assert sorted(run.outcomes) == [recorded["outcomes"][key.index(each)] for each in sorted(key)]
+    found, expected = sorted(run.outcomes), sorted(recorded["outcomes"])
+    assert [outcome[:4] for outcome in found] == [outcome[:4] for outcome in expected]
+    for (*_, text), (*_, right) in zip(found, expected, strict=True):
+        if " error " not in text:
+            assert text == right
+            continue
+        # ROS takes errors of more than half a turn for smaller ones, also of joints that cannot turn so far.
+        (words, error), (right_words, right_error) = (each.rsplit(" ", 1) for each in (text, right))
+        assert words == right_words
+        assert math.remainder(float(error), math.tau) == pytest.approx(float(right_error), abs=2e-6)
     assert commands == pytest.approx(recorded["commands"], abs=1e-6)
+    assert states == pytest.approx(recorded["states"], rel=1e-6, abs=1e-4)

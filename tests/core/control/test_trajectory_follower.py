@@ -196,6 +196,26 @@ class TestReplacement:
         assert arm.follower.position_errors == pytest.approx([math.tau - 6.0, -6.0])
         assert arm.follower.velocity_errors == [-0.25, 0.0]
 
+    def test_commands_are_not_stored_without_limit_while_the_loop_pauses(self) -> None:
+        arm = Arm()
+        for position in range(1000):
+            arm.send((0.1, [float(position)] * 2))
+        assert len(arm.follower._requests) == 100
+        assert arm.run(0.2) == [999.0, 999.0]
+
+    def test_absurd_numbers_never_overflow(self) -> None:
+        arm = Arm(continuous="a")
+        for cycle in range(300):
+            position = 4e99 if cycle % 2 else -4e99
+            arm.send(
+                Point(1 if cycle % 3 else 2**31 * SECOND, [position] * 2, [-position] * 2, [position] * 2),
+                Point(2**31 * SECOND + 1, [-position] * 2, [-position] * 2, [position] * 2),
+            )
+            arm.tick(period=TICK if cycle % 5 else 2**30 * SECOND)
+            follower = arm.follower
+            for values in (follower.positions, follower.velocities, follower.accelerations):
+                assert all(map(math.isfinite, values))
+
     def test_a_refused_trajectory_changes_nothing(self) -> None:
         arm = Arm()
         arm.send((1.0, [1.0, 1.0]))

@@ -71,6 +71,14 @@ def test_unknown_interface_is_skipped() -> None:
     ]
 
 
+def test_interface_of_another_package_is_named_once_for_all_joints() -> None:
+    found, warnings = read(*(simple(joint, interface("franka_hw/FrankaStateInterface")) for joint in "jk"))
+    assert found == {}
+    assert warnings == [
+        "transmission 't': unknown hardware interface 'franka_hw/FrankaStateInterface', so it is skipped"
+    ]
+
+
 def test_differential_is_read_as_independent_joints() -> None:
     kind = "transmission_interface/DifferentialTransmission"
     pair = simple("j", interface("EffortJointInterface"), kind=kind).replace(

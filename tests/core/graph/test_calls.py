@@ -1,4 +1,4 @@
-"""core/graph/calls: a table of methods, called without a server."""
+"""core/graph/calls: the table of methods, called without a server."""
 
 from __future__ import annotations
 

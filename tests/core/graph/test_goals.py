@@ -58,7 +58,7 @@ def test_client_without_status_accepts_every_status() -> None:
     "before", [GoalState.PENDING, GoalState.ACTIVE, GoalState.RECALLING, GoalState.PREEMPTING]
 )
 def test_a_client_follows_each_step_of_a_server(before: GoalState, event: GoalEvent) -> None:
-    """For any transition on the server, a client that has received the status before it accepts the next status."""
+    """For any transition on the server, a client that has received the previous status accepts the next one."""
     after = SERVER_STEPS[event].get(before)
     if after is None:
         return

@@ -131,7 +131,7 @@ def test_updates_go_to_the_subscribers_above_and_below() -> None:
         ParameterUpdate("u2", "/a/b/"),
         ParameterUpdate("u3", "/a/b/c/"),
     ]
-    # The node that set the namespace is not notified of that, but of the change to a parameter inside.
+    # The node that set the namespace is not notified of that, only of the change to a parameter inside.
     assert list(tree.set("/a", {"b": 3}, "/n2")) == [
         ParameterUpdate("u1", "/a/"),
         ParameterUpdate("u2", "/a/b/"),
@@ -325,7 +325,7 @@ def test_room_shrinks_by_each_parameter_and_its_name() -> None:
 
 
 def test_namespace_is_copied_once_after_it_was_returned() -> None:
-    # Copying a large value at each change would take long.
+    # Copying a large value at each change would be slow.
     tree = tree_of(a={"x": 1})
     for _ in range(2):
         returned = tree.get("/a")

@@ -29,8 +29,8 @@ def test_publishers_and_subscribers_find_each_other() -> None:
     assert registry.publisher_uris("/t") == ["up"]
     assert registry.count_subscribers("/t") == 2
     assert registry.topic_types() == {"/t": "a/B"}
-    assert registry.published_topics("/") == [("/t", "a/B")]
-    assert registry.published_topics("/x") == []
+    assert list(registry.published_rows("/")) == [("/t", "a/B")]
+    assert list(registry.published_rows("/x")) == []
 
 
 def test_unregistering_needs_the_address_that_registered() -> None:

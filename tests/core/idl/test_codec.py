@@ -256,7 +256,7 @@ def test_bytes_that_are_no_utf_8_are_replaced() -> None:
 
 
 def test_a_buffer_is_not_held() -> None:
-    """A message must not keep a view into the buffer from which it was read, because the buffer is reused for the next one."""
+    """A message must not keep a view of the buffer from which it was read: the buffer is reused for the next one."""
     data_class = class_from_text("p/M", "uint8[] c\nint32[] a")
     buffer = bytearray(serialized(data_class(c=b"12", a=[5])))
     message = data_class().deserialize(memoryview(buffer))

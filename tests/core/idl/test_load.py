@@ -15,7 +15,7 @@ from minirospy.core.idl.load import write_if_changed
 def test_module_that_is_written_again_is_compiled_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Compilation is repeated even within the same second and if the size is unchanged."""
+    """The module is compiled again even within the same second and with the same size."""
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     path = tmp_path / "made.py"
     for number in range(5):

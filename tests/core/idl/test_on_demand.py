@@ -41,7 +41,7 @@ def test_only_packages_of_ros_are_files() -> None:
 
 
 def test_module_is_made_once_and_then_cached(tmp_path: Path) -> None:
-    """Python's own cache has the result, so the second process does not need the compiler."""
+    """Python's own cache contains the result, so the second process does not need the compiler."""
     program = """
 import sys
 from gazebo_msgs.msg import ModelState, ModelStates
@@ -63,7 +63,7 @@ def test_folder_that_cannot_be_written_to_works(tmp_path: Path) -> None:
 
 
 def test_cache_of_other_definitions_is_not_used(tmp_path: Path) -> None:
-    """A newer minirospy has other definitions, so the older version's cached modules must be regenerated."""
+    """A newer minirospy has other definitions, so modules cached by the older version must be regenerated."""
     program = "import sys, {0}.msg as m; m.UniqueID; print('minirospy.core.idl.emit' in sys.modules)"
     prefix = str(tmp_path / "cache")
     site = tmp_path / "site"

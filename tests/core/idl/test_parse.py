@@ -92,7 +92,7 @@ def test_mistakes(text: str, line: int, error: str) -> None:
 def test_a_service_of_any_number_of_parts(
     text: str, request_fields: list[str], response_fields: list[str]
 ) -> None:
-    """As genmsg: without `---` there is no response; a second one is ignored."""
+    """Without `---` there is no response, and a second one is ignored, as in genmsg."""
     service = parse_service(text, "p", "S")
     assert [field.name for field in service.request.fields] == request_fields
     assert [field.name for field in service.response.fields] == response_fields

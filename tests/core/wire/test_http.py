@@ -38,7 +38,7 @@ def test_requests_come_out_whole_in_any_pieces(bodies: list[bytes], step: int) -
 
 @given(st.lists(st.binary(max_size=30), min_size=1, max_size=3), st.data())
 def test_heads_and_bodies_may_come_one_by_one(bodies: list[bytes], data: st.DataObject) -> None:
-    """Python's clients send them this way; some pieces are split further, or joined to the next one."""
+    """Python's clients send them this way. Some pieces are split further or joined with the next one."""
     pieces = []
     for body in bodies:
         request = serialize_request("localhost:11311", "/RPC2", body)
@@ -64,7 +64,7 @@ def test_pipelined_messages_are_parsed_one_at_a_time() -> None:
     second = reader.next_message()
     assert second
     assert second.body == b"a"
-    # The error is raised only when it is the invalid message's turn.
+    # The error is raised only when the invalid message's turn comes.
     with pytest.raises(RpcProtocolError):
         reader.next_message()
 
@@ -152,7 +152,7 @@ def test_request_bytes() -> None:
         b"Content-Length: 4\r\n\r\n<x/>"
     )
     assert serialize_request("robot", "", b"").startswith(b"POST / HTTP/1.1\r\n")
-    # No header can contain this host name: the host is not found, but there must be no traceback.
+    # No header can contain this host name. The host is not found, but there must be no traceback.
     assert b"Host: r?bot\r\n" in serialize_request("r\u0151bot", "/", b"")
 
 

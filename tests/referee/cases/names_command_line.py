@@ -1,4 +1,4 @@
-"""What rosgraph reads from the command line: myargv, and the address, which is read at each call."""
+"""Print the values that rosgraph reads from the command line: myargv, and the address, which is read at each call."""
 
 import os
 import sys

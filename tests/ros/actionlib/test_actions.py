@@ -137,7 +137,7 @@ print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state()
         assert said == "True 3\n"
 
     def test_statuses_of_many_goals_are_published_less_often(self) -> None:
-        """With few goals, each change publishes the list; with 600 goals, lists are at least 60 ms apart."""
+        """With few goals, each change publishes the list. With 600 goals, lists are at least 60 ms apart."""
         said = run("""
 from types import SimpleNamespace
 import minirospy.ros.actionlib.actionlib.server as module
@@ -260,7 +260,7 @@ print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), sec
     @pytest.mark.parametrize("how", ["kill", "terminate"])
     @pytest.mark.parametrize("goal", [3, 4])
     def test_goal_is_lost_when_its_server_dies(self, how: str, goal: int) -> None:
-        """A server that does not answer at all (goal 4) dies before it lists the goal."""
+        """A server that does not respond at all (goal 4) dies before it has listed the goal."""
         said = run(f"""
 import subprocess, sys
 from minirospy.ros.actionlib.actionlib import client as client_module

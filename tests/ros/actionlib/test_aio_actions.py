@@ -275,7 +275,7 @@ def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatc
         pauses: list[float] = []
 
         async def sleep(seconds: float) -> None:
-            # Both have arrived by now. The one with the shorter pause is processed before the other continues.
+            # Both have arrived by now. The one with the shorter pause is processed before the other.
             pauses.append(seconds)
             await until(
                 lambda: not (len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server.goals))
@@ -395,7 +395,7 @@ def test_goal_is_lost_when_its_server_dies(
                 await goal
             await server.wait()
             assert goal.state is GoalState.LOST
-            # A goal that has not been sent waits for the next server.
+            # A goal that was not sent yet waits for the next server.
             waiting = client.send(msg.TestGoal(1))
             await asyncio.sleep(0.5)
             assert not waiting.done

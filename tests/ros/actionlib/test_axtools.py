@@ -157,7 +157,7 @@ def test_a_person_serves(master: str) -> None:
     assert said.endswith("Succeeded: well done\nresult: 7\n")
     assert status == 0
     process.stdin.close()
-    # No user input exists for the next goal.
+    # There is no user input for the next goal.
     said, _, status = ask("", "/ask", "{goal: 6}")
 
     assert "Aborted: the person who answered has left\n" in said

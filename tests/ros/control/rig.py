@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import rospy
+from rosgraph_msgs.msg import Clock
 
 from minirospy.base.errors import MinirospyError
 from minirospy.core.control.controller import ControllerContext, ControllerError, Resources
@@ -87,6 +88,7 @@ class Rig:
         rospy.set_param("/c", dict(parameters))
         self.resources = Resources(self.hardware)
         self.nanoseconds = 100_000_000_000
+        self._clock: Publisher | None = None
         self.controller: Any = find_plugins()[kind].load()()
         self._urdf = urdf
         self.context = ControllerContext("/c", "/", "c", Parameters("/c", parameters), self._robot)
@@ -105,6 +107,14 @@ class Rig:
     def now(self) -> rospy.Time:
         """The held time."""
         return rospy.Time(*divmod(self.nanoseconds, 1_000_000_000))
+
+    def show_time(self) -> None:
+        """Publish the held time on /clock, and wait until the node has it. Do nothing in a node with wall time."""
+        if rospy.rostime.is_wallclock():
+            return
+        if self._clock is None:
+            self._clock = Publisher("/clock", Clock)
+        self._clock.send(Clock(self.now), lambda: bool(rospy.get_rostime() == self.now))
 
     def joint(self, name: str) -> Any:
         """Return a joint."""

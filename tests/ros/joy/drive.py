@@ -116,7 +116,7 @@ def follow_teleop(
     answers: list[str] = []
     for axes, buttons in STATES:
         publisher.publish(Joy(axes=axes, buttons=buttons))
-        # After the last state, one that is answered like the second one takes the place of a long wait for nothing.
+        # After the last state, send one with the same effect as the second, to avoid a long wait for nothing.
         is_last = len(answers) == len(STATES) - 1 and answers[1] != "nothing"
         if is_last:
             publisher.publish(Joy(axes=STATES[1][0], buttons=STATES[1][1]))
@@ -127,7 +127,7 @@ def follow_teleop(
 
 def answer_of(twists: queue.Queue[Twist]) -> str:
     try:
-        # On a busy machine a message may take long.
+        # On a busy machine, a message may take a while.
         twist = twists.get(timeout=10)
     except queue.Empty:
         return "nothing"

@@ -1,4 +1,4 @@
-"""teleop_twist_keyboard: the effect of keys, and the program in a terminal."""
+"""teleop_twist_keyboard: the effects of keys, and the program in a terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maps of many kinds. recorded.json contains the messages that the real map_server publishes for them (make_recorded.py)."""
+"""Maps of many kinds. recorded.json has the messages that the real map_server publishes for them (see make_recorded.py)."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def test_search_finds_the_same_as_loops(
 
 
 def test_search_of_many_topics_without_a_match_ends() -> None:
-    # There are 50 stamps on either side, none of which fits those on the other side: 100 ** 12 combinations.
+    # There are 50 stamps on either side, and none fits any on the other side: 100 ** 12 combinations.
     sides = [queue_of([*range(50), *range(151, 201)]) for _ in range(12)]
     sides.append(queue_of([*range(50)]))
     sides.append(queue_of([*range(151, 201)]))

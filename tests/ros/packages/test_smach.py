@@ -280,13 +280,13 @@ def test_userdata_takes_no_more_memory_than_it_has_bytes() -> None:
 
 def test_array_whose_bytes_would_be_pointers_is_refused() -> None:
     numpy = pytest.importorskip("numpy")
-    # The state clears the object flag; numpy would then follow the array's bytes as pointers.
+    # The state clears the object flag; numpy would then interpret the array's bytes as pointers and follow them.
     state = (3, "|", None, ("a",), {"a": (numpy.dtype("O"), 0)}, 8, 1, 0)
     dtype = b"cnumpy\ndtype\n(U\x02V8\x89\x88tR" + pickle.dumps(state, 2)[2:-1] + b"b"
     array = b"cnumpy.core.numeric\n_frombuffer\n(U\x08AAAAAAAA" + dtype + b"K\x01\x85U\x01CtR"
     with pytest.raises(ValueError, match="not userdata: an array of"):
         unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + array + b"s.").decode())
-    # A state must neither make an array larger than its memory nor its size negative.
+    # A state must not make an array larger than its memory or its size negative.
     for size in (800, -1):
         other = (3, "|", None, None, None, size, 1, 0)
         dtype = b"cnumpy\ndtype\n(U\x02S8\x89\x88tR" + pickle.dumps(other, 2)[2:-1] + b"b"

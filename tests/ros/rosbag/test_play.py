@@ -61,7 +61,7 @@ class Ear:
         return [one.text for one in self.heard]
 
     def expect(self, *texts: str) -> None:
-        """Assert that exactly these strings are received. The last may arrive after the player has exited."""
+        """Assert that exactly these strings are received. The last one may arrive only after the player has exited."""
         wait_until(lambda: len(self.heard) >= len(texts))
         assert self.texts == list(texts)
 
@@ -121,7 +121,7 @@ def test_messages_are_played_in_the_order_of_time(ear: Ear, start: Start, tmp_pa
     one = make_bag(tmp_path / "one.bag", [("/a", 0, "1"), ("/a", 0.2, "3")])
     two = make_bag(tmp_path / "two.bag", [("/a", 0.1, "2"), ("/a", 0.3, "4")])
     ear.listen("/a")
-    # This plays for three seconds; of a shorter time, little may remain if the first message arrives late.
+    # This plays for three seconds: if the first message arrives late, little may remain of a shorter time.
     output, errors = play(start, one, "-r", "0.1", "--bags", two).communicate(timeout=GUARD)
 
     assert errors == ""
@@ -194,7 +194,7 @@ def test_the_clock_is_published(ear: Ear, start: Start, tmp_path: Path) -> None:
     name = make_bag(tmp_path / "b.bag", [("/a", 0, "1"), ("/a", 0.5, "2")])
     ear.listen("/clock")
     ear.listen("/a")
-    # This plays for five seconds; a player that stalls skips the output for that time.
+    # This plays for five seconds: a player that stalls skips the output for the time of the stall.
     play(start, name, "--clock", "--hz", "50", "-r", "0.1").communicate(timeout=GUARD)
     wait_until(lambda: [one.topic for one in ear.heard].count("/a") == 2)
 
@@ -298,7 +298,7 @@ def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
 
 
 STALLED = "from minirospy.ros.rosbag.recording import player; player._STALLED_SECONDS = {}"
-PATIENT = STALLED.format(1e9)  # with this, only the test's action ends the wait for a subscriber
+PATIENT = STALLED.format(1e9)  # with this, a wait for a subscriber ends only by the test's action
 
 
 def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_path: Path) -> None:

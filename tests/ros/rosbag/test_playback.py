@@ -1,4 +1,4 @@
-"""The effect of requests in each phase of a playback: the state machine, without a clock, files or threads."""
+"""The effect of requests in each phase of a playback: only the state machine, without a clock, files or threads."""
 
 from __future__ import annotations
 

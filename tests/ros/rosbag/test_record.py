@@ -128,7 +128,7 @@ def test_compressed_message_reaches_the_disk_without_another(
     talker: Talker, start: Start, tmp_path: Path
 ) -> None:
     chatter = talker.advertise("/chatter")
-    # One message fills the buffer, so if the recorder waited, nothing else would be recorded.
+    # One message fills the buffer; a recorder that waited would record nothing else.
     process = start("record", "-j", "-b", "1", "--chunksize", "0", "-O", "out", "/chatter")
     connected(chatter)
     for i in range(3):

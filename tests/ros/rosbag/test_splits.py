@@ -1,4 +1,4 @@
-"""When a recording is split, and the names of its files."""
+"""The limits at which a recording is split, and the names of its files."""
 
 from __future__ import annotations
 

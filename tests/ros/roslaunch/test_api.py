@@ -116,7 +116,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
 
 
 def test_the_run_id_is_the_programs(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The run id also applies to a master that the launch starts."""
+    """The run id also applies to a master started by the launch."""
     uri = f"http://localhost:{free_port()}"
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
@@ -197,7 +197,7 @@ def test_nothing_is_left_of_a_program_that_forgets_its_launch(master: str, packa
         "process = launch.launch(roslaunch.core.Node('pkg', 'wait.py', 'a', output='screen'))\n"
         "print('pid', process.pid, flush=True)\n"
     )
-    # The output only reaches end of file when the node, which also has the pipe open, has exited.
+    # The output reaches end of file only when the node, which also has the pipe open, has exited.
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )

@@ -56,7 +56,7 @@ def test_the_table_on_a_terminal(package: Path, master: str) -> None:
         env={**os.environ, "COLUMNS": "120", "TERM": "xterm"},
     )
     os.close(below)
-    # Read bytes, because a read may end in the middle of a character.
+    # Read bytes: a read may end in the middle of a character.
     said = b""
     while b"waiting here" not in said:
         said += os.read(above, 4096)

@@ -1,4 +1,4 @@
-"""Stopping the processes of a launch, and the guardian on systems that stop these processes themselves."""
+"""Stopping a launch's processes, and the guardian on systems that stop these processes themselves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FOREVER = [sys.executable, "-c", "import time; time.sleep(600)"]
 def test_a_process_that_no_interrupt_reaches_is_terminated_immediately(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """On Windows without a console, no interrupt reaches the process, so waiting its 600 seconds would have no effect."""
+    """On Windows without a console, no interrupt reaches the process; waiting its 600 seconds would be useless."""
 
     def refuse(_: object) -> None:
         raise OSError("Invalid handle")
@@ -33,7 +33,7 @@ def test_a_process_that_no_interrupt_reaches_is_terminated_immediately(
 
 
 def test_the_guardian_leaves_processes_alone_that_the_system_ends() -> None:
-    """By then, their process ids may belong to other processes."""
+    """Their process ids may belong to other processes by then."""
     words = [sys.executable, "-I", "-S", str(guardian.__file__), "0", "0", "http://localhost:1"]
     with subprocess.Popen(FOREVER) as other:
         try:

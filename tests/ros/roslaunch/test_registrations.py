@@ -98,7 +98,7 @@ def test_a_new_node_of_the_same_name_stays_registered(master: str) -> None:
     register(master, "/node", old := refusing())
     with Graph(MasterProxy(master, "/test"), "test") as graph:
         state = graph.state()
-        # A new node starts between the check of the old one and the calls that unregister the old one.
+        # A new node starts between the check of the old one and the calls that unregister it.
         register(master, "/node", refusing())
         forget_node(graph, NodeAddress("/node", old), state)
         after = graph.state()
@@ -126,7 +126,7 @@ def test_close_waits_for_the_nodes_added_before(master: str) -> None:
 
 
 def process_of(launch: Running, name: str) -> psutil.Process:
-    # Check the name too, because another test's roslaunch may have a node of the same name.
+    # Check the name, too: another test's roslaunch may have a node with the same name.
     return next(child for child in launch.children() if f"__name:={name}" in child.cmdline())
 
 

@@ -1,8 +1,7 @@
 """A simulated microcontroller on a pseudo-terminal and a node that communicate; prints the messages on both sides.
 
-`drive.py PROGRAM...` starts serial_node of either stack on the terminal; drive.txt is the output for the real one
-(rosserial 0.9.2,
-which Debian does not have).
+`drive.py PROGRAM...` starts serial_node of either stack on the terminal. drive.txt is the output for the real one (rosserial
+0.9.2, which Debian does not have).
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ CHATTER, LAMP, SERVER_OUT, SERVER_IN, CLIENT_OUT, CLIENT_IN = range(100, 106)
 
 
 class Device:
-    """The microcontroller's side of the serial line."""
+    """The microcontroller's end of the serial line."""
 
     def __init__(self) -> None:
         self.master, self.slave = pty.openpty()
@@ -110,7 +109,7 @@ def topics(
         rospy.sleep(0.02)
     lamp.publish(True)
     device.receive("lamp", Bool)
-    # The same again, as after a reset: nothing changes.
+    # Do the same again, as after a reset: nothing changes.
     device.describe(1, LAMP, "lamp", Bool, size=280)
     device.send(CHATTER, String("again"))
     print("node: chatter", chatter.get(timeout=SECONDS), flush=True)

@@ -51,14 +51,14 @@ def test_device_and_node_see_the_same_as_with_the_real_program(master: str) -> N
     )
     assert done.returncode == 0, done.stderr
     recorded = (HERE / "drive.txt").read_text(encoding="utf-8")
-    # These messages are Python's own, which do not name a type.
+    # These messages are Python's own and do not name a type.
     for python, ours in (
         ("no_such_msgs", "no_such_msgs/Thing"),
         ("module 'std_msgs.msg' has no attribute 'NoSuch'", "std_msgs/NoSuch"),
     ):
         line = f"Cannot import package of message type [{ours}]: build or install it on this side, too"
         recorded = recorded.replace(f"failed: {python}\n", f"failed: {line}\n")
-    # The message is published once the node runs, even if the subscriber to /rosout is not connected by then.
+    # The message is published once the node runs, even if the subscriber to /rosout is not connected yet.
     printed = done.stdout
     for early in ("log: 2 ROS Serial Python Node\n", "log: 2 Connecting to PORT at 57600 baud\n"):
         printed, recorded = printed.replace(early, ""), recorded.replace(early, "")
@@ -103,7 +103,7 @@ def test_devices_connect_by_tcp_one_after_the_other(start: Start, fork: str) -> 
                         assert message.data == turn
                         break
                     await words.wait_for_subscribers()
-                    # The message is larger than the device's buffer, so it is dropped, and the next one is received.
+                    # The message is larger than the device's buffer, so it is dropped. The next one is received.
                     await words.publish(String("x" * 400))
                     await words.publish(String("short"))
                     (packet,) = await asyncio.to_thread(packets, device, decoder, 1)

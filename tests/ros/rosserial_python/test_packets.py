@@ -12,7 +12,7 @@ PIECES = st.lists(st.binary(max_size=20), max_size=8)
 
 
 def test_packets_are_those_of_the_protocol() -> None:
-    # These are the requests for topics and for silence in the protocol's documentation.
+    # The requests for topics and for silence, from the protocol's documentation.
     assert encode(0, b"") == bytes.fromhex("ff fe 00 00 ff 00 00 ff")
     assert encode(11, b"") == bytes.fromhex("ff fe 00 00 ff 0b 00 f4")
     # 3 bytes on topic 258, with checksums of 03 00, and of 02 01 with the data.

@@ -101,7 +101,7 @@ def test_a_test_called_as_a_node_is_warned_of(tmp_path: Path) -> None:
 
 
 def test_a_test_without_a_name_runs_under_a_unique_one(tmp_path: Path) -> None:
-    """The test's results have no name, and its node is named after its type. Real rostest does the same."""
+    """The test's results have no name, and its node is named after its type, as in real rostest."""
     text = '<test test-name="" pkg="tested" type="good.py"/><test test-name="" name="x" pkg="tested" type="good.py"/>'
     status, out, _ = ran("rostest", "--package=a", "--pkgdir=/", write_test(tmp_path / "x.test", text))
     assert status == 1

@@ -41,7 +41,7 @@ def frames(start: Start) -> None:
     """Publish the frame a -> b on /tf at 10 Hz, and b -> c on /tf_static."""
     start(*OLD_STATIC, *words("1 2 3 0.5 0.25 0.1 /a /b 100"), "__name:=moving")
     start(*STATIC, *words("0.5 0 0 0 0 0 1 b c"), "__name:=fixed")
-    # Wait, because some programs listen for only a few seconds.
+    # Wait first, because some programs listen for only a few seconds.
     wait_for("b", "c")
 
 
@@ -93,7 +93,7 @@ class TestEcho:
     def test_failure_names_the_frames(self, start: Start) -> None:
         program = start("tf", "tf_echo", "a", "nothing", "20")
         read = ""
-        # Until frames have arrived, "a" does not exist either.
+        # "a" does not exist either until frames have arrived.
         while '"nothing"' not in read:
             lines_until(program, r"Failure at \d+\.\d{9}\n")
             read = lines_until(program, "The current list")
@@ -185,7 +185,7 @@ def test_frames_are_drawn(
         output, errors = program.communicate(timeout=SECONDS)
         assert program.returncode == 0, errors
         graph = Path("frames.gv").read_text(encoding="utf-8")
-        # On a machine that stalls, frames may arrive after the five seconds for which the program listens.
+        # If the machine stalls, frames may arrive after the five seconds for which the program listens.
         if '"a" -> "b"' in graph and '"b" -> "c"' in graph:
             break
     assert re.search(r'"b" -> "c"\[label=" ?Broadcaster: /fixed\\nAverage rate: 10000.0', graph)

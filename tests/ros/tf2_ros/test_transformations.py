@@ -47,7 +47,7 @@ def test_angles_become_a_rotation_and_angles_again(roll: float, pitch: float, ya
 
 
 def test_shears_are_taken_apart() -> None:
-    """The real module decomposes shears with eigenvectors, of which a shear has too few, and is off by some percent."""
+    """The real module decomposes shears by eigenvectors, of which a shear has too few; its results are off by some percent."""
     matrix = transformations.shear_matrix(0.7, [1, -2, 0], [1, 2, 3], [0, 0, 5])
     found, direction, _, normal = transformations.shear_from_matrix(matrix)
     assert found == pytest.approx(0.7, rel=0.1)

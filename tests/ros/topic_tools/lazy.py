@@ -34,7 +34,7 @@ relay = Relay()
 for _ in range(2):
     came = threading.Event()
     subscriber = rospy.Subscriber("words_out", String, lambda message, came=came: came.set())
-    # Repeat: a string that was forwarded before this subscriber connected is lost.
+    # Repeat: strings that are forwarded before this subscriber connects are lost.
     while not came.wait(0.2):
         words.publish("word")
     print("word", flush=True)

@@ -53,7 +53,7 @@ async def driven(
 async def commanded(
     node: Node, command: Callable[[], Awaitable[None]], topic: str, is_right: Callable[[object], bool]
 ) -> object:
-    """Repeat a command until a pose meets a condition, because a command applies for a second, and poses may arrive later."""
+    """Repeat a command until a pose meets a condition: a command is in effect for a second, and poses may arrive later."""
     following = asyncio.ensure_future(until(node, topic, Pose, is_right))
     while not following.done():
         await command()
@@ -288,8 +288,8 @@ class Terminal:
         return status
 
     def _read(self) -> None:
-        # Read continuously, because a program whose terminal is full blocks, and its turtle stands still. Linux
-        # raises an error if the terminal is closed.
+        # Read continuously: a program whose terminal is full blocks, and its turtle stands still. On Linux, reading
+        # from a closed terminal raises an error.
         with contextlib.suppress(OSError):
             while data := os.read(self._master, 65536):
                 with self._changed:

@@ -199,7 +199,7 @@ def test_stroke_outside_of_the_paper_changes_nothing() -> None:
 
 
 def test_square_is_drawn_with_its_goals(world: World) -> None:
-    """These are the lines that draw_square logs. For half of its turns, the goal is the point at which the turtle stops."""
+    """These are the lines that draw_square logs. For half of its turns, the goal is where the turtle stops."""
     square = Square()
     lines: list[str] = []
     orders: list[Order | None] = []

@@ -48,7 +48,7 @@ def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pyt
                 master.dispatch("registerPublisher", [f"/dead{number}", f"/t{number}", "a/B", dead_uri])
             await until(lambda: publishers == [slow_uri, dead_uri, dead_uri])
             await asyncio.sleep(0.05)
-            # There is enough space, so no node is called.
+            # There is enough space, so the master calls no nodes.
             assert len(master.registry.nodes()) == 13
             assert "getPid" not in called
 

@@ -137,7 +137,7 @@ def test_start_writes_the_boot_and_the_state(journal: Journal, path: Path, state
 
 
 def test_rewrite_syncs_the_new_file_before_it_replaces_the_old_one(journal: Journal, disk: Disk) -> None:
-    """Otherwise a power cut could leave an empty file under the journal's name."""
+    """Otherwise a power cut could leave an empty file with the journal's name."""
     journal.start()
     disk.calls.clear()
     journal.rewrite()
@@ -146,7 +146,7 @@ def test_rewrite_syncs_the_new_file_before_it_replaces_the_old_one(journal: Jour
 
 
 def test_append_does_not_sync(journal: Journal, disk: Disk) -> None:
-    """A kill -9 loses no written data, and a sync for each call would slow the master down."""
+    """kill -9 loses no data that was written, and a sync for each call would slow the master down."""
     journal.start()
     disk.calls.clear()
     journal.append("set", "/p", 1)
@@ -278,7 +278,7 @@ def test_rewrite_in_steps_keeps_records_appended_meanwhile(
 
     for count, _ in enumerate(steps[0], 1):
         stepping.append("set", "/meanwhile", count)
-        # A crash at this point would lose nothing either.
+        # A crash at this point would not lose anything, either.
         assert records(path)[-1] == ["set", "/meanwhile", count]
 
     assert path.stat().st_ino != old
@@ -500,7 +500,7 @@ def test_store_on_a_full_disk_is_reported(
     finish(journal.store(list(range(1000))))
     assert journal.trouble == os.strerror(errno.ENOSPC)
     assert "cannot be written, a crash would lose the graph" in caplog.text
-    # There is no retry before half a minute has passed.
+    # There is no retry within half a minute.
     disk.error = None
     finish(journal.store([1]))
     assert "write" not in disk.calls[disk.calls.index("fsync") :][2:]
@@ -698,7 +698,7 @@ def test_read_returns_the_changes_the_age_and_the_boot(
     assert left
     assert not left.same_boot
 
-    # This simulates that the clock was set back.
+    # This simulates a clock that was set back.
     os.utime(path, (1, time.time() + 100))
     left = journal.read()
     assert left

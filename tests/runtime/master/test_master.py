@@ -208,7 +208,7 @@ def test_a_subscriber_that_never_answers_delays_no_other(proxy: ServerProxy, sla
 def test_an_update_does_not_meet_the_answer_to_a_registration(
     proxy: ServerProxy, slaves: list[Slave], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # If real rospy received the update first and the older response later, it would stay without the publisher.
+    # If real rospy received the update first and then the older response, it would lose the publisher.
     old, fresh = slaves
     monkeypatch.setattr(notifier, "HOLD_SECONDS", 0.0)
     proxy.registerSubscriber("/old", "/t", "std_msgs/Bool", old.uri)

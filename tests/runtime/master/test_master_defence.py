@@ -176,7 +176,7 @@ def result_of(answer: Any) -> Any:
 def exchange(uri: str, data: bytes) -> bytes:
     """Return the master's response, up to the end of the connection or response."""
     port = int(uri.rsplit(":", 1)[1])
-    # Reading a million elements takes seconds, or many times as long on a busy machine.
+    # Reading a million elements takes seconds, many times that on a busy machine.
     with socket.create_connection(("127.0.0.1", port), 100) as sock:
         sock.sendall(data)
         answer = b""
@@ -248,7 +248,7 @@ def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch
 
 def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
     async def start() -> Master:
-        serving = Master(most_clients=20)
+        serving = Master(max_clients=20)
         await serving.start()
         return serving
 

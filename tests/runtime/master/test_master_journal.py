@@ -433,7 +433,7 @@ def test_journal_of_another_master_is_written_once_that_one_has_ended(
 
 
 def test_master_without_the_port_never_locks_the_journal(path: Path) -> None:
-    """Otherwise it could briefly hold the lock, and the master that got the port would run without a journal."""
+    """Otherwise it could hold the lock for a moment, and the master that got the port would run without a journal."""
 
     async def test() -> None:
         with socket.socket() as other:
@@ -918,7 +918,7 @@ class Oracle(BackgroundClient):
                     with self.lock:
                         if self.unsure is None:
                             self._call(proxy, rng)
-                    # Let a thread that is waiting for the lock acquire it.
+                    # Give a thread that waits for the lock a chance to acquire it.
                     time.sleep(0.0005)
 
     def _call(self, proxy: ServerProxy, rng: random.Random) -> None:
@@ -967,7 +967,7 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
         master = Killed(port)
         stack.callback(master.end)
         with ServerProxy(master.uri) as proxy:
-            # Reading 20 MB takes long enough that both starts overlap.
+            # Reading 20 MB takes so long that the two starts overlap.
             for number in range(10):
                 proxy.setParam("/test", f"/large/{number}", [f"{number} " + 1000 * "x"] * 2000)
         oracle = Oracle(master.uri, loop.run(open_all(), 20.0))

@@ -205,7 +205,7 @@ def test_nothing_is_sent_after_close(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A list of 1,000 publishers is followed by a pause of 50 ms; the node's other topics are not delayed."""
+    """After a list of 1,000 publishers there is a pause of 50 ms; it does not delay the node's other topics."""
 
     async def scene(clock: ManualLoop) -> None:
         scene = Scene(monkeypatch)
@@ -225,7 +225,7 @@ def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyP
         await clock.advance(0.02)
         await scene.answer(clock, [uri], is_dead=False)
         assert [args[1] for _, args in scene.calls] == ["/many", "/few", "/many"]
-        # A node whose pause has ended uses neither memory nor time.
+        # After its pause, a node uses neither memory nor time.
         await clock.advance(0.06)
         assert not scene.notifier.nodes
         await scene.notifier.close()

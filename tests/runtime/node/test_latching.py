@@ -16,8 +16,7 @@ from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
-# Seconds for which the other thread may run in between. If there is a lock, the thread waits for it, so all of the
-# time passes.
+# Seconds for which the other thread may run in between. It uses all of them if it waits for a lock.
 MEANWHILE = 0.3
 
 

@@ -231,7 +231,7 @@ def _count(master: FakeMaster, method: str) -> int:
 
 
 def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """asyncio.wait_for before Python 3.12 loses it if the response arrives at the same moment."""
+    """Before Python 3.12, asyncio.wait_for loses it if the response arrives at the same moment."""
 
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:

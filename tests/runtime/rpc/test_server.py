@@ -351,7 +351,7 @@ def test_connections_that_may_displace_each_other_are_read_first(
             read.append(self)
 
     async def scene() -> None:
-        server = RpcServer(lambda method, args: 0, most_idle=2)
+        server = RpcServer(lambda method, args: 0, max_idle=2)
         await server.start()
         with contextlib.ExitStack() as stack:
             for _ in range(8):

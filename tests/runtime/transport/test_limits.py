@@ -1,4 +1,4 @@
-"""A process at its limit of threads or open files logs one clear line, does not spin, and continues when the limit allows."""
+"""A process at its limit of threads or open files logs one clear line, does not spin, and continues once the limit permits."""
 
 from __future__ import annotations
 

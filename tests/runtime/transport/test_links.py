@@ -233,7 +233,7 @@ def test_reader_busy_polls_while_messages_arrive_quickly(
 def test_reader_blocks_after_busy_polling_without_success(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The measured wait includes the busy-poll and the blocking; after a long wait, the next receive blocks."""
+    """The measured wait includes both the busy-poll and the blocking. After a long wait, the next receive blocks."""
     one, other = socket.socketpair()
     looks: list[str] = []
     clock = SimpleNamespace(now=0.0)

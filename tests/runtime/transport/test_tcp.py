@@ -174,8 +174,8 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
         listener = await serve(received)
         silent: list[socket.socket] = []
         try:
-            # Use as many as this process may open: it has both sockets of each connection open, unless the listener
-            # closes its own socket.
+            # Use as many as this process may open. It has both sockets of each connection open, unless the listener
+            # closes its own.
             for number in range(1000):
                 silent.append(await tcp.connect("127.0.0.1", listener.port))
                 if number % 100 == 99:

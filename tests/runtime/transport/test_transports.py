@@ -1,4 +1,4 @@
-"""How two nodes on one machine connect by a Unix socket, and use TCP otherwise."""
+"""Two nodes on one machine connect by a Unix socket; other nodes use TCP."""
 
 from __future__ import annotations
 
@@ -236,8 +236,7 @@ def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
 
 def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
-    # This has the same effect as if this process, which took the name, belonged to a user other than this one and
-    # root.
+    # This has the same effect as a process that took the name and belongs to a user other than this one and root.
     monkeypatch.setattr(local, "TRUSTED_USERS", frozenset())
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]

@@ -130,7 +130,7 @@ def test_board_that_cannot_be_shown_has_its_error(
 
     monkeypatch.setattr(board_endpoint, "state_of", fail)
     with opened(serve()) as socket:
-        # The client disconnects as soon as this arrives. The connection to the board is closed nevertheless, as a
+        # The client disconnects as soon as this arrives. The connection to the board must still be closed, which a
         # fixture checks.
         found = state(socket, lambda each: "error" in each)
     assert found["error"] == "the dashboard failed to show the board: ZeroDivisionError"

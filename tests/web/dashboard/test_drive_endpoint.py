@@ -1,4 +1,4 @@
-"""Driving through the server's endpoint: whatever failure a client has, the last message is zero."""
+"""Driving through the server's endpoint: however a client fails, the last message is zero velocity."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ import pytest
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
@@ -31,6 +32,7 @@ from minirospy.web.dashboard.drive_endpoint import (
     Command,
     DriveSession,
     Joystick,
+    Target,
     Velocity,
     parse,
 )
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from tests.web.dashboard.conftest import Served
 
 FORWARD = {"topic": "/cmd_vel", "twist": [0.5, 0, 0, 0, 0, -1]}
+REACH = {"topic": "/arm/command", "joints": ["a", "b"], "positions": [0.5, -1], "seconds": 2}
 AT_REST = {"topic": "/cmd_vel", "twist": [0] * 6}
 
 
@@ -52,10 +55,13 @@ def test_commands_are_parsed() -> None:
     assert parse('{"topic": "joy", "axes": [0.5], "buttons": [0, 1]}') == Command(
         "joy", Joystick((0.5,), (0, 1))
     )
+    assert parse(json.dumps(REACH)) == Command("/arm/command", Target(("a", "b"), (0.5, -1), 2.0))
     assert parse('{"leave": "/joy"}') == Command("/joy", None)
     assert Velocity((0.0, -0.0, 0, 0, 0, 0)).is_zero
     assert Joystick((0.0, 1.0), (1,)).zero() == Joystick((0.0, 0.0), (0,))
     assert not Joystick((0.0,), (1,)).is_zero
+    assert Target(("a",), (0.0,), 1.0).zero().is_zero
+    assert not Target(("a",), (0.0,), 1.0).is_zero
 
 
 @pytest.mark.parametrize(
@@ -75,6 +81,13 @@ def test_commands_are_parsed() -> None:
         ("[" * 20_000, "nested too deep"),
         ("[" * 20_001, "more than 20000 characters"),
         ('{"topic": "/a", "axes": [1e39], "buttons": []}', "an axis is from -1 to 1"),
+        (json.dumps(REACH | {"joints": []}), "joints are an array of names"),
+        (json.dumps(REACH | {"joints": [1, 2]}), "joints are an array of names"),
+        (json.dumps(REACH | {"joints": ["a"]}), "each joint has one position"),
+        (json.dumps(REACH | {"positions": [0, float("nan")]}), "not finite"),
+        (json.dumps(REACH | {"seconds": 0}), "a motion lasts up to 3600 seconds"),
+        (json.dumps(REACH | {"seconds": 3601}), "a motion lasts up to 3600 seconds"),
+        (json.dumps(REACH | {"seconds": None}), "not finite"),
     ],
 )
 def test_text_that_is_not_a_command_is_refused(text: str, why: str) -> None:
@@ -317,6 +330,27 @@ def test_joystick_is_published_and_at_rest_when_it_is_left(serve: Callable[..., 
         client.send('{"leave": "/joy"}')
         rest = until(lambda joy: joy.axes[0] == 0)
         assert (list(rest.axes), list(rest.buttons)) == ([0, 0], [0, 0, 0])
+
+
+@pytest.mark.parametrize("ending", ["leaves", "is silent", "is cut off"])
+def test_joints_are_held_when_the_client(serve: Callable[..., Served], ending: str) -> None:
+    served = serve()
+    until = listen(served, "/arm/command", JointTrajectory)
+    with opened(served) as client:
+        # The topic is connected first, which may take longer than a client may be silent.
+        client.send(json.dumps(REACH))
+        until(lambda command: not command.points or command.points[0].positions)
+        client.send(json.dumps(REACH))
+        reached = until(lambda command: command.points)
+        assert list(reached.joint_names) == ["a", "b"]
+        assert list(reached.points[0].positions) == [0.5, -1]
+        assert reached.points[0].time_from_start.to_sec() == 2
+        assert reached.header.stamp.to_sec() > 0
+        if ending == "leaves":
+            client.send('{"leave": "/arm/command"}')
+        elif ending == "is cut off":
+            client.socket.close()
+        until(lambda command: not command.points)
 
 
 def test_forbidden_topics_are_named(serve: Callable[..., Served]) -> None:

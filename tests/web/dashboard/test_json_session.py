@@ -67,7 +67,7 @@ class Session(JsonSession):
     subject: ClassVar[str] = "toys"
     owners_only: ClassVar[str] = "play"
     longest: ClassVar[int] = 1000
-    most_waiting: ClassVar[int] = 3
+    max_waiting: ClassVar[int] = 3
 
     def __init__(self, client: WebClient) -> None:
         self.left_by: list[str] = []

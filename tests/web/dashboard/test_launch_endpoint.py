@@ -55,7 +55,7 @@ class Client:
         return launch
 
     def log(self, text: str) -> str:
-        """Return the followed log once it contains this text."""
+        """Return the log being followed once it contains this text."""
         found = ""
         while text not in found:
             message = self.next(lambda each: "log" in each)

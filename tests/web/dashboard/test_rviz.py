@@ -67,7 +67,7 @@ def test_file_of_rviz_is_written_as_it_was_read() -> None:
     again = format_rviz(found)
     assert parse_rviz(again) == found
     lines = set(FILE.splitlines())
-    # A string of digits is quoted, so that every reader takes it for a string.
+    # A string of digits is quoted, so that every reader treats it as a string.
     assert [line for line in again.splitlines() if line not in lines] == ["  Odd State: '00000012'"]
 
 

@@ -100,11 +100,11 @@ class ActionClient:
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
-        """Send a goal and return its handle. Keep a reference to the handle: without one, the callbacks are no longer called.
+        """Send a goal and return its handle. Keep a reference to the handle: the callbacks are only called while it exists.
 
         ``transition_cb(handle)`` is called on each state change, and ``feedback_cb(handle, feedback)`` for each feedback
-        message.
-        Both are called in the library's threads: one at a time for each goal, but concurrently for different goals.
+        message. Both are called in the library's threads: one at a time for each goal, but concurrently for different
+        goals.
         """
         impl = self.status_sub.impl
         subscription = impl and impl.subscription
@@ -121,7 +121,7 @@ class ActionClient:
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Wait for the server. This is the old name of :meth:`wait_for_server`."""
+        """Wait for the server. An old name of :meth:`wait_for_server`."""
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
@@ -156,13 +156,13 @@ class ActionClient:
             self._check_later(goals)
 
     def _check_later(self, goals: list[CommStateMachine]) -> None:
-        # Use a wall-clock timer instead of rospy.Timer, because a simulated clock may stop together with the server.
+        # Use a wall-clock timer instead of rospy.Timer, because a simulated clock may stop when the server does.
         timer = threading.Timer(SERVER_SECONDS, self._check_server, (goals, self.last_status_msg))
         timer.daemon = True
         timer.start()
 
     def _check_server(self, goals: list[CommStateMachine], last: GoalStatusArray | None) -> None:
-        """End ``goals`` as LOST, unless a server lists them in a newer status message than ``last``."""
+        """Set ``goals`` to LOST, except those that a server lists in a status message newer than ``last``."""
         impl = self.status_sub.impl  # read once, because stop() in another thread sets it to None
         if rospy.is_down() or impl is None:
             return
@@ -206,13 +206,13 @@ class ActionClient:
 
 
 def _remove(functions: list[Callable[[], object]], function: Callable[[], object]) -> None:
-    """Remove ``function`` from ``functions`` if it is there; another thread may remove it at the same time."""
+    """Remove ``function`` from ``functions``, unless another thread has already removed it."""
     with contextlib.suppress(ValueError):
         functions.remove(function)
 
 
 def _lose(goal: CommStateMachine) -> bool:
-    """End ``goal`` as LOST; return False if it had already ended. Log the error if its callback raises one."""
+    """Set ``goal`` to LOST; return False if it had already ended. If its callback raises an error, log the error."""
     try:
         return goal.lose()
     except BaseException as error:  # noqa: BLE001 - user code failed, but the goal has ended

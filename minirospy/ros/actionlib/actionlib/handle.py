@@ -147,7 +147,7 @@ class ServerGoalHandle:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal after a cancel request: as RECALLED if it was never accepted, otherwise as PREEMPTED."""
+        """Set the goal's status after a cancel request: RECALLED if the goal was never accepted, otherwise PREEMPTED."""
         self._log("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 
@@ -157,17 +157,17 @@ class ServerGoalHandle:
         self._finish(GoalEvent.REJECT, result, text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal as ABORTED."""
+        """Set the goal's status to ABORTED."""
         self._log("Setting status to aborted on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.ABORT, result, text)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal as SUCCEEDED."""
+        """Set the goal's status to SUCCEEDED."""
         self._log("Setting status to succeeded on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.SUCCEED, result, text)
 
     def set_cancel_requested(self) -> bool:
-        """Record a client's cancel request; return whether that changes the goal's state."""
+        """Record a client's cancel request; return whether it changes the goal's state."""
         self._log("Transisitoning to a cancel requested state on goal id: %s, stamp: %.2f")
         tracker = self.status_tracker
         if not self.goal or tracker is None or self.action_server is None:

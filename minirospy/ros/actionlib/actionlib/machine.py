@@ -28,7 +28,7 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which the server may not list a goal, either not yet or no longer."""
+"""States in which the server may not list a goal: it does not list the goal yet, or no longer."""
 
 
 class ClientGoalHandle:
@@ -55,7 +55,7 @@ class ClientGoalHandle:
             return
         with machine.mutex:
             machine.send_cancel_fn(GoalID(id=machine.action_goal.goal_id.id))
-            # If the goal has just ended, there is no acknowledgement to wait for.
+            # A goal that has just ended has no acknowledgement to wait for.
             if machine.state != _DONE:
                 machine.transition_to(CommState.WAITING_FOR_CANCEL_ACK)
 
@@ -183,7 +183,7 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The status list with this status may arrive later or never, so make its transitions first.
+                # The status list with this status may arrive later or never, so make its transitions now.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
@@ -196,7 +196,7 @@ class CommStateMachine:
                 self.feedback_cb(ClientGoalHandle(self), action_feedback.feedback)
 
     def lose(self) -> bool:
-        """End the goal as LOST, because its server is gone; return False if the goal had already ended."""
+        """Set the goal to LOST, because its server is gone; return False if the goal had already ended."""
         with self.mutex:
             if self.state == _DONE:
                 return False

@@ -42,9 +42,9 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # maximum number of statuses to publish immediately on each change
+_FEW_STATUSES = 50  # maximum number of statuses to publish immediately after each change
 
-# For a longer list, seconds to pause per status in it, so that publishing does not use all CPU time.
+# For longer lists: seconds to pause per status, so that publishing does not use all CPU time.
 _SECONDS_A_STATUS = 1e-4
 
 
@@ -238,7 +238,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and self._find(goal_id.id) is None:
-                # If the goal arrives after this request, it is recalled immediately.
+                # If the goal arrives after this request, it will be recalled immediately.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._add(tracker)
                 tracker.end()
@@ -286,7 +286,7 @@ class ActionServer:
         return ServerGoalHandle(tracker, self, tracker.handle_tracker)
 
     def _publish_periodically(self) -> None:
-        # A subclass that overrides publish_status() expects each publication to go through it.
+        # A subclass that overrides publish_status() expects every publication to go through that method.
         if type(self).publish_status is ActionServer.publish_status:
             self.publish_status_now()
         else:
@@ -294,7 +294,7 @@ class ActionServer:
 
     def _find(self, id: str) -> StatusTracker | None:
         """Return the goal in the list with this ID, or None."""
-        # Equality of lists compares the identity of their items first, which is fast.
+        # Comparing lists compares the identity of their items first, which is fast.
         if self._indexed != self.status_list:
             self._indexed = list(self.status_list)
             self._by_id = {tracker.status.goal_id.id: tracker for tracker in reversed(self._indexed)}
@@ -339,7 +339,7 @@ class _StatusThread:
             threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
 
     def hurry(self, seconds: float) -> None:
-        """Call ``publish`` in ``seconds``, unless a call is due before that."""
+        """Call ``publish`` in ``seconds``, unless a call is already due before that."""
         due = time.monotonic() + seconds
         if due < self._due:
             self._due = due

@@ -58,8 +58,7 @@ class SimpleActionServer:
         self.action_server = ActionServer(
             name, ActionSpec, self.internal_goal_callback, self.internal_preempt_callback, auto_start=False
         )
-        # Share the action server's lock: with two locks, a goal that arrives while another ends could cause a
-        # deadlock.
+        # Share the action server's lock. With two locks, a goal that arrives while another ends could cause a deadlock.
         self.lock = self.action_server.lock
         self.execute_condition = threading.Condition(self.lock)
 
@@ -107,17 +106,17 @@ class SimpleActionServer:
         return self.current_goal.get_goal_status().status in (GoalStatus.ACTIVE, GoalStatus.PREEMPTING)
 
     def set_succeeded(self, result: Message | None = None, text: str = "") -> None:
-        """End the current goal as SUCCEEDED."""
+        """Set the current goal's status to SUCCEEDED."""
         with self.lock:
             self.current_goal.set_succeeded(result or self.get_default_result(), text)
 
     def set_aborted(self, result: Message | None = None, text: str = "") -> None:
-        """End the current goal as ABORTED."""
+        """Set the current goal's status to ABORTED."""
         with self.lock:
             self.current_goal.set_aborted(result or self.get_default_result(), text)
 
     def set_preempted(self, result: Message | None = None, text: str = "") -> None:
-        """End the current goal as PREEMPTED."""
+        """Set the current goal's status to PREEMPTED."""
         with self.lock:
             rospy.logdebug("Setting the current goal as canceled")
             self.current_goal.set_canceled(result or self.get_default_result(), text)
@@ -206,8 +205,8 @@ class SimpleActionServer:
         try:
             self.execute_callback(goal)
         except BaseException as error:  # noqa: BLE001 - user code failed; serve the next goals
-            # During a shutdown exceptions are expected: Ctrl-C interrupts sleeps, and a hook may have closed the
-            # callback's resources.
+            # Exceptions are expected during a shutdown.
+            # Ctrl-C interrupts sleeps, and a hook may have closed the callback's resources.
             if not rospy.is_shutdown_requested():
                 rospy.logerr("Exception in your execute callback: %s\n%s", error, traceback.format_exc())
                 self.set_aborted(None, f"Exception in execute callback: {error}")
@@ -217,7 +216,7 @@ class SimpleActionServer:
                 self.set_aborted(None, "No terminal state was set.")
 
     def _wake_soon(self) -> None:
-        """Wake the execute loop from a new thread, because a blocking callback may hold the lock."""
+        """Wake the execute loop from a new thread, because a callback that blocks may hold the lock."""
         with naming_thread_limit():
             threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
 

@@ -21,14 +21,14 @@ __all__ = [
 # Connection header field on goal topics, set by minirospy clients to announce that they accept fast responses.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 
-# Seconds by which the server delays goals from other clients: Python actionlib drops results that arrive before
-# send_goal returns.
+# Seconds for which the server delays goals from other clients.
+# Python's actionlib drops results that arrive before send_goal returns.
 SEND_SECONDS = 1e-3
 
-# Seconds by which cancel requests are delayed: the goal, sent earlier on another connection, is itself delayed.
+# Seconds for which cancel requests are delayed, because the goal, which was sent earlier on another connection, is delayed too.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
-# Seconds for a server to reconnect after its connection has ended. After that, its goals are LOST.
+# Seconds for a server to reconnect after its connection has ended; after that, its goals are LOST.
 SERVER_SECONDS = 5.0
 
 

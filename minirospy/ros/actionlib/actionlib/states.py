@@ -27,7 +27,7 @@ g_goal_id = 1  # unused; ROS's `from actionlib import *` exports it
 def get_name_of_constant(C: type, n: int) -> str:
     """Return the name of the class constant with this value; if there is none, return a name such as ``NO_SUCH_STATE_77``."""
     for name, value in vars(C).items():
-        # ``type(value) is int`` excludes bool constants, which message classes may also define.
+        # ``type(value) is int`` excludes bool constants, which message classes may also have.
         if type(value) is int and value == n and not name.startswith("_"):
             return name
     return f"NO_SUCH_STATE_{n}"

@@ -66,7 +66,7 @@ class StatusList(GoalStatusArray):
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
             return None
-        # Check the position, because the same bytes may also occur in another goal's text.
+        # Check the position, because another goal's text may contain the same bytes.
         for start, end in self._bounds():
             if self._data.startswith(key, start + 8):
                 return _parse(self._data[start:end])
@@ -90,7 +90,7 @@ class StatusList(GoalStatusArray):
             seq, secs, nsecs, length = _HEADER.unpack_from(data)
             self._start = _HEADER.size + length + _COUNT.size
             (self._count,) = _COUNT.unpack_from(data, self._start - _COUNT.size)
-        # OverflowError: the offset exceeds the range that struct supports
+        # OverflowError: the offset is out of struct's range
         except (struct.error, OverflowError):
             self._fail(data)
         self.header.seq = seq
@@ -111,7 +111,7 @@ class StatusList(GoalStatusArray):
                 end += 17 + _STAMP_AND_LENGTH.unpack_from(data, start)[2]
                 end += _STATUS_AND_LENGTH.unpack_from(data, end - 5)[1]
                 bounds.append((start, end))
-        # OverflowError: the offset exceeds the range that struct supports
+        # OverflowError: the offset is out of struct's range
         except (struct.error, OverflowError):
             self._fail(data)
         return bounds

@@ -1,4 +1,4 @@
-"""Blocks until a condition becomes true, without polling. A shutdown interrupts the wait, and timeouts are in ROS time."""
+"""Blocks until a condition becomes true, without polling. A shutdown interrupts the wait. Timeouts are in ROS time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Waiting:
             event.set()
 
     def wait_for(self, condition: Callable[[], bool], timeout: times.Duration) -> bool:
-        """Wait until ``condition()`` is truthy; return False after ``timeout`` (zero: no timeout) or at a shutdown."""
+        """Wait until ``condition()`` is true; return False after ``timeout`` (zero: no timeout) or at a shutdown."""
         deadline = rospy.get_rostime() + timeout if timeout != _FOREVER else None
         if condition():
             return True

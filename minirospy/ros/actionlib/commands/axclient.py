@@ -163,7 +163,7 @@ class _Progress:
         self._tell("Sent")
         try:
             client.send_goal(self._goal, self._on_done, self._on_active, self._on_feedback)
-            # Wait in slices, because a Ctrl-C just before a long wait would take effect only when the wait ends.
+            # Wait in slices: a Ctrl-C just before a long wait would only take effect when the wait ends.
             while not self._done.wait(_SLICE_SECONDS):
                 pass
         except KeyboardInterrupt:

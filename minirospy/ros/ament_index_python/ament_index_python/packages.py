@@ -38,7 +38,10 @@ def get_package_share_path(package_name: str, print_warning: bool = True) -> Pat
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Return a package's folder: ROS 1 has no shared prefix. Raise PackageNotFoundError if there is no such package."""
+    """Return a package's folder: ROS 1 has no prefix that packages share.
+
+    Raise PackageNotFoundError if there is no such package.
+    """
     return get_package_share_directory(package_name)
 
 

@@ -41,7 +41,7 @@ def shortest_angular_distance(from_angle: float, to_angle: float) -> float:
 
 
 def two_pi_complement(angle: float) -> float:
-    """Return the rotation in the opposite direction that leads to the same angle, from -2 pi to 2 pi."""
+    """Return the rotation in the opposite direction that reaches the same angle, in the range -2 pi to 2 pi."""
     if abs(angle) > _TURN:
         angle = fmod(angle, _TURN)
     return angle - _TURN if angle > 0 else angle + _TURN
@@ -61,7 +61,7 @@ def shortest_angular_distance_with_limits(
         for each in (turn, other):
             if least <= each <= greatest:
                 return True, each
-        # The target is outside the limits: rotate towards the limit that is closer to the target.
+        # The target is outside the limits: rotate towards the limit closer to the target.
         _, least, greatest = _find_min_max_delta(to_angle, left_limit, right_limit)
         least, greatest = greatest, least
 
@@ -93,7 +93,7 @@ def shortest_angular_distance_with_large_limits(
 def _find_min_max_delta(
     from_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float, float]:
-    """Return whether an angle is within the limits, and how far it can rotate clockwise and counter-clockwise before a limit."""
+    """Return whether an angle is within the limits, and how far it can rotate clockwise and counter-clockwise to a limit."""
     to_left = shortest_angular_distance(from_angle, left_limit)
     to_right = shortest_angular_distance(from_angle, right_limit)
     left_round, right_round = two_pi_complement(to_left), two_pi_complement(to_right)

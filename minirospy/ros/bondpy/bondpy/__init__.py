@@ -1,1 +1,1 @@
-"""bondpy: a bond notifies two nodes of each other's exit. Source: http://wiki.ros.org/bondpy."""
+"""bondpy: a bond notifies each of two nodes when the other exits. Source: http://wiki.ros.org/bondpy."""

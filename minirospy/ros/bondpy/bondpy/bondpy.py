@@ -23,7 +23,7 @@ __all__ = ["Bond", "Timeout", "as_float_duration", "as_ros_duration"]
 Seconds = float | times.Duration
 Callback = Callable[[], object]
 
-_LOOK = 0.1  # seconds between checks for a shutdown
+_LOOK = 0.1  # seconds between checks whether the node is shutting down
 
 
 def as_ros_duration(d: Seconds) -> times.Duration:
@@ -92,7 +92,7 @@ class Bond:
             Event.HEARTBEAT_TIMEOUT: Constants.DEFAULT_HEARTBEAT_TIMEOUT,
             Event.DISCONNECT_TIMEOUT: Constants.DEFAULT_DISCONNECT_TIMEOUT,
         }
-        # The active timeouts' deadlines, in monotonic time.
+        # The deadlines of the active timeouts, in monotonic time.
         self._deadlines: dict[Event, float] = {}
         self._heartbeat_period: float = Constants.DEFAULT_HEARTBEAT_PERIOD
         self.sub: rospy.Subscriber[Status] | None = None
@@ -104,7 +104,7 @@ class Bond:
         return f"[Bond {self.id}, Instance {self.instance_id} ({self._state.value})]"
 
     def __del__(self) -> None:
-        # If __init__ has failed, ``pub`` is missing, and there is nothing to shut down.
+        # If __init__ failed, ``pub`` does not exist and there is nothing to shut down.
         if hasattr(self, "pub"):
             self.shutdown()
 
@@ -307,7 +307,7 @@ class Bond:
                 self._run_timeout(event)
             return
         with self.lock:
-            # A message may have restarted the timeout since the deadline expired.
+            # A message may have restarted the timeout after the deadline expired.
             deadline = self._deadlines.get(event)
             if deadline is not None and deadline <= time.monotonic():
                 del self._deadlines[event]

@@ -38,8 +38,7 @@ class Action(enum.Enum):
 
 
 _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
-    # The first message counts as a heartbeat, so that the bond detects a sister that exits right after its first
-    # message.
+    # The first message counts as a heartbeat, so that the bond detects a peer that exits right after its first message.
     (State.WAITING, Event.SISTER_ALIVE): (State.ALIVE, (Action.CONNECTED, Action.HEARTBEAT)),
     (State.WAITING, Event.SISTER_DEAD): (State.DEAD, (Action.CONNECTED, Action.SISTER_DIED, Action.DEATH)),
     (State.WAITING, Event.CONNECT_TIMEOUT): (State.DEAD, (Action.DEATH,)),
@@ -54,5 +53,5 @@ _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
 
 
 def next_state(state: State, event: Event) -> tuple[State, tuple[Action, ...]]:
-    """Return the next state and the actions to perform. If the event has no transition, the state stays the same."""
+    """Return the next state and the actions to perform. An event without a transition leaves the state unchanged."""
     return _TABLE.get((state, event), (state, ()))

@@ -22,7 +22,7 @@ _MATRICES = (
     ("rectification_matrix", "R", (3, 3)),
     ("projection_matrix", "P", (3, 4)),
 )
-"""(key, CameraInfo field, shape) of each matrix; None accepts any shape."""
+"""(key, CameraInfo field, shape) of each matrix; a shape of None means any."""
 _INI_COUNTS = {"width": 1, "height": 1, "camera matrix": 9, "rectification": 9, "projection": 12}
 _INI_FIELDS = {"camera matrix": "K", "distortion": "D", "rectification": "R", "projection": "P"}
 _MAX_DIGITS = 100  # maximum number of digits in the width or height, including leading zeros
@@ -38,7 +38,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
     import yaml
 
     try:
-        # Load all scalars as strings: a name may look like a number, and YAML 1.1 does not read 1e3 as a number.
+        # Load all scalars as strings: a name may look like a number, and in YAML 1.1 1e3 is not a number.
         tree = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         raise CalibrationError(" ".join(str(error).split())) from error

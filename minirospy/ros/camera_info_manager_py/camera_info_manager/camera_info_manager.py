@@ -104,7 +104,7 @@ class CameraInfoManager:
             self.camera_info = loadCalibrationFile(filename, self.cname)
 
     def setCameraInfo(self, req: SetCameraInfoRequest) -> SetCameraInfoResponse:
-        """Store a calibration and save it; this is the service's handler."""
+        """Store and save a calibration; this is the service's handler."""
         rospy.logdebug("SetCameraInfo received for %s", self.cname)
         self.camera_info = req.camera_info
         if saveCalibration(req.camera_info, self.url, self.cname):
@@ -123,7 +123,7 @@ class CameraInfoManager:
         return True
 
     def setURL(self, url: str) -> bool:
-        """Set the calibration's URL; return False if it is invalid. Load the calibration again afterwards."""
+        """Set the calibration's URL and reload the calibration; return False if the URL is invalid."""
         if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
             return False
         if self.url != url:
@@ -132,7 +132,7 @@ class CameraInfoManager:
 
 
 def genCameraName(from_string: str) -> str:
-    """Convert a string to a valid camera name: replace all characters except letters and digits by ``_``."""
+    """Convert a string to a valid camera name: replace all characters except letters and digits with ``_``."""
     return re.sub(r"\W", "_", from_string, flags=re.ASCII)
 
 

@@ -59,7 +59,7 @@ class ZoomCameraInfoManager(CameraInfoManager):
         self._update_camera_info()
 
     def _update_camera_info(self) -> None:
-        """Compute the calibration again; subclasses override it."""
+        """Recompute the calibration; subclasses override this method."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -126,7 +126,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         matrix[0] = width / (2 * tan(horizontal / 2))
         matrix[4] = height / (2 * tan(vertical / 2))
         matrix[8] = 1.0
-        # A calibrated center is scaled with the image size; without a calibration, the image center is used.
+        # Scale a calibrated center with the image size; without a calibration, use the image center.
         is_calibrated = matrix[2] != 0.0 and loaded.width and loaded.height
         matrix[2] = matrix[2] * width / loaded.width if is_calibrated else width / 2
         matrix[5] = matrix[5] * height / loaded.height if is_calibrated else height / 2
@@ -191,5 +191,5 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
 
 
 def _between(low: Sequence[float], high: Sequence[float], share: float) -> list[float]:
-    """Interpolate between two arrays: ``low`` at ``share`` 0, ``high`` at ``share`` 1."""
+    """Interpolate between two arrays: return ``low`` for ``share`` 0, ``high`` for ``share`` 1."""
     return [(1 - share) * left + share * right for left, right in zip(low, high, strict=False)]

@@ -17,7 +17,7 @@ def get_workspaces() -> list[str]:
 
 
 def get_source_paths(workspace: str) -> list[str]:
-    """Return a devel folder's source folders; [] for an install folder.
+    """Return a devel folder's source folders; return [] for an install folder.
 
     Raise ValueError if ``workspace`` is not a catkin workspace.
     """

@@ -1,4 +1,4 @@
-"""`catkin_test_results`: sum up the JUnit XML files below a folder.
+"""`catkin_test_results`: summarize the JUnit XML files below a folder.
 
 Source: http://wiki.ros.org/catkin/commands (catkin_test_results).
 """

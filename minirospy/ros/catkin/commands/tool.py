@@ -37,7 +37,7 @@ _ACCEPTED = """
     -c --continue-on-failure -s --summarize --no-summarize -v --verbose -i --interleave-output --force-cmake --no-status
     --no-color --no-notify --pre-clean --limit-status-rate --unbuilt --env-cache --no-env-cache --jobserver --no-jobserver
 """.split()  # noqa: SIM905
-"""Options of `catkin build` that have no effect if nothing is compiled; accepted for compatibility."""
+"""Options of `catkin build` that only affect compilation; accepted for compatibility."""
 
 
 def catkin(argv: Sequence[str] | None = None) -> int:
@@ -46,7 +46,7 @@ def catkin(argv: Sequence[str] | None = None) -> int:
 
 
 class _Settings(NamedTuple):
-    """The settings that `catkin config` saves for `catkin build`; None means not set."""
+    """The settings that `catkin config` saves for `catkin build`. A setting of None is not set."""
 
     install: bool | None = None
     blacklist: Sequence[str] | None = None

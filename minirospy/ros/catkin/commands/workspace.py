@@ -81,7 +81,7 @@ def build_packages(
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    # Like catkin, write the setup files first, so that the workspace can be sourced even if a package fails to build.
+    # Like catkin, write the setup files first, so that the workspace can be sourced even if building a package fails.
     write_set_up(workspace.devel, (workspace.source,))
     build(workspace, plans, Packages(), only or None, show)
     if not plans:
@@ -90,7 +90,7 @@ def build_packages(
 
 
 def _places(workspace: Workspace) -> dict[str, str]:
-    """Return the CMake variables that contain the workspace's folders."""
+    """Return the CMake variables that name the workspace's folders."""
     devel, build = workspace.devel.as_posix(), workspace.build.as_posix()
     return {"CATKIN_DEVEL_PREFIX": devel, "CMAKE_BINARY_DIR": build}
 

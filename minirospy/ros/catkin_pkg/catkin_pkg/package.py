@@ -69,7 +69,7 @@ _DEPENDENCIES = {
     "replace": "replaces",
 }
 """Maps each tag to the package's attribute that lists its dependencies."""
-# attributes that the tag <depend> adds a dependency to
+# attributes to which the tag <depend> adds a dependency
 _GENERIC = ("build_depends", "build_export_depends", "exec_depends")
 _SINGLE = ("name", "version", "description")
 _COMMON = {*_SINGLE, "maintainer", "license", "author", "url", "export", "conflict", "replace"}
@@ -302,7 +302,7 @@ class Package:
         return [each.content or "" for each in exports]
 
     def is_metapackage(self) -> bool:
-        """Return whether the package is a metapackage, a mere list of other packages."""
+        """Return whether the package is a metapackage, which only lists other packages."""
         return "metapackage" in (each.tagname for each in self.exports)
 
     def has_invalid_metapackage_dependencies(self) -> bool:

@@ -29,7 +29,7 @@ def find_package_paths(
     exclude_subspaces: bool = False,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> list[str]:
-    """Return the packages' folders, relative to ``basepath``. Ignore packages inside other packages.
+    """Return the packages' folders, relative to ``basepath``. Ignore nested packages.
 
     ``exclude_subspaces``: skip folders that a build has created, which contain a file ``.catkin``.
     """

@@ -14,6 +14,7 @@ from minirospy.core.control import pid
 from minirospy.core.control.parameters import Parameters
 from minirospy.core.control.pid import PidGains, PidTerms
 from minirospy.ros.control_toolbox.control_toolbox.cfg import ParametersConfig
+from minirospy.ros.dynamic_reconfigure.definition import close_server
 from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import Config
 from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
 from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
@@ -51,9 +52,7 @@ class Pid(pid.Pid):
     def close(self) -> None:
         """Close the topics and the service."""
         if self._server is not None:
-            self._server.set_service.shutdown()
-            self._server.descr_topic.unregister()
-            self._server.update_topic.unregister()
+            close_server(self._server)
         if self._state is not None:
             self._state.close()
 

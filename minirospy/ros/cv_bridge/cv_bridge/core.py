@@ -156,7 +156,7 @@ def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
             f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}"
         )
 
-    # OpenCV names a Bayer pattern after the pixels in the second row, from the second column on.
+    # OpenCV names a Bayer pattern after the pixels in the second row, starting at the second column.
     patterns = {
         "bayer_rggb": "BayerBG",
         "bayer_bggr": "BayerRG",

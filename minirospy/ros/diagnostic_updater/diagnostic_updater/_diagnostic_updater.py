@@ -64,7 +64,7 @@ class FunctionDiagnosticTask(DiagnosticTask):
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
-    """Combines several tasks into one status, with all their values, the highest level and the merged messages."""
+    """Combines several tasks into one status that has all their values, the highest level and the merged messages."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -80,7 +80,7 @@ class CompositeDiagnosticTask(DiagnosticTask):
         initial.summary(stat)
         for task in self.tasks:
             stat.summary(initial)
-            # Accept a task that returns None: it has filled the status in place.
+            # If a task returns None, it has filled the status in place.
             stat = task.run(stat) or stat
             merged.mergeSummary(stat)
         stat.summary(merged)
@@ -133,7 +133,7 @@ class DiagnosticTaskVector:
 
 
 class Updater(DiagnosticTaskVector):
-    """Runs its tasks in ``update``, every ~diagnostic_period seconds (default 1); publishes the statuses on /diagnostics."""
+    """Runs its tasks in ``update`` every ~diagnostic_period seconds (default 1); publishes statuses on /diagnostics."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -71,7 +71,7 @@ class FrequencyStatus(DiagnosticTask):
             self.hist_indx = (oldest + 1) % self.params.window_size
             total = self.count
 
-        # The window is 0 seconds long if a simulated clock has not advanced.
+        # The window has no duration if a simulated clock has not advanced.
         frequency = events / window if window else math.inf if events else 0.0
         lowest = self.params.freq_bound["min"] * (1 - self.params.tolerance)
         highest = self.params.freq_bound.get("max", math.inf) * (1 + self.params.tolerance)
@@ -102,7 +102,7 @@ class FrequencyStatus(DiagnosticTask):
 
 
 class TimeStampStatusParam:
-    """The accepted age of a time stamp on arrival, in seconds; a negative age is in the future."""
+    """The accepted age of a time stamp on arrival, in seconds; a stamp in the future has a negative age."""
 
     def __init__(self, min_acceptable: float = -1, max_acceptable: float = 5) -> None:
         self.max_acceptable = max_acceptable

@@ -58,7 +58,7 @@ class Client:
         ``config_callback(config)`` is called on each change. Raise ROSException if the server does not appear in time.
         """
         if not isinstance(name, str):
-            # Without this check, the client would wait for a server that cannot exist.
+            # Without this check, the client could wait for a server that cannot exist.
             raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
@@ -166,7 +166,7 @@ class Client:
     description_callback = property(get_description_callback, set_description_callback)
 
     def _wait(self, is_there: Callable[[], bool], timeout: float | None) -> bool:
-        """Wait until ``is_there()`` is truthy; return its last result.
+        """Wait until ``is_there()`` is true; return its last result.
 
         If ``timeout`` is None or 0, wait until the node shuts down.
         """

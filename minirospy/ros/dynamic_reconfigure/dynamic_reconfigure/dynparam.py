@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(verb: str, usage: str = "", *more: str, missing: Mapping[str, str] | None = None) -> Parser:
-    """Return the parser for a verb that takes a node's name and the arguments ``more``."""
+    """Return the parser for a verb whose arguments are a node's name and ``more``."""
     parser = Parser(
         f"dynparam {verb}",
         ros_usage=(usage or f"%prog {verb} [options] node{''.join(f' {each}' for each in more)}").replace(
@@ -193,7 +193,7 @@ def _plain(value: object) -> object:
 
 
 def _connect() -> None:
-    """Initialize a node. Raise MasterUnreachableError if there is no master, whereas ROS silently waits for one."""
+    """Initialize a node. Raise MasterUnreachableError if there is no master; ROS would silently wait for one."""
     _check_master()
     rospy.init_node("dynparam", anonymous=True)
 

@@ -64,7 +64,7 @@ class Config(dict[str, Any]):
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
-            # copy and pickle look for special methods and expect AttributeError.
+            # copy and pickle look up special methods and expect AttributeError.
             raise AttributeError(name)
         return self[name]
 
@@ -128,7 +128,7 @@ def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
 
 
 def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
-    """Yield all subgroups of a group, each after its own subgroups."""
+    """Yield all subgroups of a group; each group follows its own subgroups."""
     for each in group["groups"].values():
         yield from _inner_groups(each)
         yield each
@@ -215,7 +215,7 @@ def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Conf
 
 
 def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Decode a configuration. If ``description`` is given, the groups also contain their parameters' values."""
+    """Decode a configuration. If ``description`` is given, also put the parameters' values into their groups."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -262,7 +262,7 @@ def extract_params(group: GroupTree) -> list[Entry]:
 
 
 def get_parents(group: GroupTree, descriptions: GroupTree) -> list[GroupTree]:
-    """Return the groups that contain a group, outermost first; ``descriptions["group"]`` is the list of all groups."""
+    """Return the groups that contain a group, outermost first; ``descriptions["group"]`` lists all groups."""
     for each in descriptions["group"]:
         if each["id"] == group["parent"] and each is not group:
             return [*get_parents(each, descriptions), each]

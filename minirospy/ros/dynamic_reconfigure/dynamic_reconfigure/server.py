@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv", "Server"]
 
-# Python types allowed for each parameter type. An int is allowed for a double, because rosparam stores 1.0 as an int
-# if it is written without a decimal point.
+# Python types allowed for each parameter type.
+# An int is allowed for a double, because rosparam stores a number without a decimal point as an int.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "double": (float, int),
@@ -106,7 +106,7 @@ class Server:
         return encode_config(self.update_configuration(changes))
 
     def _copy_from_parameter_server(self, config: Config) -> None:
-        """Use the values on the parameter server; log an error for each value with a wrong type."""
+        """Use the values on the parameter server; log an error for each value that has the wrong type."""
         for param in self._params:
             name = param["name"]
             value = rospy.get_param(self.ns + name, None)

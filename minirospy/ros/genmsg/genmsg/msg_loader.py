@@ -126,7 +126,7 @@ class MsgContext:
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
-        """Set the message types that a message's fields use."""
+        """Set the types of the messages that a message's fields use."""
         self._depends[full_msg_type] = dependencies
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
@@ -134,7 +134,7 @@ class MsgContext:
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return all messages that a message uses, directly or indirectly. Each precedes those that it uses itself.
+        """Return all messages that a message uses, directly or indirectly. Each message precedes those that it uses.
 
         Raise KeyError if :func:`load_depends` has not been called.
         """
@@ -287,7 +287,7 @@ def parsed_service(text: str, full_name: str) -> ServiceSpec:
     package, name = package_resource_name(full_name)
     request, *responses = _BETWEEN.split(text)
     if len(responses) != 1:
-        # genmsg also accepts a definition without a separator line, or with several.
+        # genmsg also accepts a definition without a separator line or with several.
         text = "\n".join([request, "---", *responses])
     try:
         return parse_service(text, package, name)

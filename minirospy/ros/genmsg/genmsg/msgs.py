@@ -194,7 +194,7 @@ def resolve_type(msg_type: str, package_context: str) -> str:
     bare = bare_msg_type(msg_type)
     if "/" in bare or is_builtin(bare):
         return msg_type
-    # Keep the brackets after Header, unlike ROS's genmsg, which drops them.
+    # Keep the brackets after Header; ROS's genmsg drops them.
     return f"std_msgs/{msg_type}" if bare == "Header" else f"{package_context}/{msg_type}"
 
 

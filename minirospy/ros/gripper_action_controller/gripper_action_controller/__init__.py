@@ -71,7 +71,7 @@ class GripperActionController(Controller):
             self._accept,
             self._hold,
             _result,
-            round(_SECOND / monitor_rate),
+            max(1, round(_SECOND / monitor_rate)),
         )
         self.opened.callback(self._action.close)
 

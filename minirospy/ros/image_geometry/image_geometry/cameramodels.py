@@ -73,7 +73,7 @@ class PinholeCameraModel:
         if not any((msg.roi.x_offset, msg.roi.y_offset, msg.roi.width, msg.roi.height)):
             self.raw_roi.width, self.raw_roi.height = self.width, self.height
 
-        # First shift the principal point by the region's offset, then scale by the binning.
+        # Shift the principal point by the region's offset first, then scale it by the binning.
         for matrix in (self.K, self.P):
             matrix[0, 2] -= self.raw_roi.x_offset
             matrix[1, 2] -= self.raw_roi.y_offset
@@ -239,7 +239,7 @@ class StereoCameraModel:
         return self.left.tfFrame()
 
     def project3dToPixel(self, point: Point) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return a point's rectified pixels in the left and in the right image."""
+        """Return the rectified pixels of a point in the left and the right image."""
         return self.left.project3dToPixel(point), self.right.project3dToPixel(point)
 
     def projectPixelTo3d(self, left_uv: Point, disparity: float) -> tuple[float, float, float]:

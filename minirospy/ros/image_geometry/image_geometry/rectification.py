@@ -23,7 +23,7 @@ else:
 __all__ = ["Distortion", "distorted", "rectified_image", "undistorted"]
 
 _ITERATIONS = 5  # number of iterations, as in OpenCV's undistortPoints
-_STEPS = 32  # number of subpixel positions per pixel, as in OpenCV's interpolation
+_STEPS = 32  # subpixel positions per pixel, as in OpenCV's interpolation
 _ONE = 1 << 15  # sum of the integer weights for a pixel's neighbors
 _COUNTS = (0, 4, 5, 8, 12, 14)
 
@@ -133,7 +133,7 @@ def _tilt(tau_x: float, tau_y: float) -> Values:
 
 
 def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
-    """Return an image with pixels read from ``raw`` at the positions in the maps. Interpolation is bicubic.
+    """Return an image whose pixels are read from ``raw`` at the positions in the maps, with bicubic interpolation.
 
     Positions outside ``raw`` become black.
     """

@@ -28,7 +28,7 @@ Callback = Callable[[InteractiveMarkerFeedback], object]
 
 _QUEUE_SIZE = 100
 _KEEP_ALIVE = 0.5  # seconds between keep-alive updates to viewers
-_TURN = 1.0  # seconds for which one viewer's feedback blocks feedback from other viewers
+_TURN = 1.0  # seconds for which feedback from one viewer blocks feedback from the others
 _UNCHANGED: Callback | int = -1
 
 
@@ -170,7 +170,7 @@ class InteractiveMarkerServer:
                 self._apply(name, update, message)
             self.pending_updates = {}
             self.seq_num += 1
-            # Publish with the lock held, so that no other message with the new sequence number is sent first.
+            # Publish with the lock held, so that no other message is sent before the one with the new sequence number.
             self.publish(message)
         self.publishInit()
 
@@ -210,7 +210,7 @@ class InteractiveMarkerServer:
                 return
             now = rospy.Time.now()
             age = (now - context.last_feedback).to_sec()
-            # A negative age means that the clock has jumped back.
+            # If the age is negative, the clock has jumped back.
             if context.last_client_id != feedback.client_id and 0 <= age < _TURN:
                 rospy.logdebug(
                     f"Rejecting feedback for {feedback.marker_name}: conflicting feedback from separate clients."

@@ -51,7 +51,7 @@ class MenuHandler:
         command: str = "",
         callback: Callback | None = None,
     ) -> int | None:
-        """Add an entry, below ``parent`` if given; return its handle, or None if the parent does not exist."""
+        """Add an entry, below ``parent`` if that is given; return the entry's handle, or None if the parent does not exist."""
         handle = self.doInsert(title, command_type, command, callback)
         if parent is None:
             self.top_level_handles_.append(handle)
@@ -109,8 +109,8 @@ class MenuHandler:
         return True
 
     def reApply(self, server: InteractiveMarkerServer) -> bool:
-        """Apply the menu again to all markers that use it; return whether all these markers still exist."""
-        # Build a list, not a generator, so that all markers are processed even if one is missing.
+        """Apply the menu again to all markers that use it; return whether all of these still exist."""
+        # Build a list instead of using a generator, so that all markers are processed even if one is missing.
         found = [self.apply(server, marker) for marker in list(self.managed_markers_)]
         return all(found)
 

@@ -79,7 +79,7 @@ class JointTrajectoryController(Controller):
         stop_duration = parameters.finite("stop_trajectory_duration", 0.0)
         if state_rate <= 0.0 or monitor_rate <= 0.0 or stop_duration < 0.0:
             raise ControllerError(
-                f"state_publish_rate and action_monitor_rate must be above 0, stop_trajectory_duration at least 0 "
+                "state_publish_rate and action_monitor_rate must be above 0, stop_trajectory_duration at least 0 "
                 f"(namespace: {context.namespace})."
             )
 
@@ -91,7 +91,7 @@ class JointTrajectoryController(Controller):
         )
         self.read_gains(context)
 
-        self._state_period = round(_SECOND / state_rate)  # ns
+        self._state_period = max(1, round(_SECOND / state_rate))  # ns
         self._state_due = 0  # ns of the uptime
         self._state = RealtimePublisher(f"{context.namespace}/state", JointTrajectoryControllerState)
         self.opened.callback(self._state.close)
@@ -101,7 +101,7 @@ class JointTrajectoryController(Controller):
             self._accept,
             self.follower.request_hold,
             _result,
-            round(_SECOND / monitor_rate),
+            max(1, round(_SECOND / monitor_rate)),
         )
         self.opened.callback(self._action.close)
         command = rospy.Subscriber(

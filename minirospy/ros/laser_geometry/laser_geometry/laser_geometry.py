@@ -30,7 +30,7 @@ _INT32, _FLOAT32 = 5, 7  # the numbers of these types in PointField
 
 
 class LaserProjection:
-    """Converts scans to clouds; caches the beams' directions between scans."""
+    """Converts scans to clouds. Keeps the beams' directions for the next scan."""
 
     LASER_SCAN_INVALID = -1.0
     LASER_SCAN_MIN_RANGE = -2.0

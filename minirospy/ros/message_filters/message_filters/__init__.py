@@ -72,7 +72,7 @@ class Subscriber(SimpleFilter):
         return self.topic
 
     def __getattr__(self, key: str) -> object:
-        # A copied object has no attributes at first, so looking up ``sub`` would recurse infinitely.
+        # A copied object has no attributes at first, so looking up ``sub`` would recurse endlessly.
         if key == "sub":
             raise AttributeError(key)
         return getattr(self.sub, key)
@@ -197,12 +197,12 @@ class TimeSynchronizer(SimpleFilter):
                 return
 
             for each in sorted(set(self.queues[0]).intersection(*self.queues[1:]) if self.queues else ()):
-                # A callback may have completed this set already, by adding messages to the queues.
+                # A callback may already have completed this set by adding messages to the queues.
                 if all(each in queue for queue in self.queues):
                     self.signalMessage(*[queue.pop(each) for queue in self.queues])
 
     def _reset_if_time_jumped(self, my_queue: Queue, my_queue_index: int | None) -> bool:
-        """Clear an input's queue if simulated time has jumped back; return whether another input has a later time."""
+        """Clear an input's queue if simulated time has jumped back. Return True if another input has a later time."""
         if not self.enable_reset or is_wallclock():
             return False
         now = rospy.Time.now()
@@ -266,12 +266,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             if waiting > self.queue_size:
                 _keep_newest(my_queue, self.queue_size)
                 if my_queue_index is not None and stamp not in my_queue:
-                    # The queue is full, and the new message has been removed again because it is the oldest.
+                    # The queue is full, and the new message was removed again because it is the oldest.
                     return
             if is_stale:
                 return
 
-            # Skip the search if an input has no messages, the most frequent case.
+            # Skip the search if an input has no messages, which is the most frequent case.
             if self.queues is self._stamp_queues and not all(self._orders):
                 return
             found = self._match(my_queue_index, nanoseconds)
@@ -285,7 +285,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
         """Remove the set that a time stamp completes from the queues; return its messages, or [] if there is no set."""
-        # Use ``_stamp_queues``, because a subclass may have replaced ``queues`` by its own list of dicts.
+        # Use ``_stamp_queues``, because a subclass may have replaced ``queues`` with its own list of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:
             queues = [queue if isinstance(queue, StampQueue) else StampQueue(queue) for queue in self.queues]
@@ -301,7 +301,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
 
 def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
-    """Return a message's time stamp. If the message has no header, return the current time, or log a warning and return None."""
+    """Return a message's time stamp. If it has no header, return the current time, or log a warning and return None."""
     try:
         stamp: Time = message.header.stamp  # type: ignore[attr-defined]
     except AttributeError:

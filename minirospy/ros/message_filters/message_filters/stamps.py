@@ -98,7 +98,7 @@ class StampQueue(MutableMapping[Time, object]):
         return self.order[bisect_left(self.order, first) : bisect_right(self.order, last)]
 
     def by_distance(self, stamps: Sequence[int], stamp: int) -> list[int]:
-        """Sort some of the queue's stamps by distance to ``stamp``; at equal distance, by order of arrival."""
+        """Sort some of the queue's stamps by distance to ``stamp``; stamps at equal distance stay in order of arrival."""
         ranks = {each: rank for rank, each in enumerate(self._entries)}
         return sorted(stamps, key=lambda each: (abs(each - stamp), ranks[each]))
 
@@ -106,7 +106,7 @@ class StampQueue(MutableMapping[Time, object]):
 def closest_stamps(
     queues: Sequence[StampQueue], stamp: int, slop: int, index: int | None = None
 ) -> list[int] | None:
-    """Return one stamp from each queue so that all differ by less than ``slop``, or None if there is no such set.
+    """Return one stamp from each queue such that all differ by less than ``slop``, or None if there is no such set.
 
     ``stamp`` is the new stamp, from queue number ``index``; the set contains it.
 
@@ -135,14 +135,14 @@ def closest_stamps(
         [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
         for at, queue in enumerate(queues)
     ]
-    # The window must contain the new stamp, so it starts at or before that stamp.
+    # The window must contain the new stamp, so it starts at that stamp or before it.
     last = stamp + slop if index is None else stamp
     starts = {each for stamps in candidates for each in stamps if each <= last}
     windows = [start for start in sorted(starts) if _has_each(candidates, start, start + slop - 1)]
 
     chosen = []
     for queue, stamps in zip(queues, candidates, strict=True):
-        # Choose the first stamp that is in a remaining window, because ROS's loops reach that stamp first.
+        # Choose the first stamp that lies in a remaining window, because ROS's loops reach that stamp first.
         for each in queue.by_distance(stamps, stamp):
             if left := _around(windows, each, slop):
                 windows = left

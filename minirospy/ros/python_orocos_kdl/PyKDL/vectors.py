@@ -130,7 +130,7 @@ class Vector:
     def __truediv__(self, other: float) -> Vector:
         if not isinstance(other, int | float):
             return NotImplemented
-        # KDL, in C++, returns infinities for a division by zero.
+        # Like KDL in C++, return infinities for a division by zero.
         return self * (1.0 / other if other else math.inf)
 
     def __eq__(self, other: object) -> bool:
@@ -239,7 +239,7 @@ class Twist(Screw):
         return Twist()
 
     def RefPoint(self, base: Vector) -> Twist:
-        """Return the same motion, expressed as the velocity of the point ``base``."""
+        """Return the same motion, with ``vel`` as the velocity of the point ``base``."""
         return Twist(self.vel + self.rot * base, self.rot)
 
 

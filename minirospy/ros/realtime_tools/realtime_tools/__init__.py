@@ -19,7 +19,7 @@ from minirospy.core.idl.protocols import Action, Message
 from minirospy.ros.actionlib.actionlib.handle import ServerGoalHandle
 from minirospy.ros.actionlib.actionlib.server import ActionServer
 
-__all__ = ["RealtimeActionServer", "RealtimePublisher", "Rejection"]
+__all__ = ["GoalEvent", "MonitoredGoal", "Outcome", "RealtimeActionServer", "RealtimePublisher", "Rejection"]
 
 _T = TypeVar("_T", bound=Message)
 

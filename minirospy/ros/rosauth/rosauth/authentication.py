@@ -19,7 +19,7 @@ __all__ = ["is_authentic", "mac_of", "main"]
 
 SECRET_LENGTH = 16
 _SECRET_FILE = "secret_file_location"
-# ROS's node returns -1, -2 and -3, which the shell reports as these exit statuses.
+# ROS's node returns -1, -2 and -3, which a shell shows as these exit statuses.
 _NO_PARAMETER, _NO_FILE, _NO_SECRET = 255, 254, 253
 
 

@@ -109,8 +109,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
         for message in reader.messages(paths) if options.limit != 0 else ():
             connection = message.connection
             field = paths[connection.id]
-            # Topics without a field share one Echo, so that the output of -p starts with a single line of column
-            # names.
+            # Topics without a field share one Echo, so that -p prints a single line of column names at the start.
             if field not in echoes:
                 echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
             echo = echoes[field]
@@ -137,8 +136,8 @@ def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")
-    # The longest matching topic takes precedence: a topic with the full name wins over a field of a topic with a
-    # shorter name.
+    # The longest matching topic takes precedence.
+    # A topic with the full name wins over a field of a topic with a shorter name.
     holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
     topic = max(holders, key=len, default="")
     return {

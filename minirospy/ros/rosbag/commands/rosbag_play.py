@@ -177,7 +177,7 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
             print("\n".join(bridge.lines), flush=True)
 
         try:
-            # Use wall time, because the player may itself publish /clock.
+            # Use wall time, because the player itself may publish /clock.
             client.init_node("play", anonymous=True, disable_rostime=True)
             for path in paths:
                 client.loginfo("Opening %s", path)

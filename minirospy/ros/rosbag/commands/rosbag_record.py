@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Replace ``--split=N`` and ``--split N``, used in old launch files, by ``--split --size N``. Yield the new words."""
+    """Replace the ``--split=N`` and ``--split N`` of old launch files with ``--split --size N``. Yield the new words."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()
@@ -136,7 +136,7 @@ def _parser() -> Parser:
 
 
 def _record_verb(given: RecordArguments) -> int:
-    # `rosrun rosbag record` accepts both options, and the name takes precedence.
+    # `rosrun rosbag record` accepts both options together; the name takes precedence.
     if given.output_prefix and given.output_name:
         text = "Can't set both prefix and name."
         raise Misuse(text, text)

@@ -133,8 +133,7 @@ def _rewrite(
             target = os.path.join(output_dir, os.path.basename(path))
             if os.path.realpath(target) != os.path.realpath(path):
                 if not _write(path, path, target, write) and unindexed:
-                    # As in ROS, only reindex fails if the target cannot be created; compress and decompress continue
-                    # with status 0.
+                    # As in ROS, only reindex fails if the target cannot be created; compress and decompress continue.
                     status = 1
                 continue
 

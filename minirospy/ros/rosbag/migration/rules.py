@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 MessageClass = Any
-"""A message class, or None. It is untyped because third-party .bmr files use such classes without type annotations."""
+"""A message class, or None. Untyped, because third-party .bmr files use such classes without annotations."""
 
 Key = tuple[str, str]
 
@@ -223,7 +223,7 @@ def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | 
 
 
 def copy_message(msg_from: Message, msg_to: Message) -> None:
-    """Fill a message from another message that has the same fields."""
+    """Fill a message from another one with the same fields."""
     buffer = io.BytesIO()
     msg_from.serialize(buffer)
     msg_to.deserialize(buffer.getvalue())
@@ -261,7 +261,7 @@ Step = Callable[[MessageUpdateRule, "Message", "Message"], None]
 def make_update_rule(
     migrator: Migrator, old_class: MessageClass, new_class: MessageClass
 ) -> type[MessageUpdateRule]:
-    """Return a rule that copies fields with equal names; the rule is valid if no field is lost or needs an invented value."""
+    """Return a rule that copies fields with equal names. It is valid if no field is lost and no value has to be invented."""
     lines: list[str] = []
     steps: list[Step] = []
     migrated: list[tuple[str, str]] = []
@@ -305,13 +305,13 @@ def make_update_rule(
 
 
 def make_old_half_rule(old_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule that converts from an old type, because the new type is unknown."""
+    """Return an invalid rule that converts from an old type to an unknown new type."""
     name = f"update__{old_class._type.replace('/', '_')}__{old_class._md5sum}"
     return _rule(name, old_class, None, ["pass"], [], valid=False)
 
 
 def make_new_half_rule(new_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule that converts to a new type, because the old type is unknown."""
+    """Return an invalid rule that converts from an unknown old type to a new type."""
     name = f"update_to_{new_class._type.replace('/', '_')}_{new_class._md5sum}"
     return _rule(name, None, new_class, ["pass"], [], valid=False)
 
@@ -359,7 +359,7 @@ def _quoted(text: str) -> str:
 
 
 def _mismatch(old_type: str | None, new_type: str) -> str:
-    """Compare two field types; return the reason why a field cannot be copied, or "" if it can be copied."""
+    """Compare two field types; return the reason why the field cannot be copied, or "" if it can."""
     if old_type is None:
         return "No matching field name in old message"
     old, new = _parsed(old_type), _parsed(new_type)

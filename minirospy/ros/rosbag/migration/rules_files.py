@@ -254,11 +254,11 @@ class MessageMigrator:
         return make_update_rule(self, old_class, new_class)
 
     def make_old_half_rule(self, old_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return an invalid rule that converts from an old type, because the new type is unknown."""
+        """Return an invalid rule that converts from an old type to an unknown new type."""
         return make_old_half_rule(old_class)
 
     def make_new_half_rule(self, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return an invalid rule that converts to a new type, because the old type is unknown."""
+        """Return an invalid rule that converts from an unknown old type to a new type."""
         return make_new_half_rule(new_class)
 
     # -- loading
@@ -373,7 +373,7 @@ class MessageMigrator:
                 if get_message_key(node.old_class) == get_message_key(end.new_class):
                     end.next = node
                     return
-            # Join the chain at its latest possible step, so that no message is converted twice.
+            # Join the chain at the latest possible step, so that no message is converted twice.
             for node in reversed(following if end.next is None else []):
                 rule = self._made(end.new_class, node.old_class)
                 if rule.valid:

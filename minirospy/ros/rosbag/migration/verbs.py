@@ -132,7 +132,7 @@ def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpd
 
 
 def _ask_new_class(old_type: str) -> type[Message] | None:
-    """Prompt for the new type's name and return its class; None at end of input."""
+    """Prompt for the new type's name and return its class; return None at end of input."""
     from minirospy.core.idl.load import get_message_class
 
     print(f"The message type {old_type} appears to have moved.  Please enter the type to migrate it to.")

@@ -20,7 +20,7 @@ __all__ = ["BagFile", "FileWriter"]
 _UNLIMITED = 2**31
 _KNOWN_HEADERS = 10_000
 _DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
-"""Fields that a bag requires, but that third-party publishers may omit from their connection headers."""
+"""Fields that a bag requires but that third-party publishers may omit from their connection headers."""
 
 
 class FileWriter(Protocol):
@@ -92,7 +92,7 @@ class BagFile:
 
     @property
     def gathered(self) -> int:
-        """Return the number of buffered bytes, not counting those in the disk thread's queue."""
+        """Return the number of buffered bytes, excluding those in the disk thread's queue."""
         return self._writer.gathered
 
     def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:
@@ -149,7 +149,7 @@ class BagFile:
             self._salvage(error)
 
     def _give_up(self, error: Exception) -> None:
-        """Complete the file after its queued writes, because compressing a chunk has failed."""
+        """Complete the file after its queued writes. Called when compressing a chunk has failed."""
         self._is_closed = True
         self._disk.submit(lambda: self._salvage(error))
 
@@ -184,5 +184,5 @@ def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | 
         chunk_threshold=options.chunk_size,
         executor=executor,
         # the recorder itself limits the queued bytes
-        most_waiting=_UNLIMITED,
+        max_waiting=_UNLIMITED,
     )

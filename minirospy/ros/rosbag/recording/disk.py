@@ -27,7 +27,7 @@ class DiskThread:
     def __init__(self, on_error: Callable[[Exception], object]) -> None:
         self._on_error = on_error
         self._queue: queue.SimpleQueue[tuple[Callable[[], object], int] | None] = queue.SimpleQueue()
-        # Each counter is written by one thread only, so no lock is needed.
+        # Only one thread writes each counter, so no lock is needed.
         self._queued = self._done = 0
         self._thread = threading.Thread(target=self._run, name="rosbag-disk")
         self._thread.start()
@@ -77,8 +77,7 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # Use open_file, which does not follow symbolic links: the name contains the time, so an attacker could guess
-        # it.
+        # Use open_file, which does not follow symbolic links: the name contains the time, which an attacker could guess.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
@@ -98,7 +97,7 @@ class QueuedFile:
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Seek relative to the start or the end of the file."""
         if whence == os.SEEK_END:
-            # Do not seek: the writer seeks to the header and then back to the end, without writing after that.
+            # Do nothing: the writer seeks to the header and back to the end without writing in between.
             return self._position
         self._position = offset
         self._do(lambda: self._file.seek(offset))

@@ -68,7 +68,10 @@ class _Terminal:
         self._before: list[object] | None = None
 
     def set_up(self) -> bool:
-        """Switch the terminal to single keys. Return False if the process is in the background, because reading would stop it."""
+        """Switch the terminal to single-key input.
+
+        Return False for a background process, which the system would suspend if it read from the terminal.
+        """
         if os.tcgetpgrp(self._number) != os.getpgrp():
             self._before = None
             return False

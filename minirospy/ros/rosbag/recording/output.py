@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
-# GIL switch interval in seconds: how long the reading thread may delay a due message
+# GIL switch interval in seconds: the maximum time for which the reading thread can delay a due message
 _SWITCH_SECONDS = 0.00005
 
 _STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the time stamp
@@ -96,7 +96,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Sends late subscribers each latched publisher's last message, because a topic itself stores only one message."""
+    """Sends each latched publisher's last message to late subscribers, because a topic itself stores only one message."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []
@@ -156,11 +156,10 @@ class NodeOutput:
 
     @contextlib.contextmanager
     def running(self, on_key: Callable[[str], object]) -> Iterator[None]:
-        """Shorten the GIL switch interval, and read keys, while the block runs."""
+        """Read keys while the block runs, and shorten the GIL switch interval."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
-        # Exclude existing objects from garbage collection, because traversing all imported modules takes
-        # milliseconds.
+        # Exclude existing objects from garbage collection: traversing all imported modules takes milliseconds.
         gc.freeze()
         try:
             with read_keys(on_key):
@@ -190,7 +189,7 @@ class NodeOutput:
         """See :meth:`Output.print`."""
         with contextlib.suppress(OSError, ValueError):
             if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
-                # The status line is rewritten in place, so its control characters must not be escaped.
+                # The status line is rewritten in place, so do not escape its control characters.
                 sys.stdout.write_own(text)
                 text = ""
             print(text, end=end, flush=True)

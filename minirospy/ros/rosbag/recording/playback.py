@@ -26,7 +26,7 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, Statu
 
 __all__ = ["Phase", "Playback", "PlayerState"]
 
-# delay in ns before the first message, so that threads that are still starting do not make it late
+# delay in ns before the first message, which would otherwise be late because threads are still starting
 _LEAD = 10**9 // 500
 
 
@@ -54,7 +54,7 @@ class Playback:
     def __init__(self, options: PlayOptions) -> None:
         self.phase = Phase.OPENING
         self.is_fresh = True  # True if no message has been published since the start or the last seek
-        # set, without the lock, if a shutdown was requested; possible in any phase
+        # set without the lock if a shutdown was requested; possible in any phase
         self.is_ended = False
         self.options = options  # control() changes the settings for looping and /clock
         self.seek_to: int | None = None  # the requested bag time, until the reader takes it
@@ -131,7 +131,7 @@ class Playback:
         if seek is not None:
             self.seek_to = min(max(seek, self._span[0]), self._span[1])
             self.is_fresh = True
-            # state() reports this time until the files have been read from that position.
+            # state() reports this time until the reader has reached that position in the files.
             schedule.seek(self.seek_to, wall)
         if is_paused is not None:
             self.set_paused(is_paused, wall)
@@ -178,9 +178,9 @@ class Playback:
         return start
 
     def arrive(self, start: int, wall: int) -> None:
-        """Continue at ``start``, where the files are now read from, unless another seek has been requested since."""
+        """Continue at ``start``, which the reader has reached, unless another seek has been requested since."""
         if self.seek_to is None:
-            # Keep the steps requested meanwhile.
+            # Keep the steps that were requested in the meantime.
             self._running.seek(start, wall, keeps_steps=True)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
@@ -195,7 +195,7 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Set is_fresh together with the new time: a client that sees this time counts its steps from here.
+            # Set is_fresh together with the new time: a client that sees the time counts its steps from there.
             self.is_fresh = False
         return wait
 

@@ -23,7 +23,7 @@ __all__ = ["Player"]
 _SECOND = 10**9
 _TICK = _SECOND // 10  # interval in ns between status lines and between shutdown checks
 
-# at the end, seconds to wait for a subscriber that reads nothing
+# at the end, seconds to wait for a subscriber that is not reading
 _STALLED_SECONDS = 5.0
 
 
@@ -80,7 +80,7 @@ class Player:
             with self._lock:
                 self._playback.accept_control(time.perf_counter_ns())
             self._on_ready(first[1].time, last)
-        # From here on, only the reading thread uses the files.
+        # From here on, only the reading thread may use the files.
         messages = ReadAhead(self._bags.messages(selection))
         with contextlib.closing(messages):
             self._wait_before(latched)
@@ -215,7 +215,7 @@ class Player:
             self.on_change()
 
     def _wait_for_slow_subscribers(self) -> None:
-        """Wait until subscribers have read the queued messages; they would be lost when this process exits."""
+        """Wait until subscribers have read the queued messages, which would be lost when this process exits."""
         left, end = 0, 0.0
         while not self._playback.is_ended and (waiting := self._output.waiting_bytes()):
             now = time.monotonic()

@@ -52,5 +52,5 @@ class PreciseWait:
             elif rest > self._spin_ns:
                 time.sleep((rest - self._spin_ns) / 1e9)
             else:
-                # Busy-poll, but release the GIL for the threads that send messages.
+                # Busy-poll, but release the GIL so that other threads can send messages.
                 time.sleep(0)

@@ -68,7 +68,6 @@ class Recorder:
         self._file: BagFile | None = None
         self._is_complete = False
         self._latched: dict[tuple[str, str], tuple[Mapping[str, str], bytes, bytes]] = {}
-        self._has_space = True
         self._reported: Counter[str] = Counter()
         self._clock: Callable[[], int] = time.time_ns
         self._announcement: client.Publisher[Message] | None = None
@@ -93,7 +92,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # Complete the file in a thread, so that Ctrl-C does not interrupt it, and the process exits only after it.
+        # Complete the file in a thread, so that Ctrl-C does not interrupt it and the process does not exit before it is done.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -103,7 +102,7 @@ class Recorder:
             if self._file and self._check_space():
                 self._record()
         except KeyboardInterrupt:
-            # This is a second Ctrl-C, or the shutdown interrupted a registration.
+            # This is a second Ctrl-C, or a shutdown that interrupted a registration.
             is_interrupted = True
         finally:
             self._stop.set()
@@ -285,7 +284,7 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Give latched messages the time of this file's first message, because they precede it.
+        # Give latched messages the time of the file's first message, because they precede it.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
@@ -337,8 +336,7 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Write compressed chunks now to free memory; otherwise, they are written only when the next message
-                # arrives.
+                # Write compressed chunks now to free memory; otherwise they would stay until the next message arrives.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1

@@ -136,7 +136,7 @@ class Schedule:
                 self._delayed = True
 
     def poll(self, wall: int) -> int | None:
-        """Return None if the message is due now, else the wall time of the next poll.
+        """Return None if the message is due now, otherwise the wall time at which to poll again.
 
         Poll earlier if another method is called before that.
         """
@@ -175,7 +175,7 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now, or the next one offered if there is no current message."""
+        """If paused, make the current message due now, or the next one offered if there is none."""
         if self._paused:
             self._steps += 1
 
@@ -192,7 +192,7 @@ class Schedule:
         if not self._period or wall < self._next_tick:
             return None
         self._advance(wall)
-        # Skip the messages that were due while the process was suspended, instead of publishing them in a burst.
+        # Skip messages that were due while the process was suspended instead of publishing them in a burst.
         self._next_tick = max(self._next_tick + self._period, wall)
         return self._clock
 
@@ -239,7 +239,7 @@ class Schedule:
         self._since = wall
 
     def _tick_now(self, wall: int) -> None:
-        """Set bag time to the message's time and make a /clock message due now."""
+        """Set bag time to the message's time, and make a /clock message due now."""
         self._clock = self._message
         self._next_tick = wall
 

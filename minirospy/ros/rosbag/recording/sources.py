@@ -1,4 +1,4 @@
-"""Reads messages from several bags in time order. A thread reads ahead, so that reading does not delay due messages."""
+"""Reads messages from several bags in time order. A thread reads ahead, so that due messages do not wait for the disk."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Bags:
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
 
     def last_time(self, selection: Selection) -> int:
-        """Return the time of the last message in a non-empty selection. Read only a few chunks."""
+        """Return the time of the last message in a non-empty selection. Reads only a few chunks."""
         return max(_last_time(reader, selection) for reader in self.readers)
 
     def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
@@ -183,7 +183,7 @@ def _last_time(reader: BagReader, selection: Selection) -> int:
     wanted = _wanted(reader, selection)
     end = selection.end
     found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}
-    # A bag without chunks has no chunk start times, so all its messages must be read.
+    # A bag without chunks has no chunk start times, so read all its messages.
     starts: list[int | None] = [*sorted(found, reverse=True)] or [selection.start]
     for start in starts:
         newest = deque(reader.messages(wanted, start, end), maxlen=1) if wanted else ()

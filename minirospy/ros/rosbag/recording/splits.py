@@ -10,7 +10,7 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MAX_EMPTY = 100  # maximum number of empty files written after a long time without messages, as in ROS
+_MAX_EMPTY = 100  # maximum number of empty files to write after a long time without messages, as in ROS
 
 
 class Next(enum.Enum):
@@ -52,7 +52,7 @@ class Splits:
         if not self._options.max_splits:
             return []
         self._kept.append(name)
-        # The list does not contain the file that is currently being written.
+        # The list does not include the file that is currently being written.
         surplus = len(self._kept) - self._options.max_splits
         removed, self._kept = self._kept[: max(0, surplus)], self._kept[max(0, surplus) :]
         return removed

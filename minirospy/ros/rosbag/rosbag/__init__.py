@@ -12,7 +12,6 @@ from minirospy.ros.rosbag.rosbag.bag import (
     ROSBagFormatException,
     ROSBagUnindexedException,
 )
-from minirospy.ros.submodules import on_first_use
 
 __all__ = [
     "Bag",
@@ -22,8 +21,6 @@ __all__ = [
     "ROSBagUnindexedException",
     "rosbagmain",
 ]
-
-__getattr__ = on_first_use("rosbag", "bag", "migration", "rosbag_main")
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> int:

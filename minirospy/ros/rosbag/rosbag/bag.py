@@ -198,7 +198,7 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy reads the index on demand, but a program's subclass may read it now to show the progress.
+            # minirospy reads the index on demand, but a program's subclass may do it here to show the progress.
             if mode == "r" and not self._skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not self._skip_index
@@ -344,7 +344,7 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # Convert the body first, so that an invalid one raises an error before anything is written to the chunk.
+            # Convert the body first, so that an invalid body raises an error before anything is written to the chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
@@ -520,7 +520,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
-        # The real module still has the data in memory after close(), so open the bag again here.
+        # The real module still has the data in memory after close(), so reopen the bag here.
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=True) as bag:
                 return bag._summary(frequencies=frequencies)

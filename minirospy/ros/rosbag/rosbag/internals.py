@@ -23,7 +23,7 @@ Header = dict[str, bytes] | dict[str, str]
 
 
 def make_time() -> Callable[[int], Time]:
-    """Return a function that creates a rospy.Time from nanoseconds faster than the constructor does."""
+    """Return a function that creates a rospy.Time from nanoseconds, faster than the constructor."""
     from minirospy.client.time import Time
 
     new = Time.__new__

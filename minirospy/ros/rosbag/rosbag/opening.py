@@ -36,7 +36,7 @@ class OpenedBag(PrivateBag):
         self._version: int | None = None
         self._mode = mode
         self._source: BagReader | None = None
-        """The file's reader. It is not named ``_reader``, because programs may replace the attribute of that name."""
+        """The file's reader. It is not named ``_reader``, because programs may replace an attribute of that name."""
         self._writer: BagWriter | None = None
         self._file_header_pos = FIRST_RECORD
         self._is_read = False  # set if a read may have moved the file's position since the last write
@@ -52,7 +52,7 @@ class OpenedBag(PrivateBag):
 
     @property
     def _output_file(self) -> BinaryIO | None:
-        """Return the file to write to. In the real module, this is the file if no chunk is open."""
+        """Return the file to write to. In the real module, this attribute is the file if no chunk is open."""
         return self._file
 
     def _current(self) -> BagReader:
@@ -129,7 +129,7 @@ class OpenedBag(PrivateBag):
 
     @staticmethod
     def _is_file(f: object) -> bool:
-        """Return whether ``f`` is an open file, and not a path."""
+        """Return whether ``f`` is an open file as opposed to a path."""
         return isinstance(f, io.IOBase)
 
     def _open_file(self) -> BinaryIO:

@@ -56,7 +56,7 @@ class PrivateBag(ABC):
     _file: BinaryIO | None
     _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
-    """The chunks that a program has assigned in place of the bag's own, or None."""
+    """The chunks that a program has assigned to replace the bag's own, or None."""
 
     @abstractmethod
     def _current(self) -> BagReader:
@@ -111,7 +111,7 @@ class PrivateBag(ABC):
         return {connection.topic: connection for connection in self._connections.values()}
 
     def _clear_index(self) -> None:
-        """Forget the list of chunks that a program has assigned."""
+        """Forget the chunks that a program has assigned."""
         self._chunks_of_program = None
 
     @contextlib.contextmanager
@@ -148,7 +148,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position in the format of index entries and raw messages."""
+        """Return the message at a position, given in the format that index entries and raw messages use."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)

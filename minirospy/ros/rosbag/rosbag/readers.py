@@ -42,7 +42,7 @@ class _BagReader:
         raw: bool,
         return_connection_header: bool = False,
     ) -> Iterator[Any]:
-        """Yield messages as Bag.read_messages does."""
+        """Yield messages, like Bag.read_messages."""
         return self.bag.read_messages(
             topics, start_time, end_time, connection_filter, raw, return_connection_header
         )
@@ -57,9 +57,9 @@ class _BagReader200(_BagReader):
             self._read_connection_index_records()
 
     def _read_connection_index_records(self) -> None:
-        """Read the index. A subclass may first replace the bag's ``_chunks`` by an iterable that counts the chunks."""
+        """Read the index. Before that, a subclass may replace the bag's ``_chunks`` with an iterable that counts the chunks."""
         for _ in self.bag._chunks:
-            # The first iteration reads the whole index, in one pass through the file.
+            # The first iteration reads the whole index in one pass through the file.
             if not self.bag._connection_indexes_read:
                 self.bag._connection_indexes_read = self.bag._connection_indexes is not None
 
@@ -99,7 +99,7 @@ class _BagReader200(_BagReader):
             records._read_time_field(header, "start_time"),
             records._read_time_field(header, "end_time"),
         )
-        records._read_uint32(file)  # the length of the message counts
+        records._read_uint32(file)  # the message's length is part of the size
         for _ in range(records._read_uint32_field(header, "count")):
             number = records._read_uint32(file)
             info.connection_counts[number] = records._read_uint32(file)

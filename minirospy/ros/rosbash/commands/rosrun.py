@@ -38,7 +38,7 @@ _NO_EXECUTABLE = 3
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return the program's exit status, or one from minirospy.command.command if it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # Do not handle interrupts, because the program decides how to handle signals.
+    # Leave interrupts alone, because the program decides how to handle signals.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
@@ -143,7 +143,7 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 
 
 def become(command: list[str]) -> int:
-    """Replace this process by the program. The program then receives its signals and determines its exit status."""
+    """Replace this process with the program, which then receives its signals and determines its exit status."""
     if sys.platform == "win32":
         # On Windows, exec detaches the program from the console, so wait for it instead, and let it handle Ctrl-C.
         try:
@@ -160,7 +160,7 @@ def become(command: list[str]) -> int:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
-            # Like a shell, run a script without a `#!` line with sh.
+            # Like a shell, run a script that has no `#!` line with sh.
             os.execv("/bin/sh", ["/bin/sh", *command])
 
         why = error.strerror or str(error)

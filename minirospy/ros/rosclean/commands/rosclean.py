@@ -103,7 +103,7 @@ def _agreed(command: str) -> bool:
 
 
 def _remove_oldest(folder: Path, excess: int) -> None:
-    """Remove entries in a folder, starting with the oldest, until ``excess`` bytes have been removed."""
+    """Remove entries from a folder, oldest first, until ``excess`` bytes have been removed."""
     entries = [path for path in folder.iterdir() if not path.is_symlink()]
     for path in sorted(entries, key=lambda path: path.stat().st_mtime):
         if excess <= 0:
@@ -127,7 +127,7 @@ def _remove(path: Path) -> None:
 
 
 def _statuses(path: Path) -> Iterator[os.stat_result]:
-    """Yield the stat results for a path and everything below it. Skip entries that disappear meanwhile."""
+    """Yield the stat results for a path and everything below it. Skip entries that disappear in the meantime."""
     for each in (path, *path.rglob("*")):
         try:
             yield each.lstat()

@@ -40,7 +40,7 @@ _PYTHON_PACKAGES: dict[str, tuple[str, str]] = {
     "yaml": ("yaml", "PyYAML"),
     "zmq": ("zmq", "pyzmq"),
 }
-"""(module, PyPI name) of Python packages for which these differ from the name in the rosdep key."""
+"""(module, PyPI name) of the Python packages whose names cannot be derived from the rosdep key."""
 _TOOLS = frozenset(
     """
     cmake python python3 python-catkin-pkg python3-catkin-pkg python3-catkin-pkg-modules python-catkin-tools
@@ -48,7 +48,7 @@ _TOOLS = frozenset(
     python3-rosdep python-rospkg python3-rospkg python3-rospkg-modules python-setuptools python3-setuptools
     """.split()  # noqa: SIM905
 )
-"""Keys needed to build and test with catkin, which minirospy replaces."""
+"""Keys needed to build and test with catkin; minirospy replaces these tools."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

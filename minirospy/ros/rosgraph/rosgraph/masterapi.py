@@ -1,8 +1,8 @@
 """The Master API for Python programs: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 # mypy: disable-error-code="no-any-return"
-# The annotations state what a master should return. Values are returned unchanged, because a program may replace the
-# master.
+# The annotations state what a master should return.
+# Values are returned unchanged, because a program may replace the master.
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Master:
             raise ValueError(f"invalid master URI: {master_uri}") from error
         self.__dict__.pop("handle", None)
         self._proxy = MasterProxy(master_uri, self.caller_id)
-        # Close the connections when the object is deleted, because ROS's Master has no close().
+        # Close the connections when the object is garbage-collected, because ROS's Master has no close().
         weakref.finalize(self, self._proxy.close)
 
     @cached_property

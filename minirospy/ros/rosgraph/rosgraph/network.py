@@ -63,7 +63,7 @@ def get_address_override() -> str | None:
 
 
 def get_host_name() -> str:
-    """Return the host name at which other nodes reach this machine."""
+    """Return the host name under which other nodes reach this machine."""
     return _environment().host
 
 

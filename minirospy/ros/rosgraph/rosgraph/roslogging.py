@@ -21,7 +21,7 @@ __all__ = [
     "renew_latest_logdir",
 ]
 
-_FILE_BYTES = 50_000_000  # size in bytes at which a new log file is started
+_FILE_BYTES = 50_000_000  # size in bytes above which a new log file is started
 _FILE_BACKUPS = 4  # number of earlier log files to keep
 _FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 
@@ -101,7 +101,7 @@ def makedirs_with_parent_perms(p: str) -> None:
     except FileExistsError:
         return  # another process has created the folder in the meantime
     wanted, made = os.stat(parent), os.stat(path)
-    # Only root may give a folder to another user, for example to that of /tmp: otherwise, the folder stays the user's own.
+    # Only root may change a folder's owner, for example to that of /tmp; otherwise the folder stays the user's own.
     with contextlib.suppress(PermissionError):
         if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
             os.chown(path, wanted.st_uid, wanted.st_gid)

@@ -48,7 +48,8 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
     def __init__(self, addr: tuple[str, int], log_requests: int = 1) -> None:
         super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
         self._serving = threading.Lock()
-        self._is_serving = False  # shutdown() would wait forever if serve_forever() was never called
+        # set because shutdown() would wait forever if serve_forever() was never called
+        self._is_serving = False
         self._is_closed = False
 
     def serve_forever(self, poll_interval: float = 0.5) -> None:

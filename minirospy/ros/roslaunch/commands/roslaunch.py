@@ -379,7 +379,9 @@ _SHOWS: dict[str, Callable[[LaunchSpec, str, Packages], None]] = {
     "dump_params": _show_params,
     "node_args": _show_command,
 }
-"""Maps the options that print information to their functions. If several are given, the first one in this table applies."""
+"""For each option that prints information, the function that prints it. If several are given, the first in this table
+applies.
+"""
 
 COMMAND = Command("roslaunch", _parser, with_options(LaunchOptions, _roslaunch))
 

@@ -1,4 +1,4 @@
-"""`rosrun roslaunch roslaunch-check`: check that launch files load and the programs they run exist.
+"""`rosrun roslaunch roslaunch-check`: check that launch files load and that the programs they run exist.
 
 Source: http://wiki.ros.org/roslaunch/roslaunch-check, http://wiki.ros.org/roslaunch (roslaunch_add_file_check).
 """

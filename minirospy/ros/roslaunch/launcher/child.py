@@ -75,7 +75,7 @@ class _Child(Launcher):
         }
 
     def look_after_parent(self, done: threading.Event) -> None:
-        """Poll the parent regularly, and stop the run if the parent no longer responds."""
+        """Poll the parent regularly; stop the run if the parent no longer responds."""
         missed = 0
         while not done.wait(_HEARTBEAT_SECONDS):
             try:

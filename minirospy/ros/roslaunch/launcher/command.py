@@ -56,7 +56,7 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the working folder for a node's process. If cwd is "node", raise MinirospyError like node_program."""
+    """Return the working folder for a node's process. If cwd is "node", raise the same MinirospyError as node_program."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 

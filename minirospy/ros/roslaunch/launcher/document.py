@@ -136,7 +136,10 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
-        """Return a numeric attribute as ``kind``, or the default if it is empty. Raise LaunchError if it is not a number."""
+        """Return a numeric attribute as ``kind``, or the default if it is empty.
+
+        Raise LaunchError for anything but a number.
+        """
         text = self.optional(key)
         try:
             return kind(text) if text else default

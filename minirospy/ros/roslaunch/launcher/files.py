@@ -18,7 +18,7 @@ __all__ = [
     "read_launch_file",
 ]
 
-# maximum size in bytes; a launch file for a hundred robots has about 100 kB
+# maximum size in bytes; a launch file for a hundred robots is about 100 kB
 _MAX_LAUNCH_FILE = 16 * 1024 * 1024
 
 
@@ -95,7 +95,7 @@ def near_files(file: str) -> str:
             return ""
         folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Compare names without suffixes, because all launch files have the same suffix.
+            # Compare names without suffixes, because all launch files have the same one.
             known: dict[str, Path] = {}
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
@@ -108,7 +108,7 @@ def near_files(file: str) -> str:
 
 
 def hidden_hint(file: str, packages: Packages) -> str:
-    """Return the hint for a file missing from a package if another package with the same name contains it."""
+    """Return the hint for a file that is missing from its package but exists in another package with the same name."""
     with suppress(OSError, ValueError):
         folder = _package_of(Path(file))
         if folder:
@@ -121,7 +121,7 @@ def _package_of(file: Path) -> Path | None:
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
-    """Return the hint for a file missing from its package: the package's launch files."""
+    """Return the hint for a file missing from its package: a list of the package's launch files."""
     try:
         files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
     except NotFoundError:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""The last command-line argument if the system terminates the processes of a killed roslaunch, like Windows."""
+"""The last command-line argument on a system that itself terminates the processes of a killed roslaunch, such as Windows."""
 
 
 def watch(
@@ -60,7 +60,7 @@ def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: fl
             time.sleep(0.02)
             left = [pid for pid in left if is_running(pid)]
     for pid in group:
-        # Also kills processes that a node left running in its group.
+        # Also kills the processes that a node has left running in its group.
         send(pid, "SIGKILL")
 
 
@@ -69,7 +69,7 @@ def send(pid: int, name: str) -> bool:
     if sys.platform == "win32":
         import subprocess
 
-        # Processes in another console receive no signals, so kill the process and all its descendants.
+        # Processes in another console receive no signals, so kill the process and all of its descendants.
         subprocess.run(["taskkill", "/F", "/T", "/PID", str(pid)], capture_output=True, check=False)
         return False
     try:
@@ -99,6 +99,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Leave the processes alone: other processes may already have reused their ids.
+        # Leave the processes alone: their ids may already have been reused.
         (lambda *_: None) if leaves_them else end_groups,
     )

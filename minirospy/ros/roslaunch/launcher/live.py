@@ -125,5 +125,5 @@ def last_line(file: Path | None) -> str:
 
 
 def _plain(text: str) -> str:
-    """Remove control characters from a text and escape rich's markup."""
+    """Remove control characters from a string, and escape rich's markup."""
     return "".join(each for each in text if each.isprintable()).replace("[", r"\[")

@@ -39,8 +39,8 @@ __all__ = [
 
 STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
-# maximum number of files per launch; a chain of 26 files that each include the next one twice means reading
-# 67,108,863 files
+# maximum number of files per launch;
+# a chain of 26 files that each include the next one twice would mean reading 67,108,863 files
 _MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
@@ -51,7 +51,7 @@ class _TooManyIncludesError(LaunchError):
 
 
 class LaunchSource(NamedTuple):
-    """A launch file, its content (None: read it from the file), and the values for its args."""
+    """A launch file, its content (None: read it from the file), and the values of its args."""
 
     file: str
     text: bytes | None
@@ -133,7 +133,7 @@ def load_sources(
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
     seen: dict[str, NodeSpec] = {}
-    # A <test> may have the same name as a node; they conflict only if the test's program registers under that name.
+    # A <test> may have the same name as a node. They conflict only if the test's program registers under that name.
     for node in spec.nodes:
         other = seen.setdefault(node.name, node)
         if other is not node:
@@ -181,7 +181,7 @@ class _File:
         }
 
     def read(self, text: bytes, scope: _Scope) -> _Scope:
-        """Read the file's text; return the scope at its end. Raise LaunchError on an error, unless errors are collected."""
+        """Read the file; return the scope at its end. Raise LaunchError on an error, unless errors are collected."""
         path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
         self._spec.add_file(path, self._file)
         root = Tag(parse_document(text, self._file), self._file, self._substitution)
@@ -193,7 +193,7 @@ class _File:
         return scope
 
     def report(self, error: LaunchError) -> None:
-        """Raise an error, or append it to the collected errors."""
+        """Raise an error, or append it to ``problems`` if errors are collected."""
         if self._problems is None:
             raise error
         self._problems.append(error)
@@ -217,7 +217,7 @@ class _File:
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
-            # Abort loading; otherwise, every file being read would report the error once per include.
+            # Abort loading. Otherwise every open file would report the error again for each of its includes.
             raise
         except LaunchError as error:
             self.report(error)
@@ -251,7 +251,7 @@ class _File:
     def _group(self, tag: Tag, scope: _Scope) -> _Scope:
         inner = self._below(tag, scope)
         self._clear(tag, inner)
-        # An arg that is declared in a group is valid only in that group.
+        # An arg that is declared in a group is valid only inside that group.
         declared, args = set(self._args.declared), dict(self._substitution.args)
         for child in tag.children():
             inner = self._read(child, inner)
@@ -313,7 +313,7 @@ class _File:
         for key, name in zip(("from", "to"), pair, strict=True):
             if not names.is_legal_name(names.canonicalize(name)):
                 raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
-        # The last remapping of a name wins, and is placed last.
+        # If a name is remapped twice, the later remapping wins and takes the last place.
         others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
         return replace(scope, remaps=(*others, pair))
 
@@ -375,7 +375,7 @@ class _File:
         return param_value(tag)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Store a parameter set inside a ``<node>`` as private, even if its name starts with a slash or tilde."""
+        """Store a parameter set inside a ``<node>`` as private, even if the name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", self._value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -443,7 +443,7 @@ class _File:
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
-        """Read the attributes that ``<node>`` and ``<test>`` share."""
+        """Read the attributes that ``<node>`` and ``<test>`` have in common."""
         required, respawn = tag.flag("required"), tag.flag("respawn")
         if required and respawn:
             raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
@@ -524,7 +524,7 @@ def _folder(tag: Tag) -> str:
 
 
 def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:
-    """Return an ``<arg>``'s name, value and default. Raise LaunchError if the name is missing, or if it has value and default."""
+    """Return an ``<arg>``'s name, value and default. Raise LaunchError if it has no name, or both a value and a default."""
     name, value, default = tag.required("name"), tag.optional("value"), tag.optional("default")
     if value is not None and default is not None:
         raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")

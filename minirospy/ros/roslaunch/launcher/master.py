@@ -66,8 +66,7 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # Make this call for its error message: it states the reason, such as an unknown host name or a suspended
-            # master.
+            # Call the master for its error, which states the reason, such as an unknown host name or a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")
@@ -94,10 +93,9 @@ class LaunchMaster:
             self._pause(0.02)
 
         if self.run_id:
-            # Set the run id explicitly, because the launching program may have set its own run id, which names the
-            # log folder.
+            # Set the run id explicitly: the launching program may have chosen its own, which names the log folder.
             self._proxy.set_param("/run_id", self.run_id)
-        # Do not warn again: if the master cannot write its log, it has already printed a warning.
+        # Do not warn again: a master that cannot write its log has already printed a warning.
         self.find_run_id(warns=False)
 
     def find_run_id(self, *, warns: bool = True) -> None:
@@ -120,7 +118,7 @@ class LaunchMaster:
         try:
             self._output.print(f"... logging to {self._output.log_to(self.log_folder)}")
         except OSError as error:
-            # Start the nodes even if the disk is full or read-only.
+            # Start the nodes even on a full or read-only disk.
             self.has_logs = False
             if warns:
                 why = error.strerror or error

@@ -37,8 +37,8 @@ class NodeStarter:
         environ = node_environment(node, self._environment)
         screen = self._uses_screen(node)
         if not screen or not sys.stdout.isatty():
-            # Make a node's output appear immediately. On a terminal, Python flushes each line anyway, and writes
-            # whole lines, so that output from other nodes does not interrupt them.
+            # Show a node's output immediately.
+            # On a terminal, Python flushes each line anyway, and writes whole lines, so that the nodes' lines do not mix.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         folder = self._made(folder)
 
@@ -56,7 +56,7 @@ class NodeStarter:
         return process
 
     def _made(self, folder: Path) -> Path:
-        """Create a node's working folder and return it; if ROS_HOME is not writable, return the temporary folder."""
+        """Create a node's working folder and return it. If ROS_HOME is not writable, return the temporary folder."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

@@ -29,7 +29,7 @@ class Output:
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
-    """The user program's functions that receive (level, text) for each line."""
+    """The user program's functions to call with (level, text) for each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -67,9 +67,9 @@ class Output:
 
     def _write(self, text: str, colour: str, level: int) -> None:
         stream = sys.stderr if level == ERROR else sys.stdout
-        # Write each line in a single call, because nodes write to the same terminal.
+        # Write each line in one call, because nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # Even if the process that reads the output (`| head`) has exited, terminate the nodes in order.
+        # Even if the reader of the output (`| head`) has exited, terminate the nodes in the right order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()
@@ -89,7 +89,7 @@ class Output:
 
 
 def warn_of_large_logs(folder: Path, output: Output) -> None:
-    """Warn if the log folder exceeds one gigabyte. Measure its size in the background."""
+    """Warn if the log folder exceeds one gigabyte. Measures its size in the background."""
 
     def look() -> None:
         size = 0

@@ -29,7 +29,7 @@ __all__ = ["param_value", "rosparam_values"]
 _XACRO = ("xacro", "xacro.py")
 _STYLE = re.compile(r"\x1b\[[0-9;]*m")  # matches terminal colours
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-# bytes at the end of a command's stderr to search for the reason for a failure
+# number of bytes at the end of a command's stderr in which to search for the reason for a failure
 _ERRORS_KEPT = 65_536
 _ERRORS_SECONDS = 1.0
 # maximum size in bytes of a file or of a command's output; the master rejects larger requests
@@ -140,16 +140,16 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
                 process.kill()
             status = process.wait()
         except BaseException:
-            # Kill the command, because it may ignore Ctrl-C.
+            # Kill the command, which may ignore Ctrl-C.
             process.kill()
             process.wait()
             raise
         finally:
-            # Close the pipe, so that processes that the command left running get a broken pipe.
+            # Close the pipe, so that processes left running by the command get a broken pipe.
             process.stdout.close()
     finally:
         os.close(writing)
-        # Wait only briefly, because processes that the command left running may hold the pipe open.
+        # Wait only briefly, because processes left running by the command may hold the pipe open.
         reader.join(_ERRORS_SECONDS)
     return status, output, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
 
@@ -161,12 +161,12 @@ def _reason(errors: str) -> str:
 
 
 def _pass_on(reading: int, end: bytearray) -> None:
-    """Copy the pipe to stderr until it is closed; store the last bytes in ``end``."""
+    """Copy the pipe to stderr until it is closed; keep the last bytes in ``end``."""
     with open(reading, "rb", buffering=0) as pipe:
         while chunk := pipe.read(_ERRORS_KEPT):
             end += chunk
             del end[:-_ERRORS_KEPT]
-            # If the program has no stderr, another file may use descriptor 2.
+            # If the program has no stderr, descriptor 2 may belong to another file.
             if sys.__stderr__ is not None:
                 with contextlib.suppress(OSError), open(2, "wb", closefd=False) as errors:
                     errors.write(chunk)

@@ -35,7 +35,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A started process. ``node`` is None for the master; ``starts`` counts how often it was started."""
+    """A started process. ``node`` is None for the master; ``starts`` counts the starts."""
 
     name: str
     command: Sequence[str]
@@ -45,9 +45,9 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # set once the process has been told to exit, so that its exit is not reported
+    is_ending: bool = False  # set once the process has been told to exit; its exit is then not reported
 
-    # set if the process will be restarted after its exit because its file has changed
+    # set if the process is to be restarted after its exit because its file has changed
     is_restarting: bool = False
 
     @property
@@ -74,7 +74,7 @@ class _Group(TypedDict, total=False):
 
 
 class Guardian:
-    """Is told of processes' starts and exits, and terminates the remaining ones if roslaunch is killed.
+    """Tracks the running processes, and terminates them if roslaunch is killed.
 
     On Windows the system terminates them (`minirospy.base.child_lifetime`). There the guardian only unregisters nodes from a
     master that this launch did not start; otherwise its process is not started.
@@ -110,8 +110,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # A process that is started outside the job would remain, suspended, if its parent were killed while starting
-        # it.
+        # A process that is started outside the job would remain, suspended, if its parent were killed while starting it.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -181,8 +180,7 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # send_signal fails if the process has exited, or on Windows without a console; then there is nothing to
-            # wait for.
+            # send_signal fails if the process has exited or, on Windows, has no console. There is nothing to wait for then.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)
@@ -193,14 +191,14 @@ def end_processes(
 
     if not _WINDOWS:
         for process in processes:
-            # Also kill processes that a node left running in its group.
+            # Also kill the processes that a node has left running in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed
 
 
 def _own_group() -> _Group:
-    """Return the options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in order."""
+    """Return the options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in the right order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}

@@ -21,8 +21,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-# seconds to wait for a node; only hanging processes take this long, because an exited process refuses the connection
-# immediately
+# seconds to wait for a node; only a hanging process takes this long, because the port of an exited one refuses connections
 _ANSWER_SECONDS = 5.0
 
 _MAX_CONCURRENT = 16

@@ -39,7 +39,7 @@ class Monitor(Protocol):
     """The part of the launcher that RemoteMachines uses."""
 
     def guard(self, process: Process) -> None:
-        """Ensure that the process is terminated if roslaunch is killed."""
+        """Ensure that the process is terminated even if roslaunch is killed."""
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
         """Report that a process on another machine has exited."""
@@ -103,7 +103,7 @@ class _Child:
     has_registered: threading.Event = field(default_factory=threading.Event)
     running: set[str] = field(default_factory=set)
     ended: set[str] = field(default_factory=set)
-    """Names of exited processes; a process may exit before ``launch`` has reported its start."""
+    """Names of exited processes. A process may exit before ``launch`` has reported that it has started."""
 
 
 class RemoteMachines:

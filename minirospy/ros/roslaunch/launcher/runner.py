@@ -133,7 +133,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # Skip the first number: in ROS, a roslaunch that starts the master uses it for /rosout.
+            # Skip the first number: if a roslaunch starts the master, ROS uses that number for /rosout.
             next(self._numbers)
 
         self.set_parameters()
@@ -210,7 +210,7 @@ class Launcher:
                 self._output.warn(f"WARNING: {why}")
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the nodes' programs. Skip missing ones: they are reported when the node is started."""
+        """Yield the nodes' programs. Skip missing ones, which are reported when the node is started."""
         for node in nodes:
             with contextlib.suppress(MinirospyError):
                 yield Path(node_program(node, self._packages)[-1])
@@ -243,7 +243,7 @@ class Launcher:
         return process
 
     def guard(self, process: Process) -> None:
-        """Ensure that the process is terminated if roslaunch is killed."""
+        """Ensure that the process is terminated even if roslaunch is killed."""
         self._ready_guardian().add(process)
 
     def _ready_guardian(self) -> Guardian:
@@ -259,7 +259,7 @@ class Launcher:
 
     @property
     def stopped_by(self) -> str:
-        """Return the signal or stop() caller that stopped the run; "" if the nodes exited by themselves."""
+        """Return the signal or stop() caller that stopped the run, or "" if the nodes exited by themselves."""
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
@@ -292,7 +292,7 @@ class Launcher:
             self._on_end(process)
 
     def _on_end(self, process: Process) -> None:
-        """Handle a node's exit; a hook for subclasses."""
+        """Handle a node's exit. A hook for subclasses."""
 
     # --- shutdown
 
@@ -337,7 +337,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Remove exited nodes' registrations from the master, unless the master exits together with the nodes."""
+        """Remove exited nodes' registrations from the master, unless the master is about to exit, too."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)
@@ -360,7 +360,7 @@ class Launcher:
 
 
 def _is_here(machine: MachineSpec) -> bool:
-    """Return whether a machine is this one, with the current user."""
+    """Return whether a machine is this one and its user is the current one."""
     if machine.user:
         import getpass
 

@@ -55,7 +55,7 @@ class NodeSpec:
 
     def to_xml(self) -> str:
         """Return the equivalent launch-file ``<node>``, without its machine."""
-        # Import this module here, because its import takes longer than those of all other roslaunch modules together.
+        # Import this module here: its import takes longer than those of all other roslaunch modules together.
         from xml.sax.saxutils import quoteattr
 
         attributes = {
@@ -105,7 +105,7 @@ class MachineSpec:
 
 @dataclass(frozen=True)
 class ParameterCommand:
-    """A ``<rosparam>`` that deletes the namespace ``name`` at the master, or dumps it into ``file``."""
+    """A ``<rosparam>`` that deletes the namespace ``name`` at the master, or dumps it to ``file``."""
 
     name: str
     file: str | None = None
@@ -161,7 +161,10 @@ class LaunchSpec:
     def add_param(
         self, name: str, value: object, error: Callable[[str], LaunchError], file: str | None = None
     ) -> None:
-        """Add a parameter. ``error`` creates errors with the tag's line. ``file`` has the ``<param>``, unless it is in a node."""
+        """Add a parameter. ``error`` creates errors with the tag's line.
+
+        ``file`` contains the ``<param>``, unless it is in a node.
+        """
         upper = name
         while upper := upper.rpartition("/")[0]:
             if upper in self.params and not isinstance(self.params[upper], dict):

@@ -26,7 +26,7 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-# maximum number of characters produced per load; args that repeat other args can double the size again and again
+# maximum number of characters produced per load, because each level of args that repeat other args can double the size
 _MAX_SUBSTITUTED = 64 * 1024 * 1024
 _MAX_SHOWN = 200  # maximum length of a string quoted in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
@@ -52,7 +52,7 @@ class Substitution:
     used: set[str] = field(default_factory=set)
     unset: dict[str, str] = field(default_factory=dict)
     given: list[int] = field(default_factory=lambda: [0])
-    """The number of characters that substitutions have produced, in all files of a load."""
+    """The number of characters that substitutions have produced in all files of a load."""
 
     def apply(self, text: str) -> str:
         """Return ``text`` with every substitution resolved.
@@ -203,7 +203,7 @@ def convert(text: str, type_: str) -> object:
             try:
                 loaded: object = load(text, fast_loader())
             except yaml.scanner.ScannerError:
-                # ROS's loader, which is in Python, also accepts a colon directly before a bracket.
+                # Like ROS's loader, which is written in Python, also accept a colon directly before a bracket.
                 loaded = load(text, yaml.SafeLoader)
         except yaml.YAMLError as error:
             why = " ".join(str(getattr(error, "problem", None) or error).split())

@@ -16,7 +16,7 @@ from minirospy.ros.roslaunch.launcher.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_RESPAWN_SECONDS = 0.1  # minimum seconds between two starts of a node that exits immediately
+_RESPAWN_SECONDS = 0.1  # minimum seconds between starts of a node that exits right away
 
 _SLICE = 0.5
 """Seconds per wait of the main thread, which receives signals.
@@ -55,7 +55,7 @@ class _Stop(NamedTuple):
 
 
 class _NoMoreNodes(NamedTuple):
-    """No more nodes will be started, so the run is over when the current ones have exited."""
+    """No more nodes will be started, so the run is over once the current ones have exited."""
 
 
 _Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
@@ -164,7 +164,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Sleep. Raise KeyboardInterrupt if stop() is called meanwhile."""
+        """Sleep. Raise KeyboardInterrupt if stop() is called during the sleep."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:
@@ -184,7 +184,7 @@ class Supervisor:
     # --- helpers
 
     def _attend(self, process: Process) -> None:
-        """Wait in a thread for a process to exit, then put an event into the queue."""
+        """Wait in a thread for a process to exit, then put an event on the queue."""
 
         def wait() -> None:
             process.popen.wait()
@@ -193,7 +193,7 @@ class Supervisor:
         threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
 
     def _next_event(self) -> _Event | None:
-        """Return the next event. After a slice without events, handle due restarts and changed files, and return None."""
+        """Return the next event. After a slice without events, return None after handling due restarts and changed files."""
         pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
             return self._events.get(timeout=min(pauses))

@@ -27,7 +27,7 @@ class FileWatch:
         """Return a file that has changed since the node was added, or since the last call."""
         before, now = self._seen.get(node.name, {}), self._times(node)
         self._seen[node.name] = now
-        # Ignore a missing file, because it is probably being rewritten.
+        # Ignore a missing file, which is probably just being rewritten.
         return next((path for path, when in now.items() if before.get(path) != when), None)
 
     def _times(self, node: NodeSpec) -> dict[Path, int]:

@@ -188,7 +188,7 @@ def load_config_default(
 
 
 def get_roscore_filename() -> str | None:
-    """Return the launch file for the master's own nodes: always None, because there are no such nodes."""
+    """Return the launch file for the master's own nodes: always None, because it has none."""
     return None
 
 

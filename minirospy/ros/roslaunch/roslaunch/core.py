@@ -111,7 +111,7 @@ class Master:
 
 
 class Param:
-    """A parameter: its global name and value."""
+    """A parameter: its global name and its value."""
 
     def __init__(self, key: str, value: object) -> None:
         self.key = names.canonicalize(key)
@@ -278,7 +278,7 @@ class Node:
         self.machine: Machine | None = None
         self.process_name: str | None = None
 
-        # As in ROS, store the caller's own list, which the caller may change later.
+        # As in ROS, keep the caller's own list, which the caller may change later.
         self.remap_args: Sequence[Sequence[str]] = remap_args or []
         self.env_args: Sequence[tuple[str, str]] = env_args or []
         self.output = output
@@ -440,7 +440,7 @@ class _Handler:
         if (level >= ERROR) == self.errors:
             try:
                 self._function(text)
-            except Exception:  # the program's own function failed; as in ROS, the line is printed anyway
+            except Exception:  # the program's own function failed; as in ROS, print the line anyway
                 logging.getLogger("roslaunch").debug("a handler of roslaunch's output raised", exc_info=True)
 
 

@@ -110,7 +110,7 @@ class ROSLaunchRunner:
             monitor.close()
             raise
         monitor.watch()
-        # If the program exits without stop(), the launched processes still terminate in order.
+        # If the program exits without calling stop(), still terminate the launched processes in the right order.
         atexit.register(self._end_with_program)
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
@@ -144,7 +144,7 @@ class ROSLaunchRunner:
         return process.exit_code == 0
 
     def is_node_running(self, node: Node) -> bool:
-        """Return whether this runner has started a node that is still running."""
+        """Return whether this runner has started the node and it is still running."""
         name = node.spec.name
         return any(
             each.node and each.node.name == name and each.is_running for each in self._launcher.processes
@@ -185,7 +185,7 @@ class ROSLaunchRunner:
             monitor.close()
 
     def _end_with_program(self) -> None:
-        # A forked child of the program must not stop the nodes when the child exits.
+        # A forked child of the program must not stop the nodes when it exits.
         if os.getpid() == self._pid:
             self.stop()
 
@@ -219,7 +219,7 @@ def replacement_of(module: str, name: str, ours: Function) -> Function:
 
 
 def unify_clear_params(params: Iterable[str]) -> list[str]:
-    """Return the namespaces to delete, with trailing slashes. Omit namespaces inside other ones."""
+    """Return the namespaces to delete, with trailing slashes. Omit namespaces that are inside another one."""
     names = [name if name.endswith("/") else f"{name}/" for name in params]
     return [
         name

@@ -5,18 +5,15 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 from collections.abc import Sequence
 
-from minirospy.base.environment import Environment
 from minirospy.ros.roslaunch.launcher.process import Timeouts
 from minirospy.ros.roslaunch.launcher.runner import RunOptions
 from minirospy.ros.roslaunch.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
 from minirospy.ros.roslaunch.roslaunch.core import RLException
 from minirospy.ros.roslaunch.roslaunch.launch import ROSLaunchRunner, master_options, replacement_of
 from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener, ProcessMonitor
-from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["RLException", "ROSLaunchParent", "load_config_default"]
 
@@ -87,7 +84,7 @@ class ROSLaunchParent:
         try:
             runner.launch()
         except RLException:
-            # Allow another attempt to start.
+            # Allow the program to call start() again.
             self.runner = None
             raise
         if auto_terminate and self.pm:
@@ -126,8 +123,3 @@ class ROSLaunchParent:
             timeouts=self._timeouts,
             master_arguments=self._master_options,
         )
-
-
-def _master_answers(environment: Environment) -> bool:
-    with contextlib.closing(MasterProxy(environment.master_uri, "/roslaunch")) as master:
-        return master.is_online()

@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import FrameType
 from typing import ClassVar
 
@@ -27,6 +27,7 @@ from minirospy.ros.roslaunch.launcher.command import node_command, node_environm
 from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.launcher.runner import Launcher, RunOptions
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, NodeSpec
+from minirospy.ros.roslaunch.own_processes import DeadProcess, OwnProcesses, Process, ProcessListener
 from minirospy.ros.roslaunch.roslaunch.core import Node, RLException
 from minirospy.ros.roslaunch.roslaunch.node_args import NodeParamsException
 from minirospy.workspace.packages import Packages
@@ -45,17 +46,6 @@ __all__ = [
     "shutdown_process_monitor",
     "start_process_monitor",
 ]
-
-
-_BAR = "=" * 80
-_POLL_SECONDS = 0.1  # seconds between checks of the program's own processes
-
-
-class ProcessListener:
-    """The base class for objects that are notified when processes exit."""
-
-    def process_died(self, process_name: str, exit_code: int) -> None:
-        """Handle the exit of a process; called in one of roslaunch's threads."""
 
 
 class ApiLauncher(Launcher):
@@ -101,101 +91,6 @@ class ApiLauncher(Launcher):
 
 class FatalProcessLaunch(RLException):
     """Raised if a process failed to start, and the launch cannot continue."""
-
-
-class Process:
-    """A process that a ProcessMonitor watches: programs override start(), stop() and is_alive()."""
-
-    def __init__(
-        self,
-        package: str,
-        name: str,
-        args: Sequence[str],
-        env: Mapping[str, str],
-        respawn: bool = False,
-        respawn_delay: float = 0.0,
-        required: bool = False,
-    ) -> None:
-        self.package = package
-        self.name = name
-        self.args = args
-        self.env = env
-        self.respawn = respawn
-        self.respawn_delay = respawn_delay
-        self.required = required
-
-        self.lock = threading.Lock()
-        self.exit_code: int | None = None
-        self.spawn_count = 0  # number of times the process was started
-        self.time_of_death: float | None = None  # time.time() when the process exited
-
-    def __str__(self) -> str:
-        return f"Process<{self.name}>"
-
-    def get_info(self) -> dict[str, object]:
-        """Return the process's details."""
-        keys = (
-            "spawn_count",
-            "args",
-            "env",
-            "package",
-            "name",
-            "alive",
-            "respawn",
-            "respawn_delay",
-            "required",
-        )
-        info = {key: self.is_alive() if key == "alive" else getattr(self, key) for key in keys}
-        if self.exit_code is not None:
-            info["exit_code"] = self.exit_code
-        return info
-
-    def start(self) -> bool | None:
-        """Start the process; return whether it is running."""
-        self.spawn_count += 1
-        return None
-
-    def is_alive(self) -> bool:
-        """Return whether the process is running; set ``time_of_death`` after it has exited."""
-        if self.time_of_death is None:
-            self.time_of_death = time.time()
-        return False
-
-    def should_respawn(self) -> float | bool:
-        """Return the seconds until the process may be restarted, or False if it must not be restarted."""
-        if not self.respawn:
-            return False
-        return (self.time_of_death or time.time()) + self.respawn_delay - time.time()
-
-    def stop(self, errors: list[str] | None = None) -> None:
-        """Terminate the process; append descriptions of errors to ``errors``."""
-
-    def get_exit_description(self) -> str:
-        """Return a description of how the process exited."""
-        if self.exit_code is None:
-            return "process has died"
-        return (
-            f"process has died with exit code {self.exit_code}"
-            if self.exit_code
-            else "process has finished cleanly"
-        )
-
-
-class DeadProcess(Process):
-    """A process that has exited, in a monitor's ``dead_list``."""
-
-    def __init__(self, p: Process) -> None:
-        super().__init__(p.package, p.name, p.args, p.env, p.respawn, p.respawn_delay, p.required)
-        self.exit_code, self.spawn_count = p.exit_code, p.spawn_count
-        self.lock = p.lock
-
-    def start(self) -> bool:
-        """Raise RLException: a process that has exited cannot be started."""
-        raise RLException("call to start on dead process!")
-
-    def is_alive(self) -> bool:
-        """Return False."""
-        return False
 
 
 class LaunchedProcess(Process):
@@ -323,21 +218,19 @@ class ProcessMonitor:
     def __init__(self, name: str = "ProcessMonitor", *, launcher: ApiLauncher | None = None) -> None:
         self.name = name
         self._launcher = launcher or ApiLauncher(LaunchSpec(), Environment.read())
-        self._is_stopping = False  # set by shutdown() and close(): start no more processes
-        self._closing = threading.Event()
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
         self.is_watching = False  # set once watch() has been called
         if launcher is not None:
             self._living.add(self)
 
-        # Guards the processes of the program's own classes; the launcher manages all others.
-        self.plock = threading.RLock()
-        self._own: list[Process] = []
-        self._own_dead: list[Process] = []
+        self._own = OwnProcesses(
+            on_exit=self._launcher.notify,
+            on_required_exit=self.shutdown,
+            on_last_exit=self._launcher.supervisor.end_with_nodes,
+        )
+        self.plock = self._own.lock
         self.core_procs: list[Process] = []
-        self._is_complete = False  # set if no more processes will be registered
-        self._own_thread: threading.Thread | None = None
 
     daemon = True  # an attribute of threading.Thread, which is the base class in ROS
 
@@ -365,13 +258,13 @@ class ProcessMonitor:
     @property
     def is_shutdown(self) -> bool:
         """Return whether a shutdown was requested or has begun."""
-        return self._is_stopping
+        return self._own.is_stopping
 
     @property
     def procs(self) -> list[Process]:
         """Return the watched processes."""
         launched = [self._launcher.known[process.name] for process in tuple(self._launcher.processes)]
-        return [*launched, *self._own]
+        return [*launched, *self._own.watched]
 
     @property
     def dead_list(self) -> list[Process]:
@@ -379,7 +272,7 @@ class ProcessMonitor:
         watched = self.get_active_names()
         known = tuple(self._launcher.known.values())
         launched = [each for each in known if each.started and each.name not in watched]
-        return [*launched, *self._own_dead]
+        return [*launched, *self._own.dead]
 
     def get_active_names(self) -> list[str]:
         """Return the names of the watched processes."""
@@ -425,9 +318,9 @@ class ProcessMonitor:
                     "%s.register[%s] failed %s", self.name, p.name, text
                 )
                 raise RLException(text)
-            self._own.append(p)
+            self._own.watched.append(p)
             if self.is_watching:
-                self._watch_own()
+                self._own.start(self.name)
 
     def register_core_proc(self, p: Process) -> None:
         """Watch a process that belongs to the launch itself, such as the master."""
@@ -437,13 +330,13 @@ class ProcessMonitor:
     def unregister(self, p: Process) -> None:
         """Stop watching a process, without terminating it. Raise ValueError if the process is not watched."""
         with self.plock:
-            self._own.remove(p)
+            self._own.watched.remove(p)
 
     def registrations_complete(self) -> None:
         """Let the monitor stop after the last process, because no more processes will be registered."""
         with self.plock:
-            self._is_complete = True
-            if not self._own:
+            self._own.is_complete = True
+            if not self._own.watched:
                 self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
@@ -466,74 +359,11 @@ class ProcessMonitor:
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
-        with self.plock:
-            if self._own:
-                self._watch_own()
+        self._own.start(self.name)
 
     def start(self) -> None:
         """Like :meth:`watch`: watch the processes."""
         self.watch()
-
-    def _watch_own(self) -> None:
-        if self._own_thread is None:
-            self._own_thread = threading.Thread(target=self._run_own, name=self.name, daemon=True)
-            self._own_thread.start()
-
-    def _run_own(self) -> None:
-        """Poll the program's own processes until the monitor stops."""
-        respawning: set[Process] = set()
-        while not self._closing.wait(_POLL_SECONDS) and not self.is_shutdown:
-            for process in tuple(self._own):
-                try:
-                    self._poll_own(process, respawning)
-                except Exception:  # noqa: BLE001 - the program's own class; the other processes are still watched
-                    Output(title=False).warn(f"ERROR: [{process.name}]\n{traceback.format_exc()}")
-                    self._remove_own(process)
-            with self.plock:
-                is_over = self._is_complete and not self._own
-            if is_over:
-                self._launcher.supervisor.end_with_nodes()
-
-    def _poll_own(self, process: Process, respawning: set[Process]) -> None:
-        if process not in respawning:
-            if process.is_alive():
-                return
-            self._report_exit(process)
-            if process.required:
-                self.shutdown()
-                return
-        seconds = process.should_respawn()
-        if seconds is False:
-            process.stop([])
-            self._remove_own(process)
-        elif seconds <= 0:
-            respawning.discard(process)
-            Output(title=False).print(f"[{process.name}] restarting process")
-            process.stop([])
-            # If the shutdown begins after this check, close() waits for start() and then terminates the process.
-            if not self.is_shutdown:
-                process.start()
-        else:
-            respawning.add(process)
-
-    def _report_exit(self, process: Process) -> None:
-        text = process.get_exit_description()
-        output = Output(title=False)
-        if process.required:
-            output.warn(
-                f"{_BAR}REQUIRED process [{process.name}] has died!\n{text}\nInitiating shutdown!\n{_BAR}"
-            )
-        elif process.exit_code:
-            output.warn(f"[{process.name}] {text}")
-        else:
-            output.print(f"[{process.name}] {text}", bold=True)
-        self._launcher.notify(process.name, process.exit_code or 0)
-
-    def _remove_own(self, process: Process) -> None:
-        with self.plock:
-            if process in self._own:
-                self._own.remove(process)
-                self._own_dead.append(DeadProcess(process))
 
     def close(self) -> None:
         """Terminate the remaining processes in the calling thread."""
@@ -541,30 +371,7 @@ class ProcessMonitor:
         with contextlib.ExitStack() as stack:
             stack.callback(self._ended.set)
             stack.callback(self._launcher.close)
-            self._close_own()
-
-    def _close_own(self) -> None:
-        """Terminate the program's own processes, after the thread that restarts them has stopped."""
-        with self.plock:
-            self._is_stopping = True
-            polling = self._own_thread
-        self._closing.set()
-        # Wait without the lock, because the program's methods that this thread calls may use the monitor.
-        if polling and polling is not threading.current_thread():
-            polling.join()
-
-        errors: list[str] = []
-        # Terminate the core's processes last, the others in the reverse order of their registration.
-        others = [each for each in reversed(self._own) if each not in self.core_procs]
-        for process in (*others, *(each for each in self.core_procs if each in self._own)):
-            Output(title=False).print(f"[{process.name}] killing on exit")
-            try:
-                process.stop(errors)
-            except Exception:  # noqa: BLE001 - the program's own class; the other processes end, too
-                errors.append(traceback.format_exc())
-            self._remove_own(process)
-        for error in errors:
-            Output(title=False).warn(error)
+            self._own.close(self.core_procs)
 
     def is_alive(self) -> bool:
         """Return whether the monitor is watching."""
@@ -572,7 +379,7 @@ class ProcessMonitor:
 
     def join(self, timeout: float | None = None) -> None:
         """Wait up to ``timeout`` seconds until all processes have exited. Return immediately if called in a listener's thread."""
-        if threading.current_thread() in (self._thread, self._own_thread):
+        if threading.current_thread() in (self._thread, self._own.thread):
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
         # Wait in slices, because on Windows a wait without timeout ignores signals.
@@ -590,7 +397,7 @@ class ProcessMonitor:
     def shutdown(self) -> None:
         """Terminate all processes without waiting for their exit."""
         # Take no lock, also not that of an Event: a signal handler, which may interrupt this method, calls it, too.
-        self._is_stopping = True
+        self._own.is_stopping = True
         self._launcher.stop("shutdown")
 
     @classmethod

@@ -1,4 +1,4 @@
-"""roslaunch.remote: can be imported for compatibility, but only ROSLaunchParent starts nodes on other machines."""
+"""roslaunch.remote: importable for compatibility, but only ROSLaunchParent starts nodes on other machines."""
 
 from minirospy.ros.roslaunch.roslaunch.core import RLException, is_machine_local
 

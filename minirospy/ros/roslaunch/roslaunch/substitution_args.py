@@ -221,7 +221,7 @@ def _eval_find(pkg: str) -> str:
 
 
 def _find(resolved: str, a: str, args: list[str], context: Context) -> str:
-    """Resolve ``$(find PKG)``. If a path follows, and the package has a program or file of that name, insert its path."""
+    """Resolve ``$(find PKG)``. If a path follows that names a program or file of the package, insert the full path."""
     if len(args) != 1:
         raise SubstitutionException(f"$(find pkg) command only accepts one argument [{a}]")
     before, after = _split_command(resolved, a)

@@ -82,7 +82,7 @@ class Configuration(Protocol):
 
 
 class ConfigError(str):
-    """A warning in ROS's wording; ``error`` is minirospy's warning, with the line."""
+    """An invalid launch file. The message has ROS's wording; ``error`` is minirospy's own message, with the line number."""
 
     error: LaunchError
 
@@ -103,7 +103,7 @@ class _Forwarded(LaunchSpec):
         self._verbose = verbose
 
     def add_file(self, path: str, name: str) -> None:
-        """Print that a file is loaded. Add the file to the configuration, unless it was given as a string."""
+        """Print that a file is being loaded. Add the file to the configuration, unless it was given as a string."""
         if name == STDIN:
             self._print("... loading XML")
             return

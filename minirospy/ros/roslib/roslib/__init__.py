@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-from minirospy.ros.submodules import on_first_use
-
 if TYPE_CHECKING:
     from minirospy.ros.roslib.roslib import exceptions as exceptions
     from minirospy.ros.roslib.roslib import launcher as launcher
@@ -11,8 +9,6 @@ if TYPE_CHECKING:
     from minirospy.ros.roslib.roslib.launcher import load_manifest
 
 __all__ = ["is_interactive", "load_manifest", "set_interactive"]
-
-__getattr__ = on_first_use("roslib", "manifest", "message", "names", "stacks")
 
 _interactive = [False]
 

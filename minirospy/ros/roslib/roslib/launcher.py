@@ -35,14 +35,13 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
     for folder in folders:
         source = str(folder / "src")
         modules = [found.parent.name for found in Path(source).glob("*/__init__.py")]
-        # Append the folder only if a module is missing, because a sourced devel folder also contains the package's
-        # messages.
+        # Append the folder only if a module is missing: a sourced devel folder also contains the package's messages.
         if source not in sys.path and not all(map(_is_importable, modules)):
             sys.path.append(source)
 
 
 def _folder_of_script(package: str) -> Path | None:
-    """Return the folder of the package that contains the running script, or None if that package has another name."""
+    """Return the folder of the package that contains the running script, or None if the script is in another package."""
     script: Sequence[str] = sys.argv[:1]
     if not script or not script[0]:
         return None

@@ -72,7 +72,7 @@ class Manifest:
 
 
 def folders_with(file: str, path: str) -> Iterator[str]:
-    """Yield the folders below ``path`` that contain the manifest ``file``. Do not search below such folders."""
+    """Yield the folders below ``path`` that contain the manifest ``file``. Do not search inside these folders."""
     for folder, subfolders, files in os.walk(path, followlinks=True):
         if file in files:
             yield folder
@@ -110,7 +110,7 @@ def load_manifest(package: str) -> Manifest:
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException if its content is invalid."""
+    """Parse a manifest file. Raise ValueError if the file does not exist, ManifestException if its content is invalid."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):
@@ -120,7 +120,7 @@ def parse_file(file: str) -> Manifest:
 
 
 def parse(string: str, filename: str = "string") -> Manifest:
-    """Return the manifest in a string. Raise ManifestException if the manifest is invalid."""
+    """Parse a manifest from a string. Raise ManifestException if it is invalid."""
     from xml.dom.minidom import parseString
 
     try:

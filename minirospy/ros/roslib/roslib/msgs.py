@@ -1,4 +1,4 @@
-"""roslib.msgs: types and definitions in their form before genmsg, and a table of definitions keyed by name."""
+"""roslib.msgs: types and definitions in the form that preceded genmsg, and a table of definitions keyed by name."""
 
 from __future__ import annotations
 
@@ -325,7 +325,7 @@ def load_from_string(
 def _constant(type_: str, declared: str, line: str) -> Constant:
     if not is_valid_constant_type(type_):
         raise MsgSpecException(f"{type_} is not a legal constant type")
-    # A string constant extends to the end of the line, including anything that looks like a comment.
+    # A string constant extends to the end of the line, even past a #.
     name, _, value = (line if type_ == "string" else declared).strip().partition(" ")[2].partition(CONSTCHAR)
     if type_ != "string" and CONSTCHAR in value:
         raise MsgSpecException(f"Invalid declaration: {declared}")

@@ -129,7 +129,7 @@ def list_pkgs_by_path(
     cache: dict[str, str] | None = None,
     env: dict[str, str] | None = None,
 ) -> list[str]:
-    """Append the packages below a folder to ``packages``; return ``packages``."""
+    """Append the names of the packages below a folder to ``packages``; return ``packages``."""
     found = [] if packages is None else packages
     found += [name for name in RosPack([path]).list() if name not in found]
     return found
@@ -153,7 +153,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
     for path, folders, names in os.walk(d, followlinks=True):
         real = os.path.realpath(path)
         if real in seen:
-            # Do not follow a link to a parent folder, because the search would never end.
+            # Do not follow a link to a parent folder: the search would never end.
             folders.clear()
             continue
         seen.add(real)

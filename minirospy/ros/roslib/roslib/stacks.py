@@ -95,7 +95,7 @@ def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
 def expand_to_packages(
     names: Sequence[str], env: Mapping[str, str] | None = None
 ) -> tuple[list[str], list[str]]:
-    """Replace stacks and metapackages by their packages; return (packages, unknown names)."""
+    """Replace stacks and metapackages with their packages; return (packages, unknown names)."""
     stacks, known = _stacks(env), _packages(env)
     packages: list[str] = []
     unknown = []

@@ -41,7 +41,9 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 _LOG_BYTES = 10 * 1024 * 1024
 
 ANSWER_SECONDS = 4.0
-"""Seconds to wait for a response from a master on a busy machine. A master that is still recovering holds its journal's lock."""
+"""Seconds to wait for a response from the master on a busy machine. A master that is still recovering already holds its
+journal's lock.
+"""
 
 
 class _Options(NamedTuple):
@@ -92,7 +94,7 @@ def _parser(name: str) -> Parser:
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")
     add("-v", dest="verbose", action="store_true", help="verbose printing")
 
-    # Accept these options without effect: one loop in one process serves all clients.
+    # Accept these options without effect, because one loop in one process serves all clients.
     parser.accept(
         "-w",
         "--numworkers",
@@ -189,8 +191,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Reject an empty value, which may come from an unset variable, because it would give every address access to
-        # the master.
+        # Reject an empty value, which may come from an unset variable: it would give every address access to the master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -215,7 +216,7 @@ def _environment(*, local: bool) -> Environment:
 
 
 def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
-    """Warn, in one line, about options and variables that only matter for other machines, if the master is local."""
+    """If the master is local, warn in one line about options and variables that only matter for other machines."""
     asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
@@ -239,7 +240,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         fresh=options.fresh,
         access=access,
         timeout=options.timeout,
-        most_clients=_most_clients(),
+        max_clients=_max_clients(),
         same_host=environment.same_host,
         owns_process=True,
     )
@@ -276,7 +277,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # Remove the file while this master still owns the port. After that, it may belong to the next master.
+        # Remove the file while this master still owns the port; later, the file may belong to the next master.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -312,7 +313,7 @@ def _write_pid(path: Path) -> None:
 async def _run(
     master: Master, stop: asyncio.Event, rosout: RosoutNode | None, run_id: str, *, quiet: bool
 ) -> None:
-    """Serve until the master is stopped."""
+    """Serve until the master is told to stop."""
     try:
         if rosout:
             await rosout.start()
@@ -328,7 +329,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master. If it is ROS's rosmaster, get the data from its API."""
+    """Print one line about the running master. For ROS's rosmaster, get the data from its API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -362,7 +363,7 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Warn if no node can reach ROS_IP: it is usually an address in another network."""
+    """Warn if no node can reach ROS_IP, which is usually an address in another network."""
     why = wrong_address(environment)
     if why:
         warn(f"{why} (`minirospy doctor` shows more)")
@@ -380,7 +381,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
     warn(f"ROS_MASTER_URI {what}: nodes find it with ROS_MASTER_URI={master.uri.rstrip('/')}")
 
 
-def _most_clients() -> int:
+def _max_clients() -> int:
     """Raise the open-file limit. Return the number of clients that it allows, with some files reserved for other uses."""
     if sys.platform == "win32":
         return 400
@@ -406,7 +407,7 @@ def _stop_event() -> asyncio.Event:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
-            # On Windows, the handler runs in the main thread, but only when the loop in this thread wakes up.
+            # On Windows, the handler runs in the main thread, but not before the loop in this thread wakes up.
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
     if sys.platform == "win32":
         _keep_waking(loop)
@@ -441,7 +442,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
-        # The master is running, because its journal is still locked, but it does not respond.
+        # The master's journal is still locked, so the master is running, but it does not respond.
         silence = (
             f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
         )
@@ -483,7 +484,7 @@ class _Shown(logging.Handler):
 def _show(line: str) -> None:
     """Print a line. If stdout is closed (`roscore -v | head`), continue without printing."""
     with contextlib.suppress(OSError):
-        # Use a single write, because a thread prints the warning about ROS_MASTER_URI.
+        # Use a single write, because another thread prints the warning about ROS_MASTER_URI.
         print(f"{line}\n", end="", flush=True)
 
 

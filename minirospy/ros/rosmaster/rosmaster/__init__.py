@@ -6,25 +6,11 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.ros.submodules import on_first_use
-
 if TYPE_CHECKING:
     from minirospy.ros.rosmaster.rosmaster import master as master
     from minirospy.ros.rosmaster.rosmaster.master import DEFAULT_MASTER_PORT
 
 __all__ = ["DEFAULT_MASTER_PORT", "rosmaster_main"]
-
-__getattr__ = on_first_use(
-    "rosmaster",
-    "exceptions",
-    "main",
-    "master_api",
-    "paramserver",
-    "registrations",
-    "threadpool",
-    "util",
-    "validators",
-)
 
 
 def rosmaster_main(argv: Sequence[str] | None = None) -> int:

@@ -8,7 +8,10 @@ __all__ = ["DEFAULT_MASTER_PORT", "Master"]
 
 
 class Master:
-    """A master that listens on ``port`` between :meth:`start` and :meth:`stop`; ``uri`` is its URI. It stores nothing on disk."""
+    """A master that serves on ``port`` between :meth:`start` and :meth:`stop`; ``uri`` is its URI.
+
+    It stores nothing on disk.
+    """
 
     def __init__(self, port: int = DEFAULT_MASTER_PORT, num_workers: int = 3) -> None:
         self.port = port

@@ -79,7 +79,7 @@ def service_update_task(api: str, service: str, uri: str) -> None:
 
 
 class _Api(MasterApi):
-    """The Master API's tables and responses. Notifications for nodes are put into ``notices``."""
+    """The tables and responses of the Master API. Notifications for nodes are put into ``notices``."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -97,7 +97,7 @@ class _Api(MasterApi):
         self.notices.put(action)
 
     def defer(self, uri: str, topic: str) -> None:
-        """Do nothing. Deferring has no effect here, because a notification contains the state at the time when it is sent."""
+        """Do nothing: deferring makes no difference, because a notification contains the state at the time it is sent."""
 
     def stop(self) -> None:
         """Stop sending notifications."""

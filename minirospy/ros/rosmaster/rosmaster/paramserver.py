@@ -47,7 +47,7 @@ class ParamDictionary:
         return self._tree.search(ns, key)
 
     def get_param(self, key: str) -> object:
-        """Return a parameter's value, or a namespace as a dictionary. Raise KeyError if neither is set."""
+        """Return a parameter's value, or a namespace as a dictionary. Raise KeyError if it does not exist."""
         return self._tree.get(key)
 
     def has_param(self, key: str) -> bool:
@@ -63,7 +63,7 @@ class ParamDictionary:
         self._notify(self._tree.set(key, value, caller_id or ""), notify_task)
 
     def delete_param(self, key: str, notify_task: Notify | None = None) -> None:
-        """Delete a parameter or a namespace. Raise KeyError if neither is set."""
+        """Delete a parameter or a namespace. Raise KeyError if it does not exist."""
         if key == "/":
             raise KeyError("cannot delete root of parameter tree")
         self._notify(self._tree.delete(key), notify_task)

@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Ask a node to shut down. Ignore a node that does not respond, because it has probably exited already."""
+    """Ask a node to shut down. Ignore a node that does not respond; it has probably exited already."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")

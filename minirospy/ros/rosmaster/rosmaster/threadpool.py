@@ -60,7 +60,7 @@ class MarkedThreadPool:
             return True
 
     def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
-        """Stop the threads; if requested, first run the queued tasks. The pool can be reused afterwards."""
+        """Stop the threads; if requested, run the queued tasks first. The pool can be reused afterwards."""
         with self._changed:
             self._is_joining = True
             while wait_for_tasks and self._tasks and self._threads:
@@ -91,7 +91,7 @@ class MarkedThreadPool:
                 if task.on_result:
                     task.on_result(result)
             except Exception:
-                # Catch every exception, because the caller's task may raise any.
+                # Catch every exception, because the caller's task may raise any kind.
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:

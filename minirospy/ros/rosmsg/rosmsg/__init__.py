@@ -307,7 +307,7 @@ def _parse(parser: OptionParser, argv: Sequence[str] | None) -> tuple[Values, li
 
 
 def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
-    """Return the options and the only name on this process's command line; if there is no name, read it from stdin."""
+    """Return the options and the only name on this process's command line. If there is no name, read one from stdin."""
     options, words = parser.parse_args(sys.argv[2:])
     if len(words) > 1:
         parser.error(f"you may only specify one {full}")

@@ -88,7 +88,7 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error for a missing node name. The error lists the nodes if a master responds."""
+    """Return the error for a missing node name. It lists the nodes if a master responds."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
@@ -284,7 +284,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return those of ``names`` that are nodes; print an error for each other name."""
+    """Return the ``names`` that are nodes; print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

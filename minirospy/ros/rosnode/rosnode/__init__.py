@@ -80,7 +80,7 @@ def get_node_names(namespace: str | None = None) -> list[str]:
 
 
 def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = False) -> str | None:
-    """Return a node's URI, or None if the node is not registered. The master is always queried."""
+    """Return a node's URI, or None if the node is not registered. Always queries the master."""
     with _graph(master) as graph:
         return graph.node_uri(caller_id)
 
@@ -196,7 +196,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
     As in ROS, raise ConnectionRefusedError if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
-        # Query the master even if the list is empty, because an unreachable master is an error.
+        # Query the master even if the list is empty, because an unreachable master is an error here.
         graph.state()
         for node in graph.addresses(blacklist):
             print(f"Unregistering {node.name}")
@@ -276,7 +276,7 @@ def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
 
 
-# The following private functions of ROS's rosnode are called by programs.
+# Programs call the following private functions of ROS's rosnode.
 
 
 def _run_verb(name: str, argv: Sequence[str]) -> int | None:
@@ -317,7 +317,7 @@ def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
 
 
 def _fullusage(return_error: bool = True) -> NoReturn:
-    """Print the list of commands, and exit with the status of a usage error, or 0."""
+    """Print the list of commands and exit, with status 0 or that of a usage error."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     status = main([])
@@ -371,7 +371,7 @@ def _graph(
     master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
 ) -> Iterator[Graph]:
     """Yield the graph of ``master`` (default: the environment's master); convert errors to this module's exceptions."""
-    # Old scripts pass a ServerProxy, which returns some object for any attribute, but never a string.
+    # Old scripts pass a ServerProxy, which returns an object for any attribute, but never a string.
     uri = getattr(master, "master_uri", None)
     try:
         with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:

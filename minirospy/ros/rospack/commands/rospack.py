@@ -96,7 +96,7 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
             print(_help(tool, line.package))
             return 0
         if not line.verb:
-            # Exit with 0, because rospack does not treat this as a failure.
+            # Exit with 0: rospack does not treat this as a failure.
             complain("Error", f"no command given.  Try '{tool.name} help'")
             return 0
         tree = Dependencies(
@@ -232,8 +232,8 @@ def _depends_manifests(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # Only check the package: rosbuild created these files when it generated messages, and catkin packages do not
-    # contain them.
+    # Only check the package.
+    # rosbuild created these files when it generated messages, and catkin packages do not contain them.
     tree.all(_package(line))
     print()
 
@@ -257,8 +257,7 @@ def _rosdep0(line: _Line, tree: Dependencies) -> None:
 
 
 def _vcs(line: _Line, tree: Dependencies) -> None:
-    # Only check that the package exists: <versioncontrol> is a tag in manifest.xml that does not exist in
-    # package.xml.
+    # Only check that the package exists: <versioncontrol> is a tag of manifest.xml that package.xml does not have.
     tree.folder(_package(line))
 
 

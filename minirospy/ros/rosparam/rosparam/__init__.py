@@ -88,7 +88,7 @@ class RosParamIOException(RosParamException):
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
-    """Raised if the YAML is invalid. Programs catch either of the two base classes."""
+    """Raised if the YAML is invalid. Programs catch one or the other of the two base classes."""
 
 
 def get_param(param: str) -> Any:
@@ -123,7 +123,7 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """Replace Binary by bytes, and numpy numbers and arrays by Python numbers and lists, in a value."""
+    """In a value, replace Binary with bytes, and numpy's numbers and arrays with Python's numbers and lists."""
     if is_numpy(value):
         return _with_bytes(value.tolist())  # type: ignore[attr-defined]
     if isinstance(value, Binary):
@@ -156,7 +156,7 @@ def delete_param(param: str, verbose: bool = False) -> None:
 
 
 def print_params(params: object, ns: str) -> None:
-    """Print parameters, one ``name=value`` per line; print a single value alone."""
+    """Print parameters, one ``name=value`` per line; if there is only a value, print just that."""
     if isinstance(params, dict):
         for name, value in parameters.flatten(ns, params):
             print(f"{name}={value}")
@@ -239,7 +239,7 @@ def yamlmain(argv: Sequence[str] | None = None) -> None:
         sys.exit(status)
 
 
-# The following private functions of ROS's rosparam are called by programs.
+# Programs call the following private functions of ROS's rosparam.
 
 
 def _run_verb(name: str, argv: Sequence[str]) -> None:
@@ -296,7 +296,7 @@ def _pretty_print(value: dict[str, object], indent: str = "") -> None:
 
 
 def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[Values, list[str]]:
-    """Parse a command line of `rosparam set`, where values may be negative numbers; return the options and values."""
+    """Parse a command line of `rosparam set`, in which values may be negative numbers; return the options and values."""
     values: list[str] = []
     options: list[str] = []
     takes_value = False
@@ -358,7 +358,7 @@ def represent_foo(loader: Any, data: str) -> Any:
     return loader.represent_scalar("#", data)
 
 
-# As in ROS, importing rosparam lets PyYAML's own loaders read deg(90) and rad(pi/2), and return bytes as Binary.
+# As in ROS, importing rosparam makes PyYAML's own loaders read deg(90) and rad(pi/2), and return bytes as Binary.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
     _loader.add_constructor("!degrees", construct_angle_degrees)

@@ -75,7 +75,10 @@ class Manifest:
         self.unknown_tags: list[str] = []
 
     def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """Return the values of an attribute in all exports with this tag. If ``convert``, replace ``${prefix}`` by the folder."""
+        """Return the values of an attribute in all exports with this tag.
+
+        If ``convert``, replace ``${prefix}`` with the folder.
+        """
         values = [export.attrs[attr] for export in self.exports if export.tag == tag and attr in export.attrs]
         folder = os.path.dirname(self.filename)
         return [value.replace("${prefix}", folder) if convert else value for value in values]

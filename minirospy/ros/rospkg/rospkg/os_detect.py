@@ -89,7 +89,7 @@ _OF_FDO = {
     "raspbian": OS_DEBIAN, "rhel": OS_RHEL, "rocky": OS_ROCKY, "sailfishos": OS_SAILFISHOS, "slackware": OS_SLACKWARE,
     "tizen": OS_TIZEN, "ubuntu": OS_UBUNTU, "zorin": OS_ZORIN,
 }  # fmt: skip
-"""Maps an ID in /etc/os-release to rospkg's name for the system."""
+"""rospkg's names of systems, keyed by their ID in /etc/os-release."""
 
 
 class OsNotDetected(Exception):

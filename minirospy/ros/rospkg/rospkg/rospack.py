@@ -100,7 +100,7 @@ class ManifestManager:
                 if name in self.get_depends(other, implicit):
                     found.append(other)
             except InvalidManifest:
-                # Ignore an invalid manifest, so that it does not affect other packages.
+                # Ignore an invalid manifest, which must not affect other packages.
                 continue
         return found
 
@@ -113,7 +113,7 @@ class ManifestManager:
         self._custom[key] = value
 
     def _load_manifest(self, name: str) -> Manifest:
-        # Programs call this method, although it is also private in rospkg.
+        # Programs call this method although it is private in rospkg, too.
         return self.get_manifest(name)
 
     def _folders(self) -> dict[str, Path]:
@@ -207,7 +207,7 @@ def get_package_name(path: str) -> str | None:
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """Replace metapackages by their packages; return (packages, unknown names)."""
+    """Replace metapackages with their packages; return (packages, unknown names)."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():

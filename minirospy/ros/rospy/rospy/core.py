@@ -49,16 +49,12 @@ if TYPE_CHECKING:
     from rosgraph_msgs.msg import Log
 
     from minirospy.client.log import Keywords
-    from minirospy.ros.rospy.rospy.passing import core_dir as __dir__
-    from minirospy.ros.rospy.rospy.passing import core_getattr as __getattr__
 
 __all__ = [
     "MASTER_NAME",
     "ROSRPC",
     "Log",
     "NullHandler",
-    "__dir__",
-    "__getattr__",
     "_base_logger",
     "add_client_shutdown_hook",
     "add_preshutdown_hook",
@@ -131,7 +127,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log with the source position of the caller's caller. rospy's log functions wrap this function; programs may do the same.
+    """Log a message with the source position of the caller's caller. rospy's log functions wrap this function.
 
     ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """
@@ -156,7 +152,7 @@ def is_initialized() -> bool:
 
 
 def is_shutdown_requested() -> bool:
-    """Return whether a shutdown has started. While its hooks run, is_shutdown() still returns False."""
+    """Return whether a shutdown has started. is_shutdown() still returns False while its hooks run."""
     return current_session().lifecycle.is_shutdown_requested
 
 
@@ -170,7 +166,7 @@ def add_preshutdown_hook(h: Callable[[object], object]) -> None:
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after is_shutdown() has started to return True. Raise TypeError if ``h`` is not callable."""
+    """Call ``h(reason)`` once is_shutdown() returns True. Raise TypeError if ``h`` is not callable."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
@@ -217,7 +213,7 @@ def is_topic(param_name: str) -> Validator:
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
-    """Wrap ``h`` as a hook without an argument, for the lifecycle. Raise TypeError if ``h`` is not callable."""
+    """Wrap ``h`` as a hook without arguments for the lifecycle. Raise TypeError if ``h`` is not callable."""
     if not callable(h):
         raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
     lifecycle = current_session().lifecycle

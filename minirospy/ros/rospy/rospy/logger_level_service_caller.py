@@ -35,7 +35,7 @@ class LoggerLevelServiceCaller:
         return sorted(name.removesuffix(_SET) for name in names if name.endswith(_SET))
 
     def get_loggers(self, node: str) -> list[str]:
-        """Return the names of a node's loggers, and cache their levels.
+        """Return the names of a node's loggers; cache their levels.
 
         Raise ROSConsoleException if the node does not respond.
         """

@@ -38,7 +38,7 @@ _master_arg_remap = {
         "unsubscribeParam",
     )
 }
-"""Maps each method to the positions of arguments that are graph resource names. The caller's name is not counted."""
+"""Positions of the arguments that are graph resource names, keyed by method. The caller's name is not counted."""
 
 
 class ServerProxy:
@@ -148,7 +148,7 @@ def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)
 
 
-# Cache the proxy per process, because a forked child must not use its parent's connections.
+# Cache the proxy per process: a forked child must not use its parent's connections.
 @functools.cache
 def _master(uri: str, pid: int) -> MasterProxy:
     return MasterProxy(uri)

@@ -102,7 +102,7 @@ def get_resolved_mappings() -> dict[str, str]:
 
 
 def reload_mappings(argv: Sequence[str]) -> None:
-    """Replace this node's command line by ``argv``."""
+    """Replace this node's command line with ``argv``."""
     current_session().identity.reload_arguments(argv)
 
 
@@ -118,7 +118,7 @@ def initialize_mappings(node_name: str) -> None:
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """Return a topic's global name, before init_node has been called. Raise ValueError if the name is private."""
+    """Return a topic's global name before init_node has been called. Raise ValueError if the name is private."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return current_session().identity.resolve_topic(name or "")

@@ -10,8 +10,6 @@ from minirospy.ros.rospy.rospy.core import topics_logger as _logger
 from minirospy.ros.rospy.rospy.impl.registration import Registration, get_topic_manager
 from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
 from minirospy.ros.rospy.rospy.msg import serialize_message
-from minirospy.ros.rospy.rospy.passing import topics_dir as __dir__
-from minirospy.ros.rospy.rospy.passing import topics_getattr as __getattr__
 
 __all__ = [
     "DEFAULT_BUFF_SIZE",
@@ -26,8 +24,6 @@ __all__ = [
     "_PublisherImpl",
     "_SubscriberImpl",
     "_TopicImpl",
-    "__dir__",
-    "__getattr__",
     "_logger",
     "args_kwds_to_message",
     "get_topic_manager",

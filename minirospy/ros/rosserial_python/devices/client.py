@@ -288,7 +288,7 @@ class SerialClient:
             info = _info(data)
             known = self.subscribers.get(info.topic_name)
             if known is None:
-                # Set the size before the first message arrives.
+                # Set the size before the first message can arrive.
                 self.setSubscribeSize(info.buffer_size)
                 self.subscribers[info.topic_name] = Subscriber(info, self.send)
                 rospy.loginfo("Setup subscriber on %s [%s]", info.topic_name, info.message_type)
@@ -304,7 +304,7 @@ class SerialClient:
                     info.message_type,
                 )
             else:
-                # A device that has restarted may number its topics differently.
+                # A device may number its topics differently after a restart.
                 known.id = info.topic_id
 
     def setupServiceServerPublisher(self, data: bytes) -> None:
@@ -324,7 +324,7 @@ class SerialClient:
         self._set_up_half(data, ServiceClient, "client", from_device=False)
 
     def _set_up_half(self, data: bytes, kind: type[_Service], name: str, *, from_device: bool) -> None:
-        """Register one direction of a service's calls: from the device, or to the device."""
+        """Register one direction of a service's calls: from the device or to the device."""
         with _Creation(f"service {name}"):
             info = _info(data)
             (self.setPublishSize if from_device else self.setSubscribeSize)(info.buffer_size)
@@ -413,7 +413,7 @@ def _info(data: bytes) -> TopicInfo:
 
 
 class _Creation:
-    """A context manager that logs and suppresses errors in creating a topic or service."""
+    """A context manager that logs and suppresses errors raised while a topic or service is created."""
 
     def __init__(self, what: str) -> None:
         self._what = what

@@ -184,7 +184,7 @@ class ServiceClient(_Service):
             except rospy.ROSInterruptException:
                 return
             except rospy.ROSException as error:
-                # Send no response: the device waits until its own timeout.
+                # Send no response; the device stops waiting after its own timeout.
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
             except rospy.ServiceException as error:
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)

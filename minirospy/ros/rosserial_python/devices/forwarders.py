@@ -105,7 +105,10 @@ class Subscriber(endpoints.Subscriber):
 
 
 class ServiceServer(endpoints.ServiceServer):
-    """A service that the device provides. Set ``id`` to the topic on which the device receives requests."""
+    """A service that the device provides.
+
+    ``id`` is the id of the topic on which the device receives requests; set it before use.
+    """
 
     def __init__(self, topic_info: TopicInfo, parent: Parent) -> None:
         self.parent = parent
@@ -129,7 +132,10 @@ class ServiceServer(endpoints.ServiceServer):
 
 
 class ServiceClient:
-    """Service calls from the device. Set ``id`` to the topic on which the device receives responses."""
+    """Service calls from the device.
+
+    ``id`` is the id of the topic on which the device receives responses; set it before use.
+    """
 
     def __init__(self, topic_info: TopicInfo, parent: Parent) -> None:
         """Wait for the service. Raise AttributeError if the service's type is not installed."""

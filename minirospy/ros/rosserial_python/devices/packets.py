@@ -31,7 +31,7 @@ class Fault(NamedTuple):
 
 
 class WrongVersion(NamedTuple):
-    """The second byte belongs to another protocol version, or the data is not a packet."""
+    """The second byte belongs to another protocol version, or the data is not a packet at all."""
 
     byte: int
 
@@ -75,7 +75,7 @@ class Decoder:
 
     @property
     def step(self) -> str:
-        """Return the part of a packet to read next, as named by the real rosserial_python."""
+        """Return which part of a packet to read next, with the real rosserial_python's name for it."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:

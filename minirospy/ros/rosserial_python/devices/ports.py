@@ -131,7 +131,7 @@ class SocketPort:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Do nothing: a new TCP connection has no stray bytes."""
+        """Do nothing, because a new TCP connection has no stray bytes."""
 
     def close(self) -> None:
         """Close the connection."""
@@ -169,4 +169,4 @@ class FilePort:
             flush()
 
     def close(self) -> None:
-        """Leave the object open, because it belongs to the program."""
+        """Leave the object open: it belongs to the program."""

@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
 
 
 def _param(name: str, default: object) -> object:
-    """Return a private parameter, else rosserial_embeddedlinux's parameter of that name, which older launch files set."""
+    """Return a private parameter; its default is rosserial_embeddedlinux's parameter of that name, for older launch files."""
     return rospy.get_param(f"~{name}", rospy.get_param(f"{_OTHER}/{name}", default))
 
 

@@ -60,7 +60,7 @@ def _info(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
         name = graph.resolve(service)
         offer = services.service_offer(graph, name)
-        # Print the master's information before calling the node, because the node may have exited.
+        # Print the master's information before calling the node, which may have exited.
         print(f"Node: {offer.node}\nURI: {offer.uri}", flush=True)
         type_ = services.service_type(graph, name)
     print(f"Type: {type_}\nArgs: {' '.join(services.service_arguments(type_))}")
@@ -173,7 +173,7 @@ def _call(
 
 
 def _as_ros_shows(error: ServiceException, service: str) -> str:
-    """Return ROS's message for an error. An error from the service's handler is printed as bytes."""
+    """Return ROS's message for an error. ROS prints an error from the service's handler as bytes."""
     cause = error.__cause__
     if isinstance(cause, CallFailed):
         return f"service [{service}] responded with an error: {cause.text!r}"

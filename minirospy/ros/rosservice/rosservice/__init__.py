@@ -139,7 +139,7 @@ def rosservice_find(service_type: str) -> list[str]:
     with _graph() as graph:
         if service_type:
             return services.find_services_of_type(graph, service_type)
-        # Query the master even though no service can match: as in ROS, an unreachable master is an error.
+        # Query the master even if no service can match: as in ROS, an unreachable master is an error.
         services.list_services(graph)
         return []
 
@@ -181,7 +181,7 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
         sys.exit(status)
 
 
-# The following private functions of ROS's rosservice are called by programs.
+# Programs call the following private functions of ROS's rosservice.
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
@@ -336,12 +336,12 @@ def _fullusage() -> None:
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Resolve a name to a global name. As in ROS, a value of another type becomes a name that matches no service."""
+    """Resolve a name to a global name. As in ROS, a value of another type yields a name that matches no service."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the global name to send to the master. Raise TypeError if XML-RPC does not support the value's type."""
+    """Return the global name to send to the master. Raise TypeError if XML-RPC has no type for the value."""
     check_sendable(name)
     return _resolved(graph, name)
 

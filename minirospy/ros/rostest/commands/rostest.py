@@ -96,7 +96,7 @@ def _rostest(
     from minirospy.ros.rostest.runner.runner import RosTest
 
     base = _base(results_base_dir)
-    # Delete the boards that test nodes create, such as MINIROSPY_BOARD=$(anon test), when the nodes exit.
+    # When the nodes exit, delete the boards that test nodes create, such as MINIROSPY_BOARD=$(anon test).
     os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,
@@ -188,7 +188,7 @@ def _rosunit(
 
 
 def _told(own: Result, results: Result, runner: str, output: Path | None) -> int:
-    """Write the results to ``output``, if given, and print them; return the exit status."""
+    """Write the results to ``output`` if it is given, and print them; return the exit status."""
     if output is not None:
         own.write(output)
         failed = [case.name for case in own.test_case_results if case.failures]

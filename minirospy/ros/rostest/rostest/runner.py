@@ -55,7 +55,7 @@ _run = _Run()
 
 
 class RosTestCase(unittest.TestCase):
-    """Declares the attributes of :func:`createUnitTest`'s classes. Programs may also define such classes."""
+    """Declares the attributes of the classes that :func:`createUnitTest` returns. Programs may also define such classes."""
 
     config: ROSLaunchConfig
     test_file: str
@@ -78,7 +78,7 @@ def getConfig() -> ROSLaunchConfig | None:
 
 
 def getRostestParents() -> list[ROSTestLaunchParent]:
-    """Return all tests' launches, so that each can be torn down at the end."""
+    """Return the launches of all tests, so that each one can be torn down at the end."""
     return _run.parents
 
 
@@ -88,7 +88,7 @@ def _accumulateResults(results: Result) -> None:
 
 
 def _addRostestParent(runner: ROSTestLaunchParent) -> None:
-    """Add a launch to those of :func:`getRostestParents`; its configuration becomes that of :func:`getConfig`."""
+    """Add a launch to those of :func:`getRostestParents`, and make its configuration that of :func:`getConfig`."""
     _run.parents.append(runner)
     _run.config = runner.config
 
@@ -119,7 +119,7 @@ def failDuplicateRunner(testName: str) -> TestMethod:
 
 
 def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None) -> TestMethod:
-    """Return a test method that launches the nodes and runs a ``<test>``. It retries as often as the tag allows.
+    """Return a test method that launches the nodes and runs a ``<test>``. It retries the test as often as the tag allows.
 
     The method reads the results from the test's XML file, in the package's folder below ``results_base_dir``.
     """

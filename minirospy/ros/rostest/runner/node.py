@@ -42,7 +42,7 @@ def run(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Call rosrun. This is the function's old name."""
+    """Call rosrun; an old name of that function."""
     rosrun(package, test_name, test, sysargs)
 
 

@@ -31,7 +31,7 @@ _Item: TypeAlias = dict[str, Any]  # an item in a list parameter: a name, and th
 def main(name: str) -> None:
     """Run one of the test nodes, as the main function of its program."""
     test = _TESTS[name]
-    # In ROS, the program itself defines the class, so the results contain this module name.
+    # In ROS, the class is defined in the program itself, so the results contain this module name.
     test.__module__ = "__main__"
     rosrun("rostest", name, test)
 

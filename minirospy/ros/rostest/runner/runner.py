@@ -112,7 +112,7 @@ class RosTest:
         return ""
 
     def _try(self, test: TestSpec, case: TestCaseResult) -> None:
-        """Run a test once and record in ``case`` any errors that are not in the test's own results."""
+        """Run a test once; record in ``case`` any errors that are not in the test's own results."""
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()
@@ -156,7 +156,7 @@ class RosTest:
         node = replace(
             test.node,
             args=" ".join(filter(None, words)),
-            # When the test exits, the whole launch stops.
+            # The whole launch stops when the test exits.
             required=True,
             output="screen" if self.text else "log",
         )

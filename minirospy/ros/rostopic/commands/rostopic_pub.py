@@ -35,15 +35,15 @@ __all__ = ["VERB"]
 _SHIELD = "\0"
 _NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\Z", re.IGNORECASE)
 
-_LATCH_SECONDS = 3.0
+LATCH_SECONDS = 3.0
 _FILE_RATE = 10.0
 _CONNECT_SECONDS = 0.5
-_REGISTERED_CONNECT_SECONDS = 5.0
+REGISTERED_CONNECT_SECONDS = 5.0
 _CLOCK_SECONDS = 5.0
 
 
 class _PubParser(Parser):
-    """Accepts negative numbers as values, despite the option `-1`."""
+    """A parser that accepts negative numbers as values, despite the option `-1`."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Parse the arguments to a dict keyed by name. Accept negative numbers as values."""
@@ -155,7 +155,7 @@ class _Publishing(NamedTuple):
 
 def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     """Publish messages. ``arguments`` are the remapping arguments on the command line."""
-    # Import fill_message here, because the other verbs do not need message classes.
+    # Imported here, because the other verbs do not need message classes.
     from minirospy.introspect.echo import fill_message
     from minirospy.introspect.publishing import publish_all, values_to_publish
 
@@ -163,7 +163,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
-        # Parse the values before starting the node, so that a typo is reported immediately.
+        # Parse the values before starting the node, so that it reports a typo immediately.
         values = _first_values(all_values, options)
         message = _filled(cls, values)
         state = graph.state()
@@ -192,7 +192,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
         messages: Iterable[Message] = itertools.repeat(message)
         if from_documents:
             # Wait for subscribers to connect, because otherwise the first messages from a file would be lost.
-            seconds = _REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
+            seconds = REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
             publisher.wait_for_subscriber(node.wait, seconds)
             messages = itertools.chain([message], map(filled, all_values))
         elif options.substitute_keywords:
@@ -250,7 +250,7 @@ def _filled(cls: type[Message], values: list[object]) -> Message:
         return fill_message(cls, values)
     except MessageException as error:
         if isinstance(error.__cause__, SerializationError):
-            raise  # ROS detects these errors only when it publishes, and does not print them
+            raise  # ROS only detects these errors when it publishes, and does not print them
         text = f"ERROR: {error.__cause__ or error}\n\nArgs are: [{get_printable_message_args(cls())}]"
         raise WordedError(error, RosText(text)) from error
 
@@ -262,11 +262,11 @@ def _warn_of_other_type(graph: Graph, topic: str, type_: str) -> None:
 
 
 def _latch(node: ToolNode, publisher: TopicPublisher, message: Message, options: _Publishing) -> None:
-    how_long = f" for {_LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
+    how_long = f" for {LATCH_SECONDS} seconds" if options.once else ". Press ctrl-C to terminate"
     shown = f"[{message}]" if options.verbose else "message"
     print(f"publishing and latching {shown}{how_long}", flush=True)
     publisher.publish(message)
-    while not node.wait(_LATCH_SECONDS):
+    while not node.wait(LATCH_SECONDS):
         if options.once:
             return
 

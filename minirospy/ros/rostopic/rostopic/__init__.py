@@ -122,7 +122,7 @@ __all__ = [
 
 NAME = "rostopic"
 _Topic = tuple[str, str, list[str]]
-# (topic, type, nodes that publish or subscribe to the topic)
+# (topic, type, nodes), where the nodes publish or subscribe to the topic
 _TopicRow = tuple[str, str, list[str]]
 
 
@@ -196,7 +196,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat the step as the name of a field that no message has.
+        # Treat the step as the name of a field, one that no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def report(error: NotFoundError | IndexError) -> None:
@@ -291,7 +291,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
-# The following private functions of ROS's rostopic are called by programs.
+# Programs call the following private functions of ROS's rostopic.
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:

@@ -139,7 +139,7 @@ class ROSTopicDelay:
 
 
 def _now() -> float:
-    # A subscriber has already imported rospy by the time its first message arrives.
+    # A subscriber has imported rospy by the time its first message arrives.
     from minirospy.client import get_time
 
     return get_time()

@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-from minirospy.ros.submodules import on_first_use
-
 if TYPE_CHECKING:
     from minirospy.ros.rosunit.rosunit import baretest as baretest
     from minirospy.ros.rosunit.rosunit import core as core
@@ -33,8 +31,6 @@ __all__ = [
 ]
 
 __version__ = "1.0.0"
-
-__getattr__ = on_first_use("rosunit", "pmon")
 
 
 def rosunitmain() -> None:

@@ -29,7 +29,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Make Ctrl-C set the event instead of raising an exception, which could leave a new process running."""
+    """Make Ctrl-C set the event; an exception could leave a new process running."""
     noted = SignalSafeEvent()
     before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:
@@ -49,7 +49,7 @@ def run_bare(
     seconds: float,
     text: bool,
 ) -> tuple[Result, TestCaseResult]:
-    """Run a Python file or executable for at most ``seconds``; return (its results, the result of the run itself).
+    """Run a Python file or executable for at most ``seconds``; return the results of its tests and that of the whole run.
 
     If ``text``, the test prints its results and writes no file, so the exit status determines the result.
     """

@@ -205,7 +205,7 @@ class _Recorder(unittest.TestResult):
         self._note(test, (TestFailure if is_failure else TestError)(kind, text))
 
     def addUnexpectedSuccess(self, test: unittest.TestCase) -> None:
-        # Like wasSuccessful(), count the unexpected success as a failure.
+        # Like wasSuccessful(), count an unexpected success as a failure.
         super().addUnexpectedSuccess(test)
         text = "the test was expected to fail, and did not"
         self.failures.append((test, text))
@@ -217,7 +217,7 @@ class _Recorder(unittest.TestResult):
             self._case.skipped = reason
 
     def _note(self, test: unittest.TestCase, info: TestInfo) -> None:
-        # startTest has not been called if setUpClass or setUpModule fails.
+        # If setUpClass or setUpModule fails, startTest has not been called.
         case = self._case or _case_of(test)
         (case.add_error if isinstance(info, TestError) else case.add_failure)(info)
         if self._case is None:
@@ -238,7 +238,7 @@ def _case_of(test: unittest.TestCase) -> TestCaseResult:
 
 
 def _told(err: ExcInfo) -> tuple[str, str]:
-    """Return an exception's name, and its message with the traceback, omitting unittest's own lines."""
+    """Return an exception's name, and its message with the traceback without unittest's own lines."""
     kind, error, trace = err
     if kind is None or error is None:
         return "", ""

@@ -55,7 +55,7 @@ def _parser(name: str) -> Parser:
         completer="launch_files",
     )
 
-    # These options of ROS's roswtf have no effect here.
+    # ROS's roswtf has these options; they have no effect here.
     parser.accept(
         "--all", help="run roswtf against all packages" if is_roswtf else "accepted, without effect"
     )
@@ -81,7 +81,7 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
     if machines and offline:
         raise Misuse(f"{machines[0]}: to try another machine needs the network")
 
-    # Suppress the log of the node that runs the checks, because the checks report the same errors.
+    # Suppress the log of the node that runs the checks: the checks themselves report these errors.
     logging.getLogger("minirospy").addHandler(logging.NullHandler())
     show = _show_json if json else _show
     counts = dict.fromkeys(Status, 0)
@@ -104,7 +104,7 @@ def _is_file(word: str) -> bool:
 
 
 def _wait_for_signal() -> None:
-    """Wait for Ctrl-C or SIGTERM, so that the listener unregisters before the process exits."""
+    """Wait for Ctrl-C or SIGTERM, and let the listener unregister before the process exits."""
     stop = threading.Event()
     for number in (*interrupt_signals(), signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -120,7 +120,7 @@ def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -
 
 
 def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
-    """Yield findings on whether a launch file loads, and whether the programs that it starts exist."""
+    """Yield findings about whether a launch file loads and whether the programs that it starts exist."""
     from minirospy.base.errors import MinirospyError
     from minirospy.ros.roslaunch.launcher.command import node_command
     from minirospy.ros.roslaunch.launcher.load import load_files

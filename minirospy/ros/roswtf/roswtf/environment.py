@@ -127,7 +127,7 @@ def _not_folders(path: str | None) -> list[str]:
 
 
 def _not_package_folders(path: str | None) -> list[str]:
-    # In a catkin workspace, the folder share is followed by a folder for stacks, which need not exist.
+    # A catkin workspace adds the folder share and then a folder for stacks, which need not exist.
     return [
         each
         for each in _not_folders(path)

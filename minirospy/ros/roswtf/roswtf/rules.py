@@ -15,7 +15,7 @@ __all__ = ["error_rule", "warning_rule"]
 
 
 class Context(Protocol):
-    """The object that roswtf's rules check."""
+    """The object that roswtf's rules examine."""
 
     errors: list[WtfError]
     warnings: list[WtfError]

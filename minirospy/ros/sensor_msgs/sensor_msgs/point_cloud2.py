@@ -50,9 +50,9 @@ _DATATYPES: dict[int, tuple[str, int]] = {
 }
 """The format character and size in bytes, keyed by field datatype."""
 
-_BLOCK = 4_096  # number of points read at a time, so that they fit into the processor's cache
+_BLOCK = 4_096  # number of points to read per step, small enough for the processor's cache
 
-_FEW = 1_000  # number of points below which numpy is slower than plain Python
+_FEW = 1_000  # number of points below which plain Python is faster than numpy
 
 
 class Column(NamedTuple):
@@ -85,8 +85,7 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # Most of the time goes into creating the tuples. zip is the fastest way: it reuses tuples that the caller has
-        # dropped.
+        # Creating the tuples takes most of the time. zip is fastest: it reuses tuples that the caller has dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
 
@@ -106,8 +105,8 @@ def read_points_list(
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Convert the first point here, to raise TypeError immediately if a field has more than one value. One point is
-    # enough, because all points have the same number of values.
+    # Convert the first point here, so that a field with more than one value raises TypeError immediately.
+    # One point is enough: all have the same number of values.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -238,7 +237,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
     """Yield the byte offset and (rows, columns) of each block of a cloud, in the order of the points."""
     height, width = cloud.height, cloud.width
     if cloud.row_step == width * cloud.point_step:
-        # If there is no padding between the rows, treat them as one row.
+        # If there is no padding between the rows, treat them as a single row.
         height, width = 1, height * width
     rows = max(1, _BLOCK // width)
     for row in range(0, height, rows):
@@ -310,7 +309,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the packed data if all points and fields are floats, or None if ``struct`` must pack them."""
+    """Return the packed data if all points and fields are floats; return None if ``struct`` must pack them."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

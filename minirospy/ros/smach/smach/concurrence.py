@@ -19,7 +19,7 @@ from minirospy.ros.smach.smach.util import is_shutdown
 
 __all__ = ["Concurrence"]
 
-_SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
+_SHUTDOWN_CHECK = 0.1  # seconds between checks for a shutdown
 
 
 class Concurrence(Container):
@@ -42,7 +42,7 @@ class Concurrence(Container):
         """Create the container. ``outcome_map`` maps an outcome to a dict from label to that state's outcome.
 
         ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states).
-        If it returns a truthy value, the other states are preempted.
+        If it returns a true value, the other states are preempted.
         """
         known = list(outcomes)
         super().__init__(known, input_keys, output_keys)
@@ -57,7 +57,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below. Notified when the states that are still executing must finish.
+        # Guards the attributes below. Notified when the states that are still executing have to finish.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -187,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the container can finish now that one of its states has finished."""
+        """Return whether the container can finish now that this state has finished."""
         others_end = False
         if self._child_termination_cb:
             try:
@@ -264,7 +264,7 @@ class Concurrence(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add ``userdata`` to the container's userdata; ``initial_states`` has no effect, because all states start."""
+        """Add ``userdata`` to the container's userdata; ``initial_states`` has no effect, because all states are started."""
         if 0 < len(initial_states) < len(self._states):
             logwarn(
                 "Attempting to set initial states in Concurrence container, but Concurrence children are always all "

@@ -85,12 +85,12 @@ class Iterator(Container):
         iterator._final_outcome_map = final_outcome_map or {}
 
     def check_consistency(self) -> None:
-        """Do nothing, as in ROS, because ``execute`` raises an error if there is no state."""
+        """Do nothing, as in ROS: ``execute`` raises an error if there is no state."""
 
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute the state for each item. Return the last outcome, mapped, or the exhausted outcome if no items are left."""
+        """Execute the state for each item. Return the mapped last outcome, or the exhausted outcome if no items are left."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
         self._is_running = True

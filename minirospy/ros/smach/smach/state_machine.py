@@ -44,10 +44,10 @@ class StateMachine(Container):
 
         self._is_running = False
         self._current_label: str | None = None
-        # The state that was preempted, but may not have handled the preemption.
+        # The state that was preempted but may not have handled the preemption yet.
         self._preempted_label: str | None = None
         self._preempted_state: State | None = None
-        # The lock is released only while a state executes, so that a preemption never occurs between two states.
+        # Only released while a state executes, so that a preemption never occurs between two states.
         self._state_transitioning_lock = threading.RLock()
 
     def __getstate__(self) -> dict[str, object]:
@@ -231,7 +231,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """Preempt a state before it executes, if the machine is preempted and the previous state has not handled it."""
+        """If the machine is preempted and the previous state has not handled it, preempt the next state before it executes."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")

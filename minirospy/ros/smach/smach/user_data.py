@@ -98,7 +98,7 @@ class Const:
 
 
 class Remapper:
-    """A state's view of a container's userdata: the declared keys, under the names that the state uses for them.
+    """A state's view of a container's userdata. It contains the declared keys, under the state's own names for them.
 
     A value whose key is an input key but not an output key is read-only (``get_const``). Writing a key that is not an
     output key is logged and has no effect; reading a key that is not an input key raises InvalidUserCodeError.

@@ -1,4 +1,4 @@
-"""A state that waits until a function returns a truthy value."""
+"""A state that waits until a function returns a true value."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ STRUCTURE_TOPIC = "/smach/container_structure"
 
 _QUEUE_SIZE = 20
 _CONNECT_SECONDS = 2.0
-"""Seconds that a command waits for the connection to the server."""
+"""Seconds for which a command waits for the connection to the server."""
 _RESEND_SECONDS = 0.3
 
 

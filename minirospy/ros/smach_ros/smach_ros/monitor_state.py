@@ -12,7 +12,7 @@ from minirospy.ros.smach.smach.user_data import Values
 
 __all__ = ["MonitorState"]
 
-_SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
+_SHUTDOWN_CHECK = 0.1  # seconds between checks for a shutdown
 
 
 class MonitorState(State):

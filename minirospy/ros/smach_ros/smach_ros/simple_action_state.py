@@ -20,7 +20,7 @@ from minirospy.ros.smach_ros.smach_ros.callbacks import StateCallback
 
 __all__ = ["SimpleActionState"]
 
-_LOOK = 0.1  # seconds between two checks for timeouts and for a shutdown
+_LOOK = 0.1  # seconds between checks for timeouts and for a shutdown
 _MINUTE = rospy.Duration(60.0)
 
 
@@ -192,7 +192,7 @@ class SimpleActionState(State):
                     )
                     return False
             elif self.preempt_requested():
-                # Cancel the goal, because the preemption may have been requested just before the goal was sent.
+                # Cancel the goal here, because the preemption may have been requested just before the goal was sent.
                 self._action_client.cancel_goal()
                 cancelled = now
             elif self._exec_timeout and now - self._activate_time > self._exec_timeout:

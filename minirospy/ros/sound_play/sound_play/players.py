@@ -37,7 +37,7 @@ PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
         f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
     ),
 }
-"""Functions that take a file and a volume (0 to 1) and return the player's arguments, keyed by player, preferred ones first."""
+"""For each player, preferred ones first: a function from a file and a volume (0 to 1) to the player's arguments."""
 
 SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
     "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
@@ -53,13 +53,13 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Functions that return the command to speak a text, keyed by program, preferred ones first."""
+"""For each program, preferred ones first: a function that returns the command to speak a text."""
 
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
 
 def _espeak(voice: str, volume: float) -> list[str]:
-    # Names such as voice_kal_diphone are voices of festival.
+    # Names like voice_kal_diphone are festival's voices.
     names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
     return ["--stdin", "-a", str(round(volume * 100)), *names]
 

@@ -141,7 +141,7 @@ def _request(name: str, request: Callable[[SoundClient], object]) -> int:
     with suppress(rospy.ROSInterruptException):
         _connect(client)
         request(client)
-        # Wait before the node exits, until the message has probably been sent.
+        # The node exits next, so wait until the message has probably been sent.
         rospy.sleep(0.2)
     return 0
 

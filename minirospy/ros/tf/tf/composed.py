@@ -171,10 +171,10 @@ def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> Floats:
 def superimposition_matrix(
     v0: ArrayLike, v1: ArrayLike, scaling: bool = False, usesvd: bool = True
 ) -> Floats:
-    r"""Return the rotation, translation and, on demand, scaling that moves points ``v0`` nearest to ``v1``.
+    r"""Return the rotation, translation and, if requested, scaling that moves points ``v0`` nearest to ``v1``.
 
-    Both have the shape (3, \*) or (4, \*), three points at least. By Kabsch's method of singular values (1976), or by Horn's
-    of quaternions (1987). Raise ValueError.
+    Both have the shape (3, \*) or (4, \*), with at least three points. Uses Kabsch's method with singular values (1976), or
+    Horn's with quaternions (1987). Raise ValueError if the shapes are different or too small.
     """
     import numpy
 
@@ -203,7 +203,7 @@ def superimposition_matrix(
 
 
 def _horn(first: Floats, second: Floats) -> Floats:
-    """Return the best rotation's quaternion: the eigenvector of Horn's matrix with the largest eigenvalue."""
+    """Return the quaternion of the best rotation: the eigenvector of Horn's matrix with the largest eigenvalue."""
     import numpy
 
     s = numpy.dot(first, second.T)
@@ -256,7 +256,7 @@ class Arcball:
         self._center = numpy.asarray(center, dtype=numpy.float64)[:2]
 
     def setaxes(self, *axes: ArrayLike) -> None:
-        """Set the axes that rotations can be constrained to. Without arguments, remove the constraint."""
+        """Set the axes to which rotations can be constrained. Without arguments, remove the constraint."""
         self._axes = [unit_vector(axis) for axis in axes] if axes else None
 
     def setconstrain(self, constrain: bool) -> None:

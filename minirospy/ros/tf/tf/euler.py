@@ -164,7 +164,7 @@ def _angles(m: list[list[float]], axes: Axes) -> tuple[float, float, float]:
     if is_regular:
         ax, az = math.atan2(ends[0], ends[1]), math.atan2(ends[2], ends[3])
     else:
-        # Gimbal lock: two axes coincide, so the first angle describes the whole rotation.
+        # Gimbal lock: two axes coincide, so let the first angle describe the whole rotation.
         ax, az = math.atan2(-m[j][k], m[j][j]), 0.0
     if parity:
         ax, middle, az = -ax, -middle, -az

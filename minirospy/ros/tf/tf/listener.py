@@ -50,7 +50,7 @@ def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
 
 
 def strip_leading_slash(s: str) -> str:
-    """Remove a leading slash from a frame name, because tf2 rejects names with one."""
+    """Remove a leading slash from a frame name; tf2 rejects such names."""
     return s[1:] if s.startswith("/") else s
 
 
@@ -130,7 +130,7 @@ class Transformer:
     def chain(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> list[str]:
-        """Return the frames on the path from the source to the target by way of the fixed frame."""
+        """Return the frames on the path from the source to the target via the fixed frame."""
         return self._buffer._chain(target_frame, target_time, source_frame, source_time, fixed_frame)
 
     def clear(self) -> None:
@@ -200,8 +200,7 @@ class Transformer:
         """Return the velocities of ``tracking_frame`` relative to ``observation_frame``, expressed in ``reference_frame``.
 
         The velocities are those of the origin of ``reference_point_frame``, averaged over ``averaging_interval`` around
-        ``time``
-        (0: until the newest data). ``ref_point`` has no effect, as in real ROS.
+        ``time`` (0: until the newest data). ``ref_point`` has no effect, as in real ROS.
         """
         import numpy
 
@@ -236,7 +235,7 @@ class Transformer:
         return tuple(linear.tolist()), tuple(angular.tolist())
 
     def setUsingDedicatedThread(self, value: bool) -> None:
-        """Set whether another thread inserts transforms. Only then can a lookup wait for one."""
+        """Set whether another thread inserts transforms; lookups can only wait for a transform if one does."""
         self._using_dedicated_thread = value
 
     def getTFPrefix(self) -> str:

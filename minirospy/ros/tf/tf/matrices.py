@@ -121,7 +121,7 @@ def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
 def scale_matrix(
     factor: float, origin: ArrayLike | None = None, direction: ArrayLike | None = None
 ) -> Floats:
-    """Return the matrix that scales about ``origin``, in all directions or in one. The factor -1 is a point reflection."""
+    """Return the matrix that scales about ``origin``, in all directions or one. A factor of -1 is a point reflection."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -139,7 +139,10 @@ def scale_matrix(
 
 
 def scale_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats | None]:
-    """Return a scaling matrix's factor, origin and direction (None: all). Raise ValueError if the matrix is not a scaling."""
+    """Return the factor, origin and direction of a scaling matrix.
+
+    Raise ValueError if the matrix is not a scaling. The direction is None for a uniform scaling.
+    """
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)

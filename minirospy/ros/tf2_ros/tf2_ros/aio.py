@@ -40,7 +40,7 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-# maximum number of messages queued while the program is busy; older messages are dropped
+# maximum number of messages queued while the program is busy; older ones are dropped
 _MAX_WAITING = 1000
 
 
@@ -118,7 +118,7 @@ class Buffer:
         return transform_stamped(target, source, found)
 
     def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
-        """Return None if :meth:`lookup` would succeed now, or else the reason why it would fail."""
+        """Return the reason why :meth:`lookup` would fail now, or None if it would succeed."""
         try:
             return self.tree.why_not(target, source, nanoseconds(time))
         except InvalidArgumentException as error:
@@ -129,7 +129,7 @@ class Buffer:
 
         Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
-        # This call raises InvalidArgumentException for invalid frame names.
+        # Raises InvalidArgumentException for invalid frame names.
         self.tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None

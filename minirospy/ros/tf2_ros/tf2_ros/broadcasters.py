@@ -39,7 +39,7 @@ class StaticTransformBroadcaster:
 
     _lock = threading.Lock()
     _sent: WeakKeyDictionary[object, dict[str, TransformStamped]] = WeakKeyDictionary()
-    """The transforms keyed by child frame, per topic handle. A node's broadcasters share them."""
+    """The transforms keyed by child frame, for each topic handle. All broadcasters of a node share them."""
 
     def __init__(self) -> None:
         self.pub_tf = rospy.Publisher("/tf_static", TFMessage, queue_size=100, latch=True)

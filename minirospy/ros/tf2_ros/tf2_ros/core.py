@@ -183,7 +183,7 @@ class BufferCore:
                 parent,
                 child,
                 nanoseconds(header.stamp),
-                # Convert to floats, which a lookup returns even if integers or numpy numbers were inserted.
+                # Convert to floats: a lookup returns floats even if integers or numpy numbers were inserted.
                 (float(where.x), float(where.y), float(where.z)),
                 (float(turn.x), float(turn.y), float(turn.z), float(turn.w)),
                 authority,
@@ -209,7 +209,7 @@ class BufferCore:
         return int(why is None), why or ""
 
     def _report(self) -> None:
-        """Log rejected transforms without holding the lock, because a log handler may look up transforms."""
+        """Log rejected transforms without the lock held, because a log handler may look up transforms."""
         with self._lock:
             refused = self._refused[:]
             del self._refused[: len(refused)]

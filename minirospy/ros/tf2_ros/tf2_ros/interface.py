@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """Raised if no conversion is registered for the type. The program must import the package that registers it."""
+    """Raised if no conversion is registered for a type. The program has to import the package that registers it."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)

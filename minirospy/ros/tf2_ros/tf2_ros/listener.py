@@ -55,7 +55,7 @@ class TransformListener:
         )
 
     def __del__(self) -> None:
-        # Suppress all errors, because the constructor may have failed, or the interpreter may be exiting.
+        # Suppress all errors: the constructor may have failed, or the interpreter may be exiting.
         with contextlib.suppress(Exception):
             self.unregister()
 
@@ -66,7 +66,7 @@ class TransformListener:
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time while holding the lock; otherwise, a thread overtaken by another would report a jump.
+        # Read the time with the lock held: otherwise a thread overtaken by another one would detect a false jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now
@@ -107,7 +107,7 @@ class TransformListener:
 
 
 def _takes_bytes(buffer: TransformSink) -> bool:
-    """Return whether a buffer accepts undecoded messages: it is a BufferCore that does not override set_transform."""
+    """Return whether a buffer accepts undecoded messages, as a BufferCore does unless it overrides set_transform."""
     kind = type(buffer)
     return (
         issubclass(kind, BufferCore)

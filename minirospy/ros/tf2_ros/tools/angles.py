@@ -1,4 +1,4 @@
-"""Converts quaternions to angles. Computes them like ROS's two programs, so that zeros have the same signs."""
+"""Converts quaternions to angles in the same way as ROS's two programs, so that zeros have the same signs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SMALL = 4 * 2.0**-52
 
 
 def rpy_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw in tf_echo's form. The yaw is 0 if the pitch is a right angle."""
+    """Return roll, pitch and yaw as tf_echo prints them. The yaw is 0 if the pitch is +/-90 degrees."""
     (xx, xy, xz), (yx, _, _), (zx, zy, zz) = _matrix(rotation)
     if zx <= -1:
         return math.atan2(xy, xz), math.pi / 2, 0.0
@@ -24,7 +24,7 @@ def rpy_of_matrix(rotation: Quaternion) -> Vector:
 
 
 def euler_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw in the form of tf2_tools' echo.py."""
+    """Return roll, pitch and yaw as tf2_tools' echo.py prints them."""
     (xx, _, _), (yx, yy, yz), (zx, zy, zz) = _matrix(rotation)
     cosine = math.sqrt(xx * xx + yx * yx)
     if cosine > _SMALL:

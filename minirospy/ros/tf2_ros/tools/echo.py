@@ -93,7 +93,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
     buffer = Buffer(rospy.Duration.from_sec(options.cache_time) if options.cache_time else None)
     TransformListener(buffer)
-    # The original program uses a timer, so its first lookup occurs after one period.
+    # The original program uses a timer, so its first lookup happens after one period.
     rospy.sleep(1 / options.rate)
     looks = 0
 

@@ -47,7 +47,7 @@ def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str
     except (rospy.ROSInterruptException, KeyboardInterrupt):
         return 0
     except BrokenPipeError:
-        # Discard the text that is still buffered, because it cannot be written.
+        # Discard the buffered text, because it cannot be written.
         sys.stdout = None
         return 0
 

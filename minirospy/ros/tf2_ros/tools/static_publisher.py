@@ -43,7 +43,7 @@ Usage: {_NAME} /param_name
 _MIN_PERIOD = 0.001
 """Minimum period in seconds; a period of 0 would keep this process and all listeners busy."""
 _TOLERANCE = 0.01
-"""Maximum deviation of a quaternion's squared length from 1. If it is larger, every listener rejects the transform."""
+"""Maximum deviation of a quaternion's squared length from 1. Every listener rejects a transform that exceeds it."""
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
@@ -65,7 +65,7 @@ def _run_tf(words: Sequence[str]) -> None:
 
     rospy.init_node(_NAME, anonymous=True)
     broadcaster = TransformBroadcaster()
-    # Stamp the transform in the future, so that the frame is known until the next message arrives.
+    # Stamp the transform in the future, so that the frame is known until the next message.
     ahead = rospy.Duration.from_sec(seconds)
     broadcaster.pub_tf.wait_for_subscribers(timeout=seconds)
     while not rospy.is_shutdown():

@@ -61,7 +61,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
     frame = transform_to_kdl(transform)
     rotation = numpy.array(frame.M._m).reshape(3, 3)
     places = numpy.stack([points[name].astype(numpy.float64) for name in "xyz"], axis=-1)
-    # Coordinates may be infinite, or may overflow.
+    # Coordinates may be infinite, or may overflow in the calculation.
     with numpy.errstate(invalid="ignore", over="ignore"):
         moved = places @ rotation.T + numpy.array(frame.p._v)
         for column, name in enumerate("xyz"):

@@ -32,7 +32,7 @@ __all__ = ["Demux", "main"]
 
 _USAGE = "\nusage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 [...]]\n"
 _FIRST_SUBSCRIBER = 0.5
-"""Maximum seconds that an output's first message waits for a subscriber after the topic is advertised."""
+"""Maximum seconds for which an output's first message waits for a subscriber after the topic is advertised."""
 
 
 def main() -> int:

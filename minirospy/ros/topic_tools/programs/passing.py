@@ -57,7 +57,7 @@ class Output:
 
     @property
     def has_subscribers(self) -> bool:
-        """Return whether a node subscribes to the output."""
+        """Return whether any node subscribes to the output."""
         return self._publisher is not None and self._publisher.get_num_connections() > 0
 
     def advertise(self, message: AnyMsg) -> None:
@@ -166,7 +166,7 @@ def run_node(
             raise ValueError("")
         start = prepare(words)
         rospy.init_node(name(words), anonymous=True)
-        # Keep a reference, so that the subscription or the services are not deleted.
+        # Keep a reference, because otherwise the subscription or the services would be deleted.
         running = start()
         rospy.spin()
         del running

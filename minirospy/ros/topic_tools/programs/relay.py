@@ -46,14 +46,14 @@ class Relay:
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
-        # Locks opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
+        # Guards opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
         self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)
         self._input.open()
 
     def monitor(self, topic: str, period: float) -> None:
-        """Subscribe only while another node subscribes to a topic; check this every ``period`` seconds."""
+        """Subscribe only while another node subscribes to the output; check this every ``period`` seconds."""
         self._is_stealthy = True
         self._master = MasterProxy(Environment.read().master_uri, rospy.get_name())
         self._timer = rospy.Timer(rospy.Duration.from_sec(period), lambda _event: self._look_for(topic))

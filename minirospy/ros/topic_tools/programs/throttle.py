@@ -41,7 +41,7 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""Takes the time in seconds and a message's size in bytes. Returns whether to forward the message and, if so, counts it."""
+"""Takes the time in seconds and a message's size in bytes. Returns whether to forward the message; counts it if so."""
 
 
 def main() -> int:
@@ -163,7 +163,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # Locks opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
+        # Guards opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
         self._lock = threading.Lock()
 
         self._output = Output(

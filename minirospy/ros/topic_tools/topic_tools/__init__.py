@@ -90,7 +90,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         return publisher
 
     def _subscribe_once(self) -> None:
-        # The constructor's thread and the listener's thread may reach this code at the same time.
+        # The constructor's thread and the listener's thread may both get here at the same time.
         with self._changing:
             if self._connection_status is not True:
                 self.subscribe()

@@ -96,7 +96,7 @@ def _transform(options: argparse.Namespace) -> _Start:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
-            # Store the top-level module, so that an expression that uses tf.transformations finds the name tf.
+            # Store the top-level module: an expression that uses tf.transformations needs the name tf.
             modules[name.partition(".")[0]] = importlib.import_module(name.partition(".")[0])
             importlib.import_module(name)
         except ImportError as error:

@@ -190,10 +190,10 @@ class Material(Object):
 
 
 class LinkMaterial(Material):
-    """A shape's material, which may consist of only a name."""
+    """A shape's material, which may have only a name."""
 
     def check_valid(self) -> None:
-        """Accept a material that consists of only a name."""
+        """Accept a material that has only a name."""
 
 
 class Visual(Object):

@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _xacro(words: Sequence[str]) -> int:
-    # Import this module here, because the package xacro uses it in an `except` clause without importing it.
+    # Import this module here: the package xacro uses it in an `except` clause without importing it.
     import xml.parsers.expat  # noqa: F401
 
     try:
@@ -42,13 +42,12 @@ def _xacro(words: Sequence[str]) -> int:
         ) from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
-        # Write UTF-8 regardless of the system's code page, because a robot description is UTF-8, and roslaunch reads
-        # it as UTF-8.
+        # Write UTF-8 regardless of the system's code page: a robot description is UTF-8, and roslaunch reads it as such.
         sys.stdout.reconfigure(encoding="utf-8")
     evaluate = xacro.eval_extension
 
     def eval_extension(text: str) -> object:
-        """Evaluate `$(...)`. Shorten the error for a missing package, which xacro would print twice, with a class name."""
+        """Evaluate `$(...)`. Shorten the error for a missing package, which xacro would print twice and with a class name."""
         try:
             return evaluate(text)
         except xacro.XacroException as error:
@@ -59,9 +58,9 @@ def _xacro(words: Sequence[str]) -> int:
     parse = xacro.parse
 
     def checked_parse(inp: object, filename: str | None = None) -> object:
-        """Parse a file or string after checking that its entities do not expand to gigabytes."""
+        """Parse a file or string, after checking that its entities do not expand to gigabytes."""
         if inp is None and filename is not None:
-            # Ignore a file that cannot be opened, because xacro itself reports the error.
+            # Ignore a file that cannot be opened; xacro itself reports that error.
             with contextlib.suppress(OSError), open(Path(xacro.root_dir, filename)) as file:
                 inp = file.read()
         if isinstance(inp, str):

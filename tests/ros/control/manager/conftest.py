@@ -66,6 +66,7 @@ class Other:
 
 ROBOT = """import os
 import sys
+import time as time_
 import rospy
 from controller_manager import run
 from hardware_interface import Interface, RobotHardware
@@ -81,6 +82,7 @@ class Robot(RobotHardware):
         for joint in self.joints.values():
             if joint.active is not None:
                 print(f"{joint.name} {joint.position_command:.3f} {period.to_nsec()}", flush=True)
+        time_.sleep(0.03 if os.path.exists("slow") else 1000 if os.path.exists("hangs") else 0)
         if os.path.exists("fails"):
             raise OSError("the cable is loose")
 

@@ -10,6 +10,8 @@ import pytest
 
 from tests.ros.control.manager.conftest import ROBOT, Start, call
 
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a Ctrl-C for one process")
+
 LOADS = """
 rospy.set_param("/one", {"type": "my_controllers/Hold", "joint": "a", "step": 0.001})
 rospy.set_param("/two", {"type": "my_controllers/Hold", "joint": "b"})
@@ -142,7 +144,6 @@ def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process there")
 def test_end_stops_the_controllers_and_releases_the_joints(start: Start, number: signal.Signals) -> None:
     robot = start("-c", ROBOT)
     call(LOADS + 'cm.load_controller("one"), cm.load_controller("two"); cm.start_controllers(["one", "two"])')
@@ -211,6 +212,29 @@ def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: St
     assert "time jumped back by 49." in errors
 
 
+SET_BACK = """
+import os, time
+time_ns = time.time_ns
+time.time_ns = lambda: time_ns() - (100_000_000_000 if os.path.exists("set_back") else 0)
+"""
+
+
+def test_controllers_are_started_again_if_the_computers_time_is_set_back(
+    start: Start, workspace: Path
+) -> None:
+    robot = start("-c", SET_BACK + ROBOT)
+    call(LOADS + 'cm.load_controller("one"), cm.start_controller("one")')
+    before = int(robot.read_until("one starts").split()[-1])
+    robot.read_until("a 0.")
+    (workspace.parent / "set_back").touch()
+    robot.read_until("one stops")
+    assert int(robot.read_until("one starts").split()[-1]) < before
+    # The period is measured by a clock that cannot be set.
+    assert 0 < int(robot.read_until("a 0.").split()[-1]) < 90_000_000_000
+    robot.process.send_signal(signal.SIGINT)
+    assert "the controllers are started again" in robot.end()[2]
+
+
 def test_diagnostics_have_the_loops_times(start: Start) -> None:
     start("-c", ROBOT)
     status = call(
@@ -226,7 +250,52 @@ def test_diagnostics_have_the_loops_times(start: Start) -> None:
     )
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
+def test_commands_are_limited_by_parameters(start: Start) -> None:
+    call(LOADS + "rospy.set_param('/joint_limits/a', {'has_velocity_limits': True, 'max_velocity': 0.01})")
+    call("rospy.set_param('/one/step', 1.0); rospy.set_param('/two/step', float('nan'))")
+    robot = start("-c", ROBOT)
+    call('cm.load_controller("one"), cm.load_controller("two"); cm.start_controllers(["one", "two"])')
+    before = 0.0
+    for _ in range(50):
+        _, position, period = robot.read_until("a 0.").split()
+        assert float(position) - before <= 0.01 * int(period) / 1e9 + 0.001
+        before = float(position)
+    assert before > 0.0
+    robot.process.send_signal(signal.SIGINT)
+    _, _, errors = robot.end()
+    assert {line.split()[1] for line in robot.lines if line.startswith("b 0")} == {"0.000"}
+    assert lines_of(errors) == ["commands that are not finite were replaced, joints: b"]
+
+
+def test_overruns_are_counted_and_not_caught_up(start: Start, workspace: Path) -> None:
+    (workspace.parent / "slow").touch()
+    robot = start("-c", ROBOT)
+    printed = call(
+        "from diagnostic_msgs.msg import DiagnosticArray\n"
+        "rospy.init_node('reader')\n"
+        "status = rospy.wait_for_message('/diagnostics', DiagnosticArray).status[0]\n"
+        "values = {pair.key: int(pair.value) for pair in status.values}\n"
+        "print(status.level, 0 < values['cycles'] == values['overruns'], values['cycle mean (us)'] >= 30_000)"
+    )
+    assert printed == "1 True True\n"
+    robot.process.send_signal(signal.SIGINT)
+    _, _, errors = robot.end()
+    assert "cycles ended after the next one was due; the period is 10 ms, the longest cycle took" in errors
+
+
+def test_driver_that_hangs_does_not_keep_the_node(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT)
+    call(LOADS + 'cm.load_controller("one"), cm.start_controller("one")')
+    (workspace.parent / "hangs").touch()
+    robot.read_until("a 0.")
+    robot.process.send_signal(signal.SIGINT)
+    status, _, errors = robot.end()
+    assert status == 1
+    assert lines_of(errors)[-1] == (
+        "the control loop does not end: a controller, or read() or write() of the hardware, hangs"
+    )
+
+
 def test_manager_starts_cleanly_after_a_kill_in_mid_motion(start: Start) -> None:
     for _ in range(3):
         robot = start("-c", ROBOT)

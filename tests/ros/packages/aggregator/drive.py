@@ -104,7 +104,7 @@ class Tree:
             lines = self.next_lines()
             if not is_it(lines):
                 continue
-            # The two topics use two connections: let the late level of an earlier tree arrive.
+            # The two topics use two connections, so give the level of an earlier tree time to arrive.
             for _ in range(10):
                 if again:
                     again()

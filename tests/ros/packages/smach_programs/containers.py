@@ -241,7 +241,7 @@ attempt("other state", lambda: it["NONE"])
 attempt("other start", lambda: it.set_initial_state(["NONE"], smach.UserData()))
 
 
-# Concurrences. The states wait for each other by events, so that their order is deterministic.
+# Concurrences. The states wait for each other with events, so that their order is deterministic.
 def concurrence(results, **kwargs):
     """Return a container whose states finish in order."""
     cc = smach.Concurrence(["done", "both", "left", "preempted"], "done", **kwargs)

@@ -106,7 +106,7 @@ class ClientGoal(Generic[_R, _F]):
     def _interrupt(self) -> None:
         if not self.done:
             self._ended.set_exception(ROSInterruptException("rospy shutdown"))
-            # Mark the exception as retrieved; otherwise asyncio logs it if no caller awaits the goal.
+            # Mark the exception as retrieved; otherwise asyncio logs it when no caller has awaited the goal.
             self._ended.exception()
             self._news.set()
 
@@ -202,7 +202,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
             self._start(self._send_cancel(goal))
 
     async def _send_cancel(self, goal: ClientGoal[_R, _F]) -> None:
-        # A connection does not prove that a server exists: `rostopic echo` also connects to the goal topic.
+        # A connection does not prove that there is a server: `rostopic echo` also connects to the goal topic.
         if goal._is_sent and self._goal.num_connections:
             await self._cancel.publish(GoalID(id=goal.id))
         else:
@@ -212,7 +212,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         async for message in subscription:
             try:
                 take(message)
-            except DeserializationError as error:  # from a StatusList, which is parsed on demand
+            except DeserializationError as error:  # raised by a StatusList, which is parsed on demand
                 self._node.log.error("a message on %s is ignored: %s", subscription.topic, error)
         for goal in list(self._goals.values()):
             goal._interrupt()
@@ -245,7 +245,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         asyncio.get_running_loop().call_later(SERVER_SECONDS, self._check_server, goals, self._statuses)
 
     def _check_server(self, goals: list[ClientGoal[_R, _F]], last: StatusList | None) -> None:
-        """End ``goals`` as LOST, unless a server lists them in a newer status message than ``last``."""
+        """Set ``goals`` to LOST, except those that a server lists in a status message newer than ``last``."""
         if self._is_closed or self._node.is_shutdown:
             return
         statuses, is_connected = self._statuses, self._status.num_connections > 0

@@ -26,7 +26,7 @@ _G = TypeVar("_G")
 _R = TypeVar("_R")
 _F = TypeVar("_F")
 
-# seconds to pause after publishing a status list, per goal in it, so that publishing does not use all CPU time
+# seconds to pause after publishing a status list, per goal in the list, so that publishing does not use all CPU time
 _SECONDS_A_STATUS = 1e-4
 
 _EVENTS = {
@@ -69,13 +69,13 @@ class ServerGoal(Generic[_G, _F]):
             self._status.status, self._status.text = int(state), text
 
     def _make_way(self) -> None:
-        """Cancel the goal's task, because a client has cancelled the goal or a newer goal preempts it.
+        """Cancel the goal's task. Called when a client cancels the goal or a newer goal preempts it.
 
         Repeated calls have no effect.
         """
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            # If a task is cancelled before it starts, it never runs, and the client would get no result.
+            # A task that is cancelled before it starts never runs, and the client would get no result.
             if self._has_begun:
                 self._task.cancel()
 
@@ -218,7 +218,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
                 goal._step(GoalEvent.CANCEL_REQUEST)
                 goal._make_way()
         if cancel.id and cancel.id not in self.goals:
-            # The goal may still arrive after the cancel request, so remember the request.
+            # The goal may arrive after the cancel request, so remember the request.
             self._canceled_early[cancel.id] = self._node.now().to_nsec()
         self._last_cancel = max(self._last_cancel, stamp)
         self._changed.set()
@@ -268,7 +268,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         message = self._types.action_result(status=goal._status, result=result or self._types.result())
         message.header.stamp = now
         self._changed.set()
-        # Publishing fails if the node is shutting down.
+        # Publishing fails while the node is shutting down.
         with contextlib.suppress(ROSException):
             await self._result.publish(message)
 
@@ -283,7 +283,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         await self._feedback.publish(message)
 
     async def _publish_regularly(self, period: float) -> None:
-        """Publish the statuses of all goals: periodically, and after each change."""
+        """Publish the statuses of all goals, periodically and after each change."""
         while not self._node.is_shutdown:
             self._changed.clear()
             now = self._node.now()

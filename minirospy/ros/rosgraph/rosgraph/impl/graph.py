@@ -140,7 +140,7 @@ class Graph:
         self.last_master_refresh = 0.0
 
     def set_master_stale(self, stale_secs: float) -> None:
-        """Set the minimum number of seconds between two queries to the master."""
+        """Set the minimum number of seconds between queries to the master."""
         self.master_stale = stale_secs
 
     def set_node_stale(self, stale_secs: float) -> None:
@@ -148,7 +148,7 @@ class Graph:
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
-        """Return False, because ``bad_nodes`` never contains nodes to query again."""
+        """Return False, because ``bad_nodes`` never contains a node to query again."""
         return False
 
     def update(self) -> bool:
@@ -186,7 +186,7 @@ class Graph:
         return before != (self.nn_nodes, self.nt_nodes, self.srvs, self.nn_edges, self.nt_all_edges)
 
     def _side(self, table: list[tuple[str, list[str]]]) -> dict[str, list[str]]:
-        """Return the topics in the topic namespace, each with its nodes in the node namespace."""
+        """Return the topics in the topic namespace, each with those of its nodes that are in the node namespace."""
         kept = {
             topic: [node for node in nodes if in_namespace(node, self.node_ns)]
             for topic, nodes in table

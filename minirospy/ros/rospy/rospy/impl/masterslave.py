@@ -43,7 +43,7 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getName", args, value=self.name)
 
     def getUri(self, *args: object) -> Answer:
-        """Return the URI of the server that uses this handler, or None if no server uses it yet."""
+        """Return the URI of the server that uses this handler, or None if none uses it yet."""
         return self._call("getUri", args, value=self.uri)
 
     def getMasterUri(self, *args: object) -> Answer:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from minirospy.client.services import Service
+from minirospy.client.service import Service
 from minirospy.client.session import current_session
 
 __all__ = ["Registration", "get_service_manager", "get_topic_manager"]

@@ -7,7 +7,8 @@ from minirospy.base.errors import (
     TransportTerminated,
 )
 from minirospy.client.lifecycle import ROSInterruptException
-from minirospy.client.services import Service, ServiceProxy, wait_for_service
+from minirospy.client.service import Service
+from minirospy.client.service_proxy import ServiceProxy, wait_for_service
 from minirospy.client.tcpros import (
     TCPROSServiceClient,
     TCPROSTransport,

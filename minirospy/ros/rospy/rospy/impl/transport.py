@@ -1,24 +1,13 @@
 """rospy.impl.transport and tcpros_base: the connection directions in getBusInfo, and TCPROS constants."""
 
-__all__ = ["BIDIRECTIONAL", "INBOUND", "OUTBOUND"]
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.client.tcpros import DeadTransport, ProtocolHandler, Transport
+
+__all__ = ["BIDIRECTIONAL", "INBOUND", "OUTBOUND", "DeadTransport", "ProtocolHandler", "Transport"]
 
 INBOUND, OUTBOUND, BIDIRECTIONAL = "i", "o", "b"
 TCPROS = "TCPROS"
 DEFAULT_BUFF_SIZE = 65536
 """The default value for Subscriber's ``buff_size``."""
-
-
-# Classes that are imported on first use: few programs use them, and `import rospy` need not import their module.
-_CLASSES = ("DeadTransport", "ProtocolHandler", "Transport")
-
-
-def __dir__() -> list[str]:
-    return sorted([*__all__, *_CLASSES])
-
-
-def __getattr__(name: str) -> object:
-    if name in _CLASSES:
-        from minirospy.client import tcpros
-
-        return getattr(tcpros, name)
-    raise AttributeError(f"module 'rospy.impl.transport' has no attribute {name!r}")

@@ -31,7 +31,7 @@ on_error: Callable[[str], object] = on_error_stderr
 
 
 def report(message: str) -> None:
-    """Call the program's replacement for on_error, or on_error itself."""
+    """Call the program's replacement for on_error or, if there is none, on_error itself."""
     module = sys.modules.get("urdf_parser_py.xml_reflection.core")
     replaced = getattr(module, "on_error", on_error_stderr)
     (on_error if replaced is on_error_stderr else replaced)(message)

@@ -458,6 +458,49 @@ export const GERMAN = {
   "All joints to their zeros": "Alle Gelenke auf ihre Nullstellung",
   "Randomize": "Zufällig",
   "All joints anywhere between their limits": "Alle Gelenke irgendwohin zwischen ihren Grenzen",
+  "Trajectory": "Trajektorie",
+  "Controllers": "Regler",
+  "Controller": "Regler",
+  "Claims": "Belegt",
+  "State": "Zustand",
+  "Type": "Typ",
+  "waiting": "wartet",
+  "Controller manager": "Controller-Manager",
+  "no controller manager": "kein Controller-Manager",
+  "no controller": "kein Regler",
+  "Load and start": "Laden und starten",
+  "Unload": "Entladen",
+  "Stop and unload": "Anhalten und entladen",
+  "uninitialized": "nicht geladen",
+  "initialized": "geladen",
+  "aborted": "abgebrochen",
+  "Read the list again": "Die Liste neu lesen",
+  "{name} was not loaded: the log of the manager's node says why (view Console)":
+    "{name} wurde nicht geladen: das Log des Managers sagt, warum (Ansicht Konsole)",
+  "{name} was not started: the log of the manager's node says why (view Console)":
+    "{name} wurde nicht gestartet: das Log des Managers sagt, warum (Ansicht Konsole)",
+  "{name} was not stopped: the log of the manager's node says why (view Console)":
+    "{name} wurde nicht angehalten: das Log des Managers sagt, warum (Ansicht Konsole)",
+  "{name} was not unloaded: the log of the manager's node says why (view Console)":
+    "{name} wurde nicht entladen: das Log des Managers sagt, warum (Ansicht Konsole)",
+  "No controller manager runs: a node that has one offers the service list_controllers.":
+    "Es läuft kein Controller-Manager: ein Node mit einem bietet den Service list_controllers an.",
+  "No controller is loaded, and none is on the parameter server.":
+    "Kein Regler ist geladen, und keiner steht auf dem Parameterserver.",
+  "{name}: it has left": "{name}: er ist fort",
+  "Speed in percent of the joints' highest velocities": "Tempo in Prozent der höchsten Geschwindigkeiten der Gelenke",
+  "Send commands": "Befehle senden",
+  "This token is read-only: it moves nothing.": "Dieses Token darf nur lesen: es bewegt nichts.",
+  "{name} does not run.": "{name} läuft nicht.",
+  "No JointTrajectoryController runs.": "Es läuft kein JointTrajectoryController.",
+  "The robot's limits are not known: there is no robot_description.":
+    "Die Grenzen des Roboters sind unbekannt: es gibt keine robot_description.",
+  "robot_description has no limits of position and velocity for {names}: they cannot be moved here.":
+    "robot_description nennt keine Grenzen der Position und Geschwindigkeit für {names}: hier lassen sie sich nicht bewegen.",
+  "command to {name}": "Befehl an {name}",
+  "Actual position": "Tatsächliche Position",
+  "The connection was lost: the controller holds its joints.":
+    "Die Verbindung ging verloren: der Regler hält seine Gelenke.",
   "Read robot_description again": "robot_description neu lesen",
   "This token is read-only: it sets no joints.": "Dieses Token darf nur lesen: es stellt keine Gelenke.",
   "The robot_description parameter is required and not set.":

@@ -9,6 +9,7 @@ import { Actions } from "./views/actions.js";
 import { Bag } from "./views/bag.js";
 import { Board } from "./views/board.js";
 import { Console } from "./views/console.js";
+import { Controllers } from "./views/controllers.js";
 import { Diagnostics } from "./views/diagnostics.js";
 import { Graph } from "./views/graph.js";
 import { Image } from "./views/image.js";
@@ -27,6 +28,7 @@ import { Smach } from "./views/smach.js";
 import { Teleop } from "./views/teleop.js";
 import { Tf } from "./views/tf.js";
 import { Topics } from "./views/topics.js";
+import { Trajectory } from "./views/trajectory.js";
 import { Turtlesim } from "./views/turtlesim.js";
 
 const VIEWS = {
@@ -49,6 +51,8 @@ const VIEWS = {
   launch: ["Launch", Launch],
   bag: ["Bags", Bag],
   joints: ["Joints", Joints],
+  controllers: ["Controllers", Controllers],
+  trajectory: ["Trajectory", Trajectory],
   smach: ["State machines", Smach],
   diagnostics: ["Diagnostics", Diagnostics],
   panels: ["Panels", Panels],

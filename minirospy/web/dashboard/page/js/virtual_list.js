@@ -51,12 +51,6 @@ export class VirtualList {
     if (!this.isFollowing) this.element.scrollTop = Math.max(0, this.element.scrollTop - rows * this.rowHeight);
   }
 
-  scrollTo(index) {
-    this.isFollowing = false;
-    this.element.scrollTop = Math.max(0, index * this.rowHeight - this.element.clientHeight / 2);
-    this.draw();
-  }
-
   scrolled() {
     const { scrollTop, clientHeight } = this.element;
     // The end may have moved before the event of the list's own scrolling comes: a person who leaves it scrolls up.

@@ -1,0 +1,1 @@
+"""ROS's package ackermann_steering_controller."""

@@ -1,0 +1,1 @@
+"""ROS's package diff_drive_controller."""

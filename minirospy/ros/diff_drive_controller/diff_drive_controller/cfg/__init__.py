@@ -1,0 +1,1 @@
+"""diff_drive_controller's configuration for dynamic_reconfigure."""

@@ -1,0 +1,1 @@
+"""ROS's package force_torque_sensor_controller."""

@@ -1,0 +1,53 @@
+"""The controller that publishes forces and torques: ``from force_torque_sensor_controller import ForceTorqueSensorController``.
+
+Source: http://wiki.ros.org/force_torque_sensor_controller.
+"""
+
+from __future__ import annotations
+
+from geometry_msgs.msg import Vector3, WrenchStamped
+
+from minirospy.base.times import Duration, Time
+from minirospy.core.control.controller import Controller, ControllerContext, Resources
+from minirospy.core.control.hardware import ForceTorqueSensor, Interface
+from minirospy.core.control.rates import PublishRate
+from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
+
+__all__ = ["ForceTorqueSensorController"]
+
+
+class ForceTorqueSensorController(Controller):
+    """Publishes each sensor of the hardware on the topic of its name."""
+
+    interfaces = (Interface.FORCE_TORQUE,)
+
+    def __init__(self) -> None:
+        self._topics: list[tuple[ForceTorqueSensor, RealtimePublisher[WrenchStamped]]] = []
+
+    def init(self, hardware: Resources, context: ControllerContext) -> None:
+        """Open a topic for each sensor. Raise ControllerError if ``publish_rate`` is not set."""
+        self._rate = PublishRate.read(context.parameters)
+        for name in hardware.names(Interface.FORCE_TORQUE):
+            topic = f"{context.root.rstrip('/')}/{name}"
+            publisher = RealtimePublisher(topic, WrenchStamped, queue_size=4)
+            self._topics.append((hardware.force_torque_sensor(name), publisher))
+
+    def starting(self, time: Time) -> None:
+        """Publish after a period."""
+        self._rate.start(time)
+
+    def update(self, time: Time, period: Duration) -> None:
+        """Publish the sensors."""
+        if self._rate.is_due(time):
+            for sensor, publisher in self._topics:
+                message = WrenchStamped()
+                message.header.stamp = time
+                message.header.frame_id = sensor.frame_id
+                message.wrench.force = Vector3(*sensor.force)
+                message.wrench.torque = Vector3(*sensor.torque)
+                publisher.publish(message)
+
+    def close(self) -> None:
+        """Close the topics."""
+        for _, publisher in self._topics:
+            publisher.close()

@@ -1,0 +1,1 @@
+"""ROS's package four_wheel_steering_controller."""

@@ -1,0 +1,1 @@
+"""ROS's package imu_sensor_controller."""

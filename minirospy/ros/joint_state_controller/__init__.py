@@ -1,0 +1,1 @@
+"""ROS's package joint_state_controller."""
