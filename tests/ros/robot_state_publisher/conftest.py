@@ -13,7 +13,7 @@ import pytest
 from minirospy.workspace.packages import Packages
 
 ARM = Path(__file__).parents[2] / "core" / "urdf" / "arm.urdf"
-SECONDS = 12.0
+SECONDS = 100.0
 
 Start = Callable[..., "subprocess.Popen[str]"]
 
