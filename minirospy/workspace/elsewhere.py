@@ -68,9 +68,6 @@ CPP = {
     "trac_ik_kinematics_plugin": "inverse kinematics, in C++",
     "velocity_controllers": "ros_control, in C++",
     # Simulators.
-    "gazebo_plugins": "the simulator Gazebo, in C++",
-    "gazebo_ros": "the simulator Gazebo (spawn_model gives it a model), in C++",
-    "gazebo_ros_control": "the simulator Gazebo, in C++",
     "stage_ros": "the simulator Stage, in C++",
     # Images, clouds, sensors.
     "apriltag_ros": "a detector in images, in C++",
@@ -167,7 +164,6 @@ MESSAGES = {
 
 IMPORTED = frozenset(
     {
-        "gazebo_ros",
         "moveit_commander",
         "moveit_ros_planning_interface",
         "nodelet",

@@ -99,13 +99,12 @@ def test_rosrun_prints_the_line_of_ros_and_then_the_advice() -> None:
         sys.executable,
         "-m",
         "minirospy.ros.rosbash.commands.rosrun",
-        "gazebo_ros",
-        "spawn_model",
-        "-urdf",
+        "amcl",
+        "amcl",
     ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     first, second = done.stderr.splitlines()
-    assert first == "[rospack] Error: package 'gazebo_ros' not found"
-    assert second == f"rosrun: ERROR: package [gazebo_ros] not found: {advice('gazebo_ros')}"
-    assert "spawn_model" in second
+    assert first == "[rospack] Error: package 'amcl' not found"
+    assert second == f"rosrun: ERROR: package [amcl] not found: {advice('amcl')}"
+    assert "localization" in second

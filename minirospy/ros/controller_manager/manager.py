@@ -185,6 +185,11 @@ class ControllerManager:
             for service in self._services:
                 service.shutdown("the controller manager is closed")
 
+    def unregister(self) -> None:
+        """End the services, after :meth:`close`, so that another controller manager of the node can use the namespace."""
+        for service in self._services:
+            service.shutdown()
+
     def _wait_for_update(self) -> bool:
         """Wait until the loop has used the new table; return False if the node shuts down."""
         if self._has_updated and not self._is_closed:

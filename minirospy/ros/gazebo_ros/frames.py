@@ -1,0 +1,69 @@
+"""Find models, links and joints by the names in requests, and convert states between frames."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from minirospy.core.sdf.model import Pose, Vector
+from minirospy.core.sdf.poses import inverse, multiply, rotate
+from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, SimModel, State
+
+if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.physics import Simulation
+
+__all__ = [
+    "WORLD_FRAMES",
+    "difference",
+    "find_entity",
+    "find_joint",
+    "find_link",
+    "relative_state",
+    "turned_back",
+]
+
+WORLD_FRAMES = ("", "world", "map", "/map")
+
+
+def find_link(simulation: Simulation, name: str) -> SimLink | None:
+    """Return the link ``model::link``, or, as in Gazebo, the first link with an unscoped name; None if there is none."""
+    model, _, link = name.partition("::")
+    if link:
+        found = simulation.models.get(model)
+        if found is None:
+            return None
+        if link not in found.links and link in found.record.lumped:
+            link = found.record.lumped[link][0]
+        return found.links.get(link)
+    return next((each.links[name] for each in simulation.models.values() if name in each.links), None)
+
+
+def find_entity(simulation: Simulation, name: str) -> SimModel | SimLink | None:
+    """Return the model or link of a frame's name, or None."""
+    return simulation.models.get(name) or find_link(simulation, name)
+
+
+def find_joint(simulation: Simulation, name: str) -> SimJoint | None:
+    """Return the joint of a name without its model: the first model wins. ``model::joint`` is found, too."""
+    model, _, joint = name.rpartition("::")
+    if model in simulation.models and joint in simulation.models[model].joints:
+        return simulation.models[model].joints[joint]
+    return next((each.joints[name] for each in simulation.models.values() if name in each.joints), None)
+
+
+def relative_state(state: State, frame: State) -> State:
+    """Return a state relative to a frame: the pose, and the difference of velocities in the frame's axes."""
+    return State(
+        multiply(inverse(frame.pose), state.pose),
+        turned_back(frame.pose, difference(state.linear, frame.linear)),
+        turned_back(frame.pose, difference(state.angular, frame.angular)),
+    )
+
+
+def turned_back(frame: Pose, vector: Vector) -> Vector:
+    """Return a vector of the world in a frame's axes."""
+    return rotate(inverse(frame).orientation, vector)
+
+
+def difference(left: Vector, right: Vector) -> Vector:
+    """Return ``left - right``."""
+    return left[0] - right[0], left[1] - right[1], left[2] - right[2]

@@ -1,0 +1,196 @@
+"""The thread that owns the simulation: it steps in real time or faster, and runs other threads' jobs between steps."""
+
+from __future__ import annotations
+
+import threading
+import time as wall
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
+
+from minirospy.base.errors import MinirospyError
+
+if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.physics import LostModel, Simulation
+
+__all__ = ["LoopClosed", "SimulationLoop"]
+
+_T = TypeVar("_T")
+
+DEFAULT_TICK_HZ = 250.0  # /clock and the states of models; 1000 messages/s would keep every Python node busy
+MAX_LAG_SECONDS = 0.1  # a simulation that is later than this does not try to catch up
+
+
+class LoopClosed(MinirospyError):
+    """Raised by a job if the simulation has ended."""
+
+
+class SimulationLoop:
+    """Runs a simulation.
+
+    simulation: only this loop's thread uses it; other threads use :meth:`call`.
+    before_step: is called before each step. on_tick: is called at the tick rate of simulated time, and after each reset.
+    on_lost: is called for each model that the simulation removed. reported: problems that were logged once.
+    """
+
+    def __init__(self, simulation: Simulation, *, paused: bool = False, tick_rate: float = 0.0) -> None:
+        self.simulation = simulation
+        self.before_step: Callable[[], None] = lambda: None
+        self.on_tick: Callable[[], None] = lambda: None
+        self.on_lost: Callable[[LostModel], None] = lambda lost: None
+        self.reported: set[str] = set()
+        self.real_time_factor = 0.0  # of the last second of wall time
+        self._paused = paused
+        self._rate = simulation.physics.update_rate
+        self._tick_rate = tick_rate or DEFAULT_TICK_HZ
+        self._jobs: deque[tuple[Callable[[], object], Future[object]]] = deque()
+        self._wake = threading.Condition()
+        self._is_closed = False
+        self._deadline = wall.monotonic()
+        self._measured = (wall.monotonic(), 0)
+        self._end: tuple[int, Callable[[], object]] | None = None
+        self._steps = 0
+        self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread, and wait for it. Jobs that have not run raise LoopClosed."""
+        with self._wake:
+            self._is_closed = True
+            self._wake.notify_all()
+        if threading.current_thread() is not self._thread and self._thread.is_alive():
+            self._thread.join()
+
+    def call(self, function: Callable[[], _T]) -> _T:
+        """Run a function between two steps, in the loop's thread; return its result. Raise LoopClosed after the end."""
+        if threading.current_thread() is self._thread:
+            return function()
+        return self._submit(function).result()
+
+    @contextmanager
+    def held(self) -> Iterator[Simulation]:
+        """Keep the simulation between two steps while the calling thread uses it. Raise LoopClosed after the end.
+
+        Do not use it in the loop's thread.
+        """
+        entered, left = threading.Event(), threading.Event()
+
+        def hold() -> None:
+            entered.set()
+            left.wait()
+
+        future = self._submit(hold)
+        future.add_done_callback(lambda _: entered.set())
+        entered.wait()
+        try:
+            if future.done():
+                future.result()
+            yield self.simulation
+        finally:
+            left.set()
+
+    def _submit(self, function: Callable[[], _T]) -> Future[_T]:
+        future: Future[_T] = Future()
+        with self._wake:
+            if self._is_closed:
+                raise LoopClosed("the simulation has ended")
+            self._jobs.append((function, future))  # type: ignore[arg-type]
+            self._wake.notify_all()
+        return future
+
+    @property
+    def is_paused(self) -> bool:
+        """Return whether the simulation is paused."""
+        return self._paused
+
+    def set_paused(self, paused: bool) -> None:
+        """Pause or continue; return after the current steps."""
+        self.call(lambda: setattr(self, "_paused", paused))
+
+    @property
+    def update_rate(self) -> float:
+        """Return the steps per second of wall time; 0 means as many as possible."""
+        return self._rate
+
+    def set_update_rate(self, rate: float) -> None:
+        """Set the steps per second of wall time. Call it in the loop's thread."""
+        self._rate = max(rate, 0.0)
+        self._deadline = wall.monotonic()
+
+    def end_after(self, steps: int, function: Callable[[], object]) -> None:
+        """Pause after a number of steps since the start, and call a function."""
+        self.call(lambda: setattr(self, "_end", (steps, function)))
+
+    def step(self, count: int) -> None:
+        """Advance by steps, while paused or not. Call it in the loop's thread."""
+        self._steps += count
+        for _ in range(count):
+            self.before_step()
+            for lost in self.simulation.step():
+                self.on_lost(lost)
+        self.on_tick()
+
+    def reset(self, *, with_time: bool) -> None:
+        """Reset the models, and the time if ``with_time``. Call it in the loop's thread."""
+        if with_time:
+            self.simulation.reset()
+        else:
+            self.simulation.reset_models()
+        self.on_tick()
+
+    def _run(self) -> None:
+        self.on_tick()
+        while not self._is_closed:
+            self._run_jobs()
+            if self._must_wait():
+                continue
+            period = self.simulation.physics.step
+            count = max(1, round(1 / (self._tick_rate * period)))
+            self.step(count)
+            self._deadline += count / self._rate if self._rate else 0.0
+            self._measure()
+            if self._end is not None and self._steps >= self._end[0]:
+                self._paused = True
+                self._end[1]()
+                self._end = None
+        with self._wake:
+            while self._jobs:
+                self._jobs.popleft()[1].set_exception(LoopClosed("the simulation has ended"))
+
+    def _run_jobs(self) -> None:
+        while self._jobs:
+            function, future = self._jobs.popleft()
+            try:
+                future.set_result(function())
+            except BaseException as error:  # noqa: BLE001 - the caller gets it
+                future.set_exception(error)
+
+    def _must_wait(self) -> bool:
+        """Wait while paused, or until the next steps are due. Return whether jobs must be looked at again."""
+        with self._wake:
+            if self._jobs or self._is_closed:
+                return True
+            now = wall.monotonic()
+            if self._paused:
+                self._wake.wait()
+                self._deadline = wall.monotonic()
+                self._measured = (self._deadline, self.simulation.time_ns)
+                return True
+            if not self._rate or now - self._deadline > MAX_LAG_SECONDS:
+                self._deadline = now
+            if now < self._deadline:
+                self._wake.wait(self._deadline - now)
+                return True
+        return False
+
+    def _measure(self) -> None:
+        now, time_ns = wall.monotonic(), self.simulation.time_ns
+        since, start_ns = self._measured
+        if now - since >= 1:
+            self.real_time_factor = max(0.0, (time_ns - start_ns) / 1e9 / (now - since))
+            self._measured = (now, time_ns)

@@ -1,0 +1,120 @@
+"""The world as markers for the dashboard's 3D view: /gazebo/world_markers, in the frame ``world``.
+
+All visuals of all models are published (latched) whenever a model is added or removed. Models that move are published again
+while there are subscribers.
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from geometry_msgs.msg import Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from minirospy import client as rospy
+from minirospy.core.sdf.model import Box, Color, Cylinder, MeshShape, Plane, Pose, Sphere, Visual
+from minirospy.core.sdf.poses import multiply
+from minirospy.ros.gazebo_ros.messages import time_of, to_pose
+from minirospy.workspace.packages import package_name
+
+if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.physics import SimLink, Simulation
+
+__all__ = ["WorldMarkers"]
+
+TOPIC = "~world_markers"
+RATE_HZ = 10.0  # of simulated time, for models that move
+GREY: Color = (0.7, 0.7, 0.7, 1.0)
+MAX_PLANE = 100.0  # m; larger planes are drawn smaller
+PLANE_THICKNESS = 0.001  # m
+
+
+class WorldMarkers:
+    """Publishes markers. All methods run in the simulation's thread."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._publisher = rospy.Publisher(TOPIC, MarkerArray, queue_size=2, latch=True)
+        self._published: dict[str, Pose] = {}  # by link
+        self._next_ns = 0
+
+    def publish_all(self) -> None:
+        """Replace all markers."""
+        self._published.clear()
+        self._send([Marker(action=Marker.DELETEALL), *self._all()])
+
+    def _all(self) -> list[Marker]:
+        links = [link for model in self._simulation.models.values() for link in model.links.values()]
+        return [marker for link in links for marker in self._markers(link)]
+
+    def publish_moved(self) -> None:
+        """Publish the links that have moved, at a low rate, if there are subscribers."""
+        now = self._simulation.time_ns
+        if 0 <= self._next_ns - now <= 1e9 / RATE_HZ or not self._publisher.get_num_connections():
+            return
+        self._next_ns = now + round(1e9 / RATE_HZ)
+        for model in self._simulation.models.values():
+            if any(self._published.get(link.scoped_name) != link.pose for link in model.links.values()):
+                # The latch keeps only the last message, so it contains all markers.
+                self._send(self._all())
+                return
+
+    def _send(self, markers: list[Marker]) -> None:
+        stamp = time_of(self._simulation.time_ns)
+        for marker in markers:
+            marker.header.frame_id = "world"
+            marker.header.stamp = stamp
+        self._publisher.publish(MarkerArray(markers))
+
+    def _markers(self, link: SimLink) -> list[Marker]:
+        pose = link.pose
+        self._published[link.scoped_name] = pose
+        found = []
+        for index, visual in enumerate(link.record.visuals):
+            marker = _marker(visual)
+            if marker is not None:
+                marker.ns = link.scoped_name
+                marker.id = index
+                marker.pose = to_pose(multiply(pose, visual.pose))
+                found.append(marker)
+        return found
+
+
+@functools.cache
+def _uri(path: str) -> str:
+    """Return a file's URI: package://, which the dashboard can read, if the file is in a package."""
+    file = Path(path)
+    for folder in file.parents:
+        if name := package_name(folder):
+            return f"package://{name}/{file.relative_to(folder).as_posix()}"
+    return file.as_uri()
+
+
+def _marker(visual: Visual) -> Marker | None:
+    marker = Marker(action=Marker.ADD)
+    red, green, blue, opacity = visual.material.color or GREY
+    marker.color = ColorRGBA(red, green, blue, opacity * (1 - visual.transparency))
+    shape = visual.geometry
+    if isinstance(shape, Box):
+        marker.type, marker.scale = Marker.CUBE, Vector3(*shape.size)
+    elif isinstance(shape, Sphere):
+        marker.type, marker.scale = Marker.SPHERE, Vector3(*[2 * shape.radius] * 3)
+    elif isinstance(shape, Cylinder):
+        marker.type = Marker.CYLINDER
+        marker.scale = Vector3(2 * shape.radius, 2 * shape.radius, shape.length)
+    elif isinstance(shape, Plane):
+        marker.type = Marker.CUBE
+        width, height = (min(size, MAX_PLANE) for size in shape.size)
+        marker.scale = Vector3(width, height, PLANE_THICKNESS)
+    elif isinstance(shape, MeshShape):
+        marker.type, marker.scale = Marker.MESH_RESOURCE, Vector3(*shape.scale)
+        marker.mesh_resource = _uri(shape.path)
+        if visual.material.color is None:
+            marker.mesh_use_embedded_materials = True
+            marker.color = ColorRGBA(0.0, 0.0, 0.0, 0.0)
+    else:
+        return None
+    return marker

@@ -1,0 +1,416 @@
+"""The base classes of plugins, and how a library's name in SDF or URDF leads to a class.
+
+A package with a plugin in Python exports it in its package.xml::
+
+    <export><gazebo_ros library="libmy_plugin.so" python="my_package.plugins.MyPlugin"/></export>
+
+and a model uses it as ``<plugin name="..." filename="libmy_plugin.so">``. All methods of a plugin run in the simulation's
+thread, between two steps, except callbacks of subscribers and services that it creates: those use ``self.call``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from minirospy import client as rospy
+from minirospy.base.errors import ManifestError, MinirospyError
+from minirospy.base.times import Time
+from minirospy.base.xml_text import XmlElement
+from minirospy.core.sdf.model import IDENTITY, Plugin, Pose, Sensor
+from minirospy.core.sdf.poses import multiply
+from minirospy.ros.gazebo_ros.messages import time_of
+from minirospy.workspace.manifest import read_manifest
+from minirospy.workspace.packages import Packages
+
+if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.loop import SimulationLoop
+    from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, SimModel
+
+__all__ = [
+    "LIBRARIES",
+    "ModelPlugin",
+    "PluginBase",
+    "PluginError",
+    "PluginHost",
+    "SensorPlugin",
+    "WorldPlugin",
+]
+
+_T = TypeVar("_T")
+
+_PLUGINS = "minirospy.ros.gazebo_plugins"
+LIBRARIES = {
+    "gazebo_ros_control": "minirospy.ros.gazebo_ros_control.plugin:GazeboRosControl",
+    "gazebo_ros_diff_drive": f"{_PLUGINS}.diff_drive:DiffDrive",
+    "gazebo_ros_skid_steer_drive": f"{_PLUGINS}.skid_steer_drive:SkidSteerDrive",
+    "gazebo_ros_planar_move": f"{_PLUGINS}.planar_move:PlanarMove",
+    "gazebo_ros_joint_state_publisher": f"{_PLUGINS}.joint_state_publisher:JointStatePublisher",
+    "gazebo_ros_laser": f"{_PLUGINS}.laser:Laser",
+    "gazebo_ros_gpu_laser": f"{_PLUGINS}.laser:Laser",
+    "gazebo_ros_camera": f"{_PLUGINS}.camera:Camera",
+    "gazebo_ros_depth_camera": f"{_PLUGINS}.camera:DepthCamera",
+    "gazebo_ros_openni_kinect": f"{_PLUGINS}.camera:DepthCamera",
+    "gazebo_ros_imu": f"{_PLUGINS}.imu:Imu",
+    "gazebo_ros_imu_sensor": f"{_PLUGINS}.imu:ImuSensor",
+    "gazebo_ros_p3d": f"{_PLUGINS}.p3d:P3D",
+    "gazebo_ros_range": f"{_PLUGINS}.range:Range",
+    "gazebo_ros_bumper": f"{_PLUGINS}.bumper:Bumper",
+    "gazebo_ros_ft_sensor": f"{_PLUGINS}.ft_sensor:ForceTorque",
+    "gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
+    "roboticsgroup_gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
+    "roboticsgroup_upatras_gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
+}
+"""Dict from library, without ``lib`` and ``.so``, to module and class."""
+
+
+class PluginError(MinirospyError):
+    """Raised by ``load`` if a plugin's parameters cannot be used; the message is one line."""
+
+
+class PluginBase:
+    """A plugin of the world.
+
+    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's.
+    """
+
+    def __init__(self, loop: SimulationLoop, plugin: Plugin) -> None:
+        self.loop = loop
+        self.simulation = loop.simulation
+        self.plugin = plugin
+        self.element: XmlElement = plugin.element
+        self.name = plugin.name
+        self.default_namespace = ""
+        self._closing: list[Callable[[], object]] = []
+
+    def load(self) -> None:
+        """Read the parameters, and create publishers and subscribers. Raise PluginError if that is impossible."""
+
+    def update(self) -> None:
+        """Do the work of one step, before it."""
+
+    def reset(self) -> None:
+        """Return to the state after ``load``; is called by reset_simulation, after the time was set to 0."""
+
+    def close(self) -> None:
+        """Unregister the publishers and subscribers that :meth:`publish_to` and :meth:`subscribe_to` created."""
+        for function in self._closing:
+            function()
+        self._closing.clear()
+
+    @property
+    def namespace(self) -> str:
+        """Return ``<robotNamespace>``, which is resolved in the node's namespace, or the default, without a final slash."""
+        text = self.text("robotNamespace", self.default_namespace)
+        return "" if text in ("", "/") else "/" + text.strip("/")
+
+    @property
+    def now(self) -> Time:
+        """Return the time of the simulation."""
+        return time_of(self.simulation.time_ns)
+
+    def call(self, function: Callable[[], _T]) -> _T:
+        """Run a function between two steps; for the callbacks of subscribers and services."""
+        return self.loop.call(function)
+
+    def text(self, tag: str, default: str = "") -> str:
+        """Return a parameter's text, or the default if it is missing or empty."""
+        child = self.element.first(tag)
+        return (child.text.strip() or default) if child is not None else default
+
+    def number(self, tag: str, default: float) -> float:
+        """Return a parameter's number. Raise PluginError if it is not a number."""
+        text = self.text(tag)
+        try:
+            return float(text) if text else default
+        except ValueError:
+            raise PluginError(f"<{tag}> is '{text}', not a number") from None
+
+    def flag(self, tag: str, default: bool) -> bool:
+        """Return a parameter's boolean."""
+        text = self.text(tag).lower()
+        return text in ("true", "1") if text else default
+
+    def frame(self, tag: str, default: str) -> str:
+        """Return a parameter's name of a frame, without the slash at its start."""
+        return self.text(tag, default).lstrip("/")
+
+    def resolve(self, topic: str) -> str:
+        """Return a topic's name in the plugin's namespace."""
+        return topic if topic.startswith("/") else f"{self.namespace}/{topic}"
+
+    def publish_to(
+        self, topic: str, kind: type[rospy.Message], *, latch: bool = False
+    ) -> rospy.Publisher[Any]:
+        """Return a publisher in the plugin's namespace."""
+        publisher = rospy.Publisher(self.resolve(topic), kind, queue_size=1, latch=latch)
+        self._closing.append(publisher.unregister)
+        return publisher
+
+    def subscribe_to(
+        self, topic: str, kind: type[rospy.Message], callback: Callable[..., object]
+    ) -> rospy.Subscriber[Any]:
+        """Subscribe to a topic in the plugin's namespace."""
+        subscriber = rospy.Subscriber(self.resolve(topic), kind, callback, queue_size=1)
+        self._closing.append(subscriber.unregister)
+        return subscriber
+
+    def serve(self, name: str, kind: type, handler: Callable[..., object]) -> None:
+        """Offer a service in the plugin's namespace."""
+        self._closing.append(rospy.Service(self.resolve(name), kind, handler).shutdown)
+
+
+class WorldPlugin(PluginBase):
+    """A plugin in ``<world>``."""
+
+
+class ModelPlugin(PluginBase):
+    """A plugin of a model."""
+
+    def __init__(self, loop: SimulationLoop, plugin: Plugin, model: SimModel) -> None:
+        super().__init__(loop, plugin)
+        self.model = model
+
+    def joint(self, name: str) -> SimJoint:
+        """Return a joint that can move. Raise PluginError if the model has none of this name."""
+        joint = self.model.joints.get(name)
+        if joint is None:
+            raise PluginError(f"model '{self.model.name}' has no joint '{name}'")
+        return joint
+
+    def link(self, name: str) -> tuple[SimLink, Pose]:
+        """Return a link, and the pose in it of the named one, which may have been merged into it by a fixed joint.
+
+        Raise PluginError if there is none.
+        """
+        name = name.removeprefix(f"{self.model.name}::")
+        if name in self.model.links:
+            return self.model.links[name], IDENTITY
+        lumped = self.model.record.lumped.get(name)
+        if lumped is not None and lumped[0] in self.model.links:
+            return self.model.links[lumped[0]], lumped[1]
+        raise PluginError(f"model '{self.model.name}' has no link '{name}'")
+
+
+class Timer:
+    """Tells when a period of simulated time has passed. A rate of 0 means each step."""
+
+    def __init__(self, rate: float) -> None:
+        self._period = round(1e9 / rate) if rate > 0 else 0
+        self._next = 0
+
+    def is_due(self, now_ns: int) -> bool:
+        """Return whether the next period begins."""
+        if now_ns < self._next - self._period:  # the time was reset
+            self._next = now_ns
+        if now_ns < self._next:
+            return False
+        self._next = max(self._next + self._period, now_ns - self._period + 1)
+        return True
+
+
+class SensorPlugin(ModelPlugin):
+    """A plugin of a sensor: :meth:`sense` is called at the sensor's rate, or at ``self.rate`` if ``load`` sets it."""
+
+    def __init__(
+        self, loop: SimulationLoop, plugin: Plugin, model: SimModel, sensor: Sensor, link: SimLink
+    ) -> None:
+        super().__init__(loop, plugin, model)
+        self.sensor = sensor
+        self.sensor_link = link
+        self.rate = sensor.update_rate
+        self._timer: Timer | None = None
+
+    @property
+    def sensor_pose(self) -> Pose:
+        """Return the sensor's pose in the world."""
+        return multiply(self.sensor_link.pose, self.sensor.pose)
+
+    def is_needed(self) -> bool:
+        """Return whether anything uses the sensor's data, such as a subscriber."""
+        return True
+
+    def sense(self) -> None:
+        """Measure and publish."""
+
+    def update(self) -> None:
+        """Call :meth:`sense` if it is due."""
+        if self._timer is None:
+            self._timer = Timer(self.rate)
+        if self._timer.is_due(self.simulation.time_ns) and self.is_needed():
+            self.sense()
+
+    def reset(self) -> None:
+        """Start the sensor's period again."""
+        self._timer = None
+
+
+class PluginHost:
+    """Loads and runs the plugins of the world and of its models."""
+
+    def __init__(self, loop: SimulationLoop) -> None:
+        self._loop = loop
+        self._plugins: dict[str, list[PluginBase]] = {}  # by the model's name; "" is the world
+        self._running: list[PluginBase] = []
+        self._named: set[str] = set()  # libraries that are missing, after the line that says so
+        self._exported: dict[str, tuple[str, Path]] | None = None
+
+    def add_world(self, plugins: tuple[Plugin, ...]) -> None:
+        """Load the plugins of the world."""
+        for plugin in plugins:
+            if (kind := self._find(plugin, "the world")) is not None:
+                self._load("", kind, WorldPlugin, plugin)
+
+    def add_model(self, model: SimModel) -> None:
+        """Load the plugins of a model and of its sensors."""
+        record = model.record
+        for plugin in record.plugins:
+            if (kind := self._find(plugin, f"model '{model.name}'")) is not None:
+                self._load(model.name, kind, ModelPlugin, plugin, model)
+        for name, link in record.links.items():
+            for sensor in link.sensors:
+                for plugin in sensor.plugins:
+                    if (
+                        kind := self._find(plugin, f"sensor '{sensor.name}' of model '{model.name}'")
+                    ) is None:
+                        continue
+                    if issubclass(kind, SensorPlugin):
+                        self._load(model.name, kind, SensorPlugin, plugin, model, sensor, model.links[name])
+                    else:
+                        self._load(model.name, kind, ModelPlugin, plugin, model)
+
+    def remove_model(self, name: str) -> None:
+        """Close the plugins of a model."""
+        for plugin in self._plugins.pop(name, ()):
+            self._close(plugin)
+        self._list()
+
+    def update(self) -> None:
+        """Run all plugins before a step. A plugin that fails is closed and named."""
+        for plugin in self._running:
+            try:
+                plugin.update()
+            except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
+                self._fail(plugin, error)
+
+    def reset(self) -> None:
+        """Reset all plugins."""
+        for plugin in self._running:
+            try:
+                plugin.reset()
+            except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
+                self._fail(plugin, error)
+
+    def close(self) -> None:
+        """Close all plugins."""
+        for name in list(self._plugins):
+            self.remove_model(name)
+
+    def _list(self) -> None:
+        self._running = [plugin for plugins in self._plugins.values() for plugin in plugins]
+
+    def _load(self, owner: str, kind: type[PluginBase], base: type, plugin: Plugin, *context: object) -> None:
+        where = f"plugin '{plugin.name}' ({plugin.library})"
+        if not issubclass(kind, base):
+            rospy.logerr("%s is ignored: it must be a %s", where, base.__name__)
+            return
+        created: PluginBase | None = None
+        try:
+            created = kind(self._loop, plugin, *context)
+            created.load()
+        except PluginError as error:
+            rospy.logerr("%s is ignored: %s", where, error)
+        except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
+            rospy.logerr("%s is ignored: %s: %s", where, type(error).__name__, error)
+        else:
+            self._plugins.setdefault(owner, []).append(created)
+            self._list()
+            return
+        if created is not None:
+            self._close(created)
+
+    def _fail(self, plugin: PluginBase, error: Exception) -> None:
+        rospy.logerr(
+            "plugin '%s' (%s) failed and is closed: %s: %s",
+            plugin.name,
+            plugin.plugin.library,
+            type(error).__name__,
+            error,
+        )
+        for plugins in self._plugins.values():
+            if plugin in plugins:
+                plugins.remove(plugin)
+        self._close(plugin)
+        self._list()
+
+    @staticmethod
+    def _close(plugin: PluginBase) -> None:
+        try:
+            plugin.close()
+        except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
+            rospy.logerr("plugin '%s' failed at its end: %s", plugin.name, error)
+
+    def _find(self, plugin: Plugin, owner: str) -> type[PluginBase] | None:
+        """Return the class of a plugin's library, or None after one line that names what is missing."""
+        library = plugin.library
+        try:
+            if target := LIBRARIES.get(library):
+                module, _, name = target.partition(":")
+                found: type[PluginBase] = getattr(importlib.import_module(module), name)
+                return found
+            if self._exported is None:
+                self._exported = _exported_plugins()
+            if library in self._exported:
+                return _load_python(*self._exported[library])
+        except PluginError as error:
+            if library not in self._named:
+                rospy.logerr("lib%s.so of %s is ignored: %s", library, owner, error)
+            self._named.add(library)
+            return None
+        except ImportError as error:
+            if target and not (error.name or "").startswith("minirospy."):
+                raise
+        if library not in self._named:
+            self._named.add(library)
+            rospy.logwarn(
+                "lib%s.so of %s is not part of minirospy's simulation: the topics and motions of plugin '%s' are missing",
+                library,
+                owner,
+                plugin.name,
+            )
+        return None
+
+
+def _exported_plugins() -> dict[str, tuple[str, Path]]:
+    found: dict[str, tuple[str, Path]] = {}
+    for _, folder in sorted(Packages().folders().items()):
+        manifest = folder / "package.xml"
+        try:
+            if b"gazebo_ros" not in manifest.read_bytes():
+                continue
+            for export in read_manifest(manifest).exports:
+                library, python = (export.attributes.get(key, "") for key in ("library", "python"))
+                if export.tag == "gazebo_ros" and library and python:
+                    name = library.removesuffix(".so").removeprefix("lib")
+                    found.setdefault(name, (python, folder))
+        except (ManifestError, OSError) as error:
+            rospy.logwarn("plugins of %s are ignored: %s", manifest, error)
+    return found
+
+
+def _load_python(python: str, folder: Path) -> type[PluginBase]:
+    module, _, name = python.replace(":", ".").rpartition(".")
+    for place in (folder / "src", folder):
+        top = module.partition(".")[0]
+        if ((place / top).is_dir() or (place / f"{top}.py").is_file()) and str(place) not in sys.path:
+            sys.path.append(str(place))
+    try:
+        found: object = getattr(importlib.import_module(module), name)
+    except Exception as error:  # the user's module may raise anything
+        raise PluginError(f"cannot import {python}: {type(error).__name__}: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, PluginBase)):
+        raise PluginError(f"{python} is not a subclass of ModelPlugin, SensorPlugin or WorldPlugin")
+    return found

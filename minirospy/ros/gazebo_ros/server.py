@@ -1,0 +1,157 @@
+"""The simulation with its plugins and what it publishes: /clock, the states of models and links, markers for the 3D view."""
+
+from __future__ import annotations
+
+from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
+from rosgraph_msgs.msg import Clock
+
+from minirospy import client as rospy
+from minirospy.base.clock import SimulatedClock
+from minirospy.core.sdf.model import Light, Model, Pose, Vector, World
+from minirospy.ros.gazebo_ros.loop import SimulationLoop
+from minirospy.ros.gazebo_ros.markers import WorldMarkers
+from minirospy.ros.gazebo_ros.messages import time_of, to_pose, to_twist
+from minirospy.ros.gazebo_ros.paths import ResourcePaths
+from minirospy.ros.gazebo_ros.physics import LostModel, SimModel, State
+from minirospy.ros.gazebo_ros.plugins import PluginHost
+
+__all__ = ["Server"]
+
+METRICS_SECONDS = 1.0  # of simulated time, between two messages on /gazebo/performance_metrics
+
+
+class Server:
+    """The running world.
+
+    lights: by name; they have no effect on the physics. clock: this process's own, or None if it uses wall time.
+    """
+
+    def __init__(
+        self,
+        loop: SimulationLoop,
+        world: World,
+        resources: ResourcePaths,
+        clock: SimulatedClock | None,
+        *,
+        only_clock: bool,
+    ) -> None:
+        self.loop = loop
+        self.resources = resources
+        self.lights: dict[str, Light] = {light.name: light for light in world.lights}
+        self.plugins = PluginHost(loop)
+        self._clock = clock
+        self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._states: _StatePublishers | None = None
+        self._markers: WorldMarkers | None = None
+        if not only_clock:
+            self._states = _StatePublishers(loop)
+            self._markers = WorldMarkers(loop.simulation)
+        loop.before_step = self.plugins.update
+        loop.on_tick = self._tick
+        loop.on_lost = self._lost
+
+    def start(self, world: World) -> None:
+        """Load the plugins of the world file, and publish the markers. Call it in the loop's thread."""
+        self.plugins.add_world(world.plugins)
+        for model in list(self.loop.simulation.models.values()):
+            self.plugins.add_model(model)
+        self._changed()
+
+    def add_model(self, model: Model, pose: Pose, name: str) -> None:
+        """Add a model and load its plugins. Raise SimulationError if it cannot be added. Call it in the loop's thread."""
+        added: SimModel = self.loop.simulation.add_model(model, pose, name)
+        self.plugins.add_model(added)
+        self._changed()
+
+    def remove_model(self, name: str) -> None:
+        """Remove a model and its plugins. Call it in the loop's thread."""
+        self.plugins.remove_model(name)
+        self.loop.simulation.remove_model(name)
+        self._changed()
+
+    def moved(self, _name: str) -> None:
+        """Publish the states now if the simulation is paused. Call it in the loop's thread."""
+        if self.loop.is_paused:
+            self._publish_states()
+
+    def set_physics(self, step: float, update_rate: float, gravity: Vector) -> None:
+        """Set the engine's parameters. Raise SimulationError if one is invalid. Call it in the loop's thread."""
+        simulation = self.loop.simulation
+        physics = simulation.physics._replace(step=step, update_rate=update_rate, gravity=gravity)
+        simulation.set_physics(physics)
+        self.loop.set_update_rate(update_rate)
+
+    def reset(self, *, with_time: bool) -> None:
+        """Reset the models, and with the time also the plugins. Call it in the loop's thread."""
+        self.loop.reset(with_time=with_time)
+        if with_time:
+            self.plugins.reset()
+
+    def close(self) -> None:
+        """Close the plugins and end the loop."""
+        try:
+            self.loop.call(self.plugins.close)
+        finally:
+            self.loop.close()
+
+    def _changed(self) -> None:
+        if self._markers is not None:
+            self._markers.publish_all()
+        self._publish_states()
+
+    def _lost(self, lost: LostModel) -> None:
+        rospy.logerr("model '%s' %s", lost.name, lost.reason)
+        self.plugins.remove_model(lost.name)
+        self._changed()
+
+    def _tick(self) -> None:
+        now = self.loop.simulation.time_ns
+        if self._clock is not None:
+            self._clock.set(now)
+        if not self.loop.is_paused or now == 0:
+            self._clock_publisher.publish(Clock(time_of(now)))
+        self._publish_states()
+
+    def _publish_states(self) -> None:
+        if self._states is not None:
+            self._states.publish()
+        if self._markers is not None:
+            self._markers.publish_moved()
+
+
+class _StatePublishers:
+    """Publishes states if there are subscribers."""
+
+    def __init__(self, loop: SimulationLoop) -> None:
+        self._loop = loop
+        self._models = rospy.Publisher("~model_states", ModelStates, queue_size=10)
+        self._links = rospy.Publisher("~link_states", LinkStates, queue_size=10)
+        self._metrics = rospy.Publisher("~performance_metrics", PerformanceMetrics, queue_size=10)
+        self._next_metrics = 0
+
+    def publish(self) -> None:
+        models = self._loop.simulation.models.values()
+        if self._models.get_num_connections():
+            message = ModelStates()
+            for model in models:
+                _append(message, model.name, model.state)
+            self._models.publish(message)
+        if self._links.get_num_connections():
+            links = LinkStates()
+            for model in models:
+                for link in model.links.values():
+                    _append(links, link.scoped_name, link.state)
+            self._links.publish(links)
+        now = self._loop.simulation.time_ns
+        if not 0 <= self._next_metrics - now <= METRICS_SECONDS * 1e9:
+            self._next_metrics = now + round(METRICS_SECONDS * 1e9)
+            if self._metrics.get_num_connections():
+                metrics = PerformanceMetrics(real_time_factor=self._loop.real_time_factor)
+                metrics.header.stamp = time_of(now)
+                self._metrics.publish(metrics)
+
+
+def _append(message: ModelStates | LinkStates, name: str, state: State) -> None:
+    message.name.append(name)
+    message.pose.append(to_pose(state.pose))
+    message.twist.append(to_twist(state.linear, state.angular))
