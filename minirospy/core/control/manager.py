@@ -7,6 +7,7 @@ Source: http://wiki.ros.org/controller_manager, and the code of the noetic relea
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -295,9 +296,18 @@ class ControllerTable:
             self._call(each, "waiting", ControllerState.WAITING, time)
 
     def _start(self, each: Loaded, time: Time) -> None:
-        for joint, _ in each.joints:
-            if joint.active is None:
+        for joint, interface in each.joints:
+            if joint.active is not None:
+                continue
+            if math.isfinite(joint.position):
                 joint.position_command = joint.position  # a command from before must not move the joint
+            elif interface not in (Interface.VELOCITY, Interface.EFFORT):
+                each.state = ControllerState.STOPPED
+                self._log(
+                    ERROR,
+                    f"Controller '{each.info.name}' is not started: the position of joint '{joint.name}' is {joint.position}",
+                )
+                return
         if self._call(each, "starting", ControllerState.RUNNING, time):
             for joint, interface in each.joints:
                 joint.active = interface

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -166,6 +167,23 @@ def test_start_forgets_an_old_position_command(bench: Bench) -> None:
     joint.position, joint.position_command = 0.7, -2.0
     bench.switch(start="one")
     assert joint.position_command == 0.7
+
+
+@pytest.mark.parametrize("position", [math.nan, math.inf])
+def test_controller_is_not_started_while_the_position_of_its_joint_is_unknown(
+    bench: Bench, position: float
+) -> None:
+    controller = bench.load("one")
+    joint = bench.hardware.joints["a"]
+    joint.position = position
+    bench.switch(start="one")
+    assert controller.calls == ["init"]
+    assert (joint.active, joint.position_command) == (None, 0.5)
+    assert bench.states() == {"one": "stopped"}
+    assert bench.log == [f"8 Controller 'one' is not started: the position of joint 'a' is {position}"]
+    joint.position = 0.6
+    bench.switch(start="one")
+    assert bench.states() == {"one": "running"}
 
 
 @pytest.mark.parametrize(
