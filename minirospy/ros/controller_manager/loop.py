@@ -167,14 +167,15 @@ class ControlLoop:
         last = deadline = clock.now()
         while not self._stop.is_set():
             try:
-                is_reset = False
-                if not clock.sleep(max(1, deadline - clock.now()), self._stop):
+                # At most a period, because time may have jumped back while the last cycle was running.
+                if not clock.sleep(min(max(1, deadline - clock.now()), period), self._stop):
                     return
             except ROSTimeMovedBackwardsException:
                 pass
             now, started = clock.now(), wall.monotonic_ns()
             if is_reset := now < last:
                 self._log_jump(last - now)
+            if is_reset or not last:
                 deadline = now
             elapsed = now - last if last and not is_reset else 0
             self._cycle(Time(*divmod(now, _BILLION)), Duration(*divmod(elapsed, _BILLION)), is_reset)

@@ -212,6 +212,52 @@ def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: St
     assert "time jumped back by 49." in errors
 
 
+JUMP = """
+import sys
+import rospy
+from minirospy.client.session import current_session
+from controller_manager import ControlLoop
+from hardware_interface import RobotHardware
+
+rospy.init_node("robot")
+clock, times = current_session().clock, []
+
+
+class Robot(RobotHardware):
+    def write(self, time, period):
+        times.append((time.to_nsec() // 10_000_000, period.to_nsec() // 10_000_000))
+        if len(times) == 2:
+            clock.set(1_000_000_000)  # a simulation is reset while a cycle runs
+        elif len(times) == 5:
+            loop._stop.set()
+
+
+loop = ControlLoop(Robot())
+loop.start()
+import threading, time
+def tick():
+    clock.set(50_000_000_000)
+    while not loop._stop.is_set():
+        time.sleep(0.01)
+        clock.set(clock.now() + 10_000_000)
+threading.Thread(target=tick, daemon=True).start()
+loop.wait()
+print(times, max(loop._times.take()[0]), flush=True)
+"""
+
+
+def test_loop_goes_on_if_time_jumps_back_during_a_cycle(start: Start) -> None:
+    call("rospy.set_param('/use_sim_time', True)")
+    robot = start("-c", JUMP)
+    status, output, errors = robot.end()
+    assert status == 0
+    assert "time jumped back by 49." in errors
+    times, _, late = output.strip().rpartition(" ")
+    assert all(5000 <= hundredths < 5010 for hundredths, _ in eval(times)[:2])
+    assert all(100 < hundredths < 110 for hundredths, _ in eval(times)[2:5])
+    assert int(late) < 1_000_000_000  # also of the first cycle, although time began at 0
+
+
 SET_BACK = """
 import os, time
 time_ns = time.time_ns
