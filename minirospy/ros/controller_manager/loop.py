@@ -120,16 +120,17 @@ class ControlLoop:
         """Stop the controllers, and write once more so that the driver sees that its joints are released."""
         now = rospy.get_rostime()
         period = Duration(*divmod(self._times.period, _BILLION))
-        self.manager.close(now)
+        self.manager.stop(now)
         self._log_invalid()
         methods: tuple[Callable[[], object], ...] = (
             partial(self.hardware.write, now, period),
+            partial(self.manager.close, now),
             self.hardware.close,
         )
         for method in methods:
             try:
                 method()
-            except Exception as error:  # noqa: BLE001 - the driver's code
+            except BaseException as error:  # noqa: BLE001 - the driver's code
                 if not self._status:
                     rospy.logfatal("the hardware failed at the end: %s", describe_error(error))
                 self._status = 1

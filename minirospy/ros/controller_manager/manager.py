@@ -167,10 +167,10 @@ class ControllerManager:
                 self.table.withdraw()
             return is_done and not rospy.is_down() and not self._is_closed
 
-    def close(self, time: Time) -> None:
-        """Stop all controllers and close them, and end the services. Call it in the loop's thread, or after the loop.
+    def stop(self, time: Time) -> None:
+        """Stop all controllers and refuse further requests. Call it in the loop's thread, or after the loop. Idempotent.
 
-        Idempotent.
+        A last ``hardware.write`` then stops the joints, before :meth:`close` calls the master and code of the controllers.
         """
         self._is_closed = True
         if pending := self.table.withdraw():
@@ -178,6 +178,10 @@ class ControllerManager:
         self.table.stop_all(time)
         while self._waiting:
             self._waiting.pop().set()
+
+    def close(self, time: Time) -> None:
+        """Stop all controllers and close them, and end the services. Like :meth:`stop`, it is idempotent."""
+        self.stop(time)
         loaded, self.table.loaded = self.table.loaded, ()
         for each in reversed(loaded):
             self.table.close(each)
