@@ -105,7 +105,7 @@ class ControlLoop:
                 self._run_on_wall_time()
             else:
                 self._run_on_simulated_time()
-        except Exception as error:  # noqa: BLE001 - the driver's code
+        except BaseException as error:  # noqa: BLE001 - the driver's code, which may call sys.exit
             self._status = 1
             rospy.logfatal("the hardware failed, so the robot is stopped: %s", describe_error(error))
         try:

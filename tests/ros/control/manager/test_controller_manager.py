@@ -176,6 +176,35 @@ def test_hardware_that_fails_ends_the_node_with_status_1(start: Start, workspace
     assert "the hardware failed, so the robot is stopped: OSError: the cable is loose (<string>:" in line
 
 
+def test_driver_that_exits_stops_the_robot_and_ends_the_node(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT.replace('raise OSError("the cable is loose")', "sys.exit(7)"))
+    call(LOADS + 'cm.load_controller("one"); cm.start_controllers(["one"])')
+    robot.read_until("a 0.")
+    (workspace.parent / "fails").touch()
+    status, output, errors = robot.end()
+    assert status == 1
+    last = [line for line in output.splitlines() if not line.startswith("a 0")]
+    assert last == ["one stops", "one closes", "closed, active: [None, None]", "status 1"]
+    (line,) = lines_of(errors)
+    assert "the hardware failed, so the robot is stopped: SystemExit: 7 (<string>:" in line
+
+
+def test_joints_are_released_before_controllers_close_their_topics(start: Start, workspace: Path) -> None:
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    file.write_text(
+        file.read_text() + "    def close(self):\n        import time\n        time.sleep(1000)\n"
+    )
+    file.write_text(file.read_text().replace("class Other:\n    pass", "class Faulty(Hold):"))
+    write = "        if not any(joint.active for joint in self.joints.values()):\n            print('released', flush=True)\n"
+    robot = start("-c", ROBOT.replace("        time_.sleep(", write + "        time_.sleep("))
+    call(LOADS + 'cm.load_controller("faulty"); cm.start_controllers(["faulty"])')
+    robot.read_until("b 0.")
+    robot.process.send_signal(signal.SIGINT)
+    robot.read_until("faulty stops")
+    robot.read_until("released")
+    assert robot.end()[0] == 1
+
+
 CLOCK = """
 import itertools, threading, time
 import rospy
