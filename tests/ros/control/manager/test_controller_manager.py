@@ -132,6 +132,22 @@ def test_controller_that_raises_is_stopped_and_the_loop_goes_on(start: Start, wo
     assert line.endswith(f"Controller 'faulty' is stopped: update raised RuntimeError: no oil {place}")
 
 
+def test_start_that_fails_is_not_reported_as_success(start: Start, workspace: Path) -> None:
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    text = file.read_text()
+    file.write_text(
+        text.replace(
+            "    def update(self, time, period):\n        raise",
+            "    def starting(self, time):\n        raise",
+        )
+    )
+    start("-c", ROBOT)
+    assert call(LOADS + 'cm.load_controller("faulty"), cm.start_controller("faulty")').splitlines() == [
+        "Loaded 'faulty'",
+        "Error when starting ['faulty'] and stopping []",
+    ]
+
+
 def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
     robot = start("-c", ROBOT)
     loads = LOADS + 'cm.load_controller("one"), cm.start_controller("one")'
