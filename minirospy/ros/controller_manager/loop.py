@@ -226,7 +226,8 @@ class ControlLoop:
             status.level = DiagnosticStatus.WARN
             status.message = (
                 f"control loop: {overruns} of {len(busy)} cycles ended after the next one was due; "
-                f"the period is {times.period / 1e6:g} ms, the longest cycle took {durations.longest / 1e6:.1f} ms"
+                f"the period is {times.period / 1e6:g} ms, the longest cycle took {durations.longest / 1e6:.1f} ms, "
+                f"the latest one began {delays.longest / 1e6:.1f} ms late"
             )
         values = {
             "rate (Hz)": f"{_BILLION / times.period:g}",

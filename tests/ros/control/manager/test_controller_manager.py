@@ -372,6 +372,7 @@ def test_overruns_are_counted_and_not_caught_up(start: Start, workspace: Path) -
     robot.process.send_signal(signal.SIGINT)
     _, _, errors = robot.end()
     assert "cycles ended after the next one was due; the period is 10 ms, the longest cycle took" in errors
+    assert " ms late" in errors
 
 
 def test_driver_that_hangs_does_not_keep_the_node(start: Start, workspace: Path) -> None:
