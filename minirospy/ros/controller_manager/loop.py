@@ -32,6 +32,7 @@ __all__ = ["ControlLoop", "limits_of_parameters", "run"]
 
 _BILLION = 1_000_000_000
 _END_SECONDS = 5.0  # the longest wait for the loop's end at shutdown, in case a driver hangs
+_SLEEP_SECONDS = 0.1  # the longest sleep, after which a slow loop looks whether it must stop
 _REPORT_SECONDS = 1.0
 _WARN_SECONDS = 10.0  # between two warnings about overruns, or about commands that are not finite
 _WARN_SHARE = 0.05  # of the cycles of a second; a busy computer delays single ones
@@ -148,8 +149,10 @@ class ControlLoop:
         last_wall, last = now_of_wall(), clock()
         deadline = last + period
         while not stop.is_set():
-            if (left := deadline - clock()) > 0:
-                wall.sleep(left / _BILLION)
+            while (left := deadline - clock()) > 0:
+                wall.sleep(min(left / _BILLION, _SLEEP_SECONDS))
+                if stop.is_set():
+                    return
             now, started = now_of_wall(), clock()
             if is_reset := now < last_wall:
                 self._log_jump(last_wall - now)

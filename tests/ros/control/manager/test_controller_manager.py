@@ -388,6 +388,14 @@ def test_driver_that_hangs_does_not_keep_the_node(start: Start, workspace: Path)
     )
 
 
+def test_slow_loop_ends_at_once(start: Start) -> None:
+    robot = start("-c", ROBOT, "_rate:=0.02")
+    call("cm.list_controllers()")
+    robot.process.send_signal(signal.SIGINT)
+    status, output, errors = robot.end()
+    assert (status, output, errors) == (0, "closed, active: [None, None]\nstatus 0\n", "")
+
+
 def test_manager_starts_cleanly_after_a_kill_in_mid_motion(start: Start) -> None:
     for _ in range(3):
         robot = start("-c", ROBOT)
