@@ -222,9 +222,10 @@ class ControlLoop:
     def _status_message(self, overruns: int, late: Sequence[int], busy: Sequence[int]) -> DiagnosticStatus:
         times = self._times
         delays, durations = spread(late), spread(busy)
-        status = DiagnosticStatus(
-            name=f"{rospy.get_name()[1:]}: control loop", message="OK", hardware_id="none"
-        )
+        name, namespace = f"{rospy.get_name()[1:]}: control loop", self.manager.namespace
+        if namespace != "/" + rospy.get_namespace().strip("/"):
+            name += f" {namespace}"  # a node may have several robots
+        status = DiagnosticStatus(name=name, message="OK", hardware_id="none")
         if overruns:
             status.level = DiagnosticStatus.WARN
             status.message = (

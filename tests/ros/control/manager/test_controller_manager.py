@@ -341,6 +341,32 @@ def test_diagnostics_have_the_loops_times(start: Start) -> None:
     )
 
 
+TWO_ROBOTS = """
+import rospy
+from controller_manager import ControlLoop
+from hardware_interface import RobotHardware
+
+rospy.init_node("robots")
+for namespace in ("", "left"):
+    ControlLoop(RobotHardware(), 100.0, namespace).start()
+rospy.spin()
+"""
+
+
+def test_diagnostics_tell_the_loops_of_a_node_apart(start: Start) -> None:
+    start("-c", TWO_ROBOTS)
+    printed = call(
+        "from diagnostic_msgs.msg import DiagnosticArray\n"
+        "rospy.init_node('reader')\n"
+        "names = set()\n"
+        "rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: names.add(message.status[0].name))\n"
+        "while len(names) < 2:\n"
+        "    rospy.wait_for_message('/diagnostics', DiagnosticArray)\n"
+        "print(sorted(names))"
+    )
+    assert printed == "['robots: control loop', 'robots: control loop /left']\n"
+
+
 def test_commands_are_limited_by_parameters(start: Start) -> None:
     call(LOADS + "rospy.set_param('/joint_limits/a', {'has_velocity_limits': True, 'max_velocity': 0.01})")
     call("rospy.set_param('/one/step', 1.0); rospy.set_param('/two/step', float('nan'))")
