@@ -49,10 +49,6 @@ CPP = {
     "teb_local_planner": _NAVIGATION,
     "voxel_grid": _NAVIGATION,
     # Arms and controllers.
-    "diff_drive_controller": "ros_control, in C++",
-    "effort_controllers": "ros_control, in C++",
-    "joint_state_controller": "ros_control, in C++",
-    "joint_trajectory_controller": "ros_control, in C++",
     "moveit_commander": "MoveIt, in C++",
     "moveit_core": "MoveIt, in C++",
     "moveit_fake_controller_manager": "MoveIt, in C++",
@@ -64,9 +60,7 @@ CPP = {
     "moveit_servo": "MoveIt, in C++",
     "moveit_setup_assistant": "MoveIt, in C++",
     "moveit_simple_controller_manager": "MoveIt, in C++",
-    "position_controllers": "ros_control, in C++",
     "trac_ik_kinematics_plugin": "inverse kinematics, in C++",
-    "velocity_controllers": "ros_control, in C++",
     # Simulators.
     "stage_ros": "the simulator Stage, in C++",
     # Images, clouds, sensors.
@@ -138,7 +132,6 @@ _QT_REPOSITORIES = (
 QT_PLUGINS = (
     "rqt_action",
     "rqt_dep",
-    "rqt_joint_trajectory_controller",
     "rqt_msg",
     "rqt_nav_view",
     "rqt_pose_view",

@@ -184,7 +184,11 @@ class RobotHardware:
         """Set the state of joints and sensors. ``period``: ROS time since the last cycle."""
 
     def write(self, time: Time, period: Duration) -> None:
-        """Send the commands of the joints whose ``active`` is not None to the motors."""
+        """Send the commands of the joints to the motors, and stop the joints whose ``active`` is None.
+
+        A position motor holds its position without a command. One that keeps its last velocity or effort must be sent that of
+        the joint, which is 0 then.
+        """
 
     def close(self) -> None:
         """Close the device, after a last ``write`` in which no joint is active; both are called even if the hardware failed."""

@@ -7,6 +7,7 @@ Source: http://wiki.ros.org/controller_manager, and the code of the noetic relea
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -38,6 +39,8 @@ BEST_EFFORT, STRICT = 1, 2  # as in controller_manager_msgs/SwitchController
 
 _LIBRARY = (os.path.dirname(os.__file__), "<frozen ")  # the beginnings of the standard library's file names
 _MINIROSPY = str(Path(__file__).parents[2])
+
+_RAISED = (Exception, SystemExit)  # by the user's code, which may call sys.exit
 
 Log = Callable[[int, str], object]
 """Called with a level of rosgraph_msgs/Log, and a line."""
@@ -107,7 +110,7 @@ class ControllerTable:
             self._log(ERROR, "Failed to initialize the controller")
         except HardwareError as error:
             self._log(ERROR, f"Exception thrown while initializing controller '{name}'.\n{error}")
-        except Exception as error:  # noqa: BLE001 - the user's code
+        except _RAISED as error:
             self._log(
                 ERROR, f"Exception thrown while initializing controller '{name}'.\n{describe_error(error)}"
             )
@@ -219,7 +222,7 @@ class ControllerTable:
             if each.state is ControllerState.RUNNING:
                 try:
                     each.controller.update(time, period)
-                except Exception as error:  # noqa: BLE001 - the user's code
+                except _RAISED as error:
                     self._fail(each, "update", time, error)
 
         switch = self._switch
@@ -248,7 +251,7 @@ class ControllerTable:
     def _close(self, controller: Controller, name: str) -> None:
         try:
             controller.close()
-        except Exception as error:  # noqa: BLE001 - the user's code
+        except _RAISED as error:
             self._log(ERROR, f"Controller '{name}' raised in close: {describe_error(error)}")
 
     def _named(self, names: Iterable[str], is_strict: bool, verb: str) -> list[Loaded] | None:
@@ -295,9 +298,18 @@ class ControllerTable:
             self._call(each, "waiting", ControllerState.WAITING, time)
 
     def _start(self, each: Loaded, time: Time) -> None:
-        for joint, _ in each.joints:
-            if joint.active is None:
+        for joint, interface in each.joints:
+            if joint.active is not None:
+                continue
+            if math.isfinite(joint.position):
                 joint.position_command = joint.position  # a command from before must not move the joint
+            elif interface not in (Interface.VELOCITY, Interface.EFFORT):
+                each.state = ControllerState.STOPPED
+                self._log(
+                    ERROR,
+                    f"Controller '{each.info.name}' is not started: the position of joint '{joint.name}' is {joint.position}",
+                )
+                return
         if self._call(each, "starting", ControllerState.RUNNING, time):
             for joint, interface in each.joints:
                 joint.active = interface
@@ -310,19 +322,19 @@ class ControllerTable:
         """Call a method of a controller and set its state; if it raises, stop the controller and return False."""
         try:
             getattr(each.controller, method)(time)
-        except Exception as error:  # noqa: BLE001 - the user's code
+        except _RAISED as error:
             self._fail(each, method, time, error)
             return False
         each.state = state
         return True
 
-    def _fail(self, each: Loaded, method: str, time: Time, error: Exception) -> None:
+    def _fail(self, each: Loaded, method: str, time: Time, error: BaseException) -> None:
         """Stop a controller that raised; its joints are released, the others go on."""
         was_running, each.state = each.is_running, ControllerState.STOPPED
-        _release(each)
         self._log(ERROR, f"Controller '{each.info.name}' is stopped: {method} raised {describe_error(error)}")
         if was_running and method != "stopping":
             self._call(each, "stopping", ControllerState.STOPPED, time)
+        _release(each)
 
 
 def describe_error(error: BaseException) -> str:

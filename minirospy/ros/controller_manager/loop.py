@@ -32,6 +32,7 @@ __all__ = ["ControlLoop", "limits_of_parameters", "run"]
 
 _BILLION = 1_000_000_000
 _END_SECONDS = 5.0  # the longest wait for the loop's end at shutdown, in case a driver hangs
+_SLEEP_SECONDS = 0.1  # the longest sleep, after which a slow loop looks whether it must stop
 _REPORT_SECONDS = 1.0
 _WARN_SECONDS = 10.0  # between two warnings about overruns, or about commands that are not finite
 _WARN_SHARE = 0.05  # of the cycles of a second; a busy computer delays single ones
@@ -105,7 +106,7 @@ class ControlLoop:
                 self._run_on_wall_time()
             else:
                 self._run_on_simulated_time()
-        except Exception as error:  # noqa: BLE001 - the driver's code
+        except BaseException as error:  # noqa: BLE001 - the driver's code, which may call sys.exit
             self._status = 1
             rospy.logfatal("the hardware failed, so the robot is stopped: %s", describe_error(error))
         try:
@@ -120,16 +121,17 @@ class ControlLoop:
         """Stop the controllers, and write once more so that the driver sees that its joints are released."""
         now = rospy.get_rostime()
         period = Duration(*divmod(self._times.period, _BILLION))
-        self.manager.close(now)
+        self.manager.stop(now)
         self._log_invalid()
         methods: tuple[Callable[[], object], ...] = (
             partial(self.hardware.write, now, period),
+            partial(self.manager.close, now),
             self.hardware.close,
         )
         for method in methods:
             try:
                 method()
-            except Exception as error:  # noqa: BLE001 - the driver's code
+            except BaseException as error:  # noqa: BLE001 - the driver's code
                 if not self._status:
                     rospy.logfatal("the hardware failed at the end: %s", describe_error(error))
                 self._status = 1
@@ -147,8 +149,10 @@ class ControlLoop:
         last_wall, last = now_of_wall(), clock()
         deadline = last + period
         while not stop.is_set():
-            if (left := deadline - clock()) > 0:
-                wall.sleep(left / _BILLION)
+            while (left := deadline - clock()) > 0:
+                wall.sleep(min(left / _BILLION, _SLEEP_SECONDS))
+                if stop.is_set():
+                    return
             now, started = now_of_wall(), clock()
             if is_reset := now < last_wall:
                 self._log_jump(last_wall - now)
@@ -167,14 +171,15 @@ class ControlLoop:
         last = deadline = clock.now()
         while not self._stop.is_set():
             try:
-                is_reset = False
-                if not clock.sleep(max(1, deadline - clock.now()), self._stop):
+                # At most a period, because time may have jumped back while the last cycle was running.
+                if not clock.sleep(min(max(1, deadline - clock.now()), period), self._stop):
                     return
             except ROSTimeMovedBackwardsException:
                 pass
             now, started = clock.now(), wall.monotonic_ns()
             if is_reset := now < last:
                 self._log_jump(last - now)
+            if is_reset or not last:
                 deadline = now
             elapsed = now - last if last and not is_reset else 0
             self._cycle(Time(*divmod(now, _BILLION)), Duration(*divmod(elapsed, _BILLION)), is_reset)
@@ -217,14 +222,16 @@ class ControlLoop:
     def _status_message(self, overruns: int, late: Sequence[int], busy: Sequence[int]) -> DiagnosticStatus:
         times = self._times
         delays, durations = spread(late), spread(busy)
-        status = DiagnosticStatus(
-            name=f"{rospy.get_name()[1:]}: control loop", message="OK", hardware_id="none"
-        )
+        name, namespace = f"{rospy.get_name()[1:]}: control loop", self.manager.namespace
+        if namespace != "/" + rospy.get_namespace().strip("/"):
+            name += f" {namespace}"  # a node may have several robots
+        status = DiagnosticStatus(name=name, message="OK", hardware_id="none")
         if overruns:
             status.level = DiagnosticStatus.WARN
             status.message = (
                 f"control loop: {overruns} of {len(busy)} cycles ended after the next one was due; "
-                f"the period is {times.period / 1e6:g} ms, the longest cycle took {durations.longest / 1e6:.1f} ms"
+                f"the period is {times.period / 1e6:g} ms, the longest cycle took {durations.longest / 1e6:.1f} ms, "
+                f"the latest one began {delays.longest / 1e6:.1f} ms late"
             )
         values = {
             "rate (Hz)": f"{_BILLION / times.period:g}",

@@ -31,6 +31,7 @@ from minirospy.base.errors import UrdfError
 from minirospy.base.log_levels import DEBUG, ERROR, FATAL, INFO, WARN
 from minirospy.base.times import Duration, Time
 from minirospy.core.control.controller import Controller, ControllerContext, ControllerError
+from minirospy.core.control.controller import ControllerState as State
 from minirospy.core.control.hardware import RobotHardware
 from minirospy.core.control.manager import BEST_EFFORT, ControllerTable
 from minirospy.core.control.parameters import Parameters
@@ -149,6 +150,7 @@ class ControllerManager:
     ) -> bool:
         """Start and stop controllers in one update, and wait for it; return whether that succeeded. A failure is logged.
 
+        As in ROS, a start that the hardware aborts is a success; one that fails in the controller is not, unlike there.
         Wait without limit if ``timeout`` is 0, else for ``timeout`` plus one second.
         """
         with self._lock:
@@ -165,12 +167,13 @@ class ControllerManager:
                 is_done = done.wait(None if end is None else end - wall.monotonic())
             if not is_done:
                 self.table.withdraw()
-            return is_done and not rospy.is_down() and not self._is_closed
+            has_failed = any(each.state is State.STOPPED for each in plan.start)
+            return is_done and not has_failed and not rospy.is_down() and not self._is_closed
 
-    def close(self, time: Time) -> None:
-        """Stop all controllers and close them, and end the services. Call it in the loop's thread, or after the loop.
+    def stop(self, time: Time) -> None:
+        """Stop all controllers and refuse further requests. Call it in the loop's thread, or after the loop. Idempotent.
 
-        Idempotent.
+        A last ``hardware.write`` then stops the joints, before :meth:`close` calls the master and code of the controllers.
         """
         self._is_closed = True
         if pending := self.table.withdraw():
@@ -178,6 +181,10 @@ class ControllerManager:
         self.table.stop_all(time)
         while self._waiting:
             self._waiting.pop().set()
+
+    def close(self, time: Time) -> None:
+        """Stop all controllers and close them, and end the services. Like :meth:`stop`, it is idempotent."""
+        self.stop(time)
         loaded, self.table.loaded = self.table.loaded, ()
         for each in reversed(loaded):
             self.table.close(each)

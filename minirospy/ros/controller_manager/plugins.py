@@ -62,7 +62,7 @@ class Plugin(NamedTuple):
             found: object = importlib.import_module(module)
             for part in name.split("."):
                 found = getattr(found, part)
-        except Exception as error:  # the user's module may raise anything
+        except (Exception, SystemExit) as error:  # the user's module may raise anything
             trace = error.__traceback__
             why = describe_error(error.with_traceback(trace and trace.tb_next))  # without this function
             raise PluginError(f"cannot import {self.python} ({self.origin}): {why}") from error

@@ -137,6 +137,8 @@ class _Spawner:
         rospy.loginfo("Shutting down spawner. Stopping and unloading controllers...")
         try:
             rospy.loginfo("Stopping all controllers...")
+            if not self._loaded:
+                return  # the manager may be busy with the controller that it loads, and would not answer
             self._switch([], self._loaded, SwitchControllerRequest.STRICT, False, 0.0)
             rospy.loginfo("Unloading all loaded controllers...")
             for name in reversed(self._loaded):
@@ -151,7 +153,7 @@ def _controllers(words: Sequence[str]) -> list[str]:
     """Return the controllers' names; a word that is a file stands for the names in it, whose parameters are set."""
     names: list[str] = []
     for word in words:
-        if not Path(word).exists():
+        if not Path(word).is_file():
             names.append(word)
             continue
         for values, _ in load_file(word):

@@ -31,12 +31,18 @@ def main() -> int:
     list_ = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)
     stopped: set[str] = set()
 
-    def stop(_: object = None) -> None:
+    def stop() -> None:
         running = names & {each.name for each in list_().controller if each.state == "running"}
         if running:
             rospy.loginfo("Inhibiting controllers: " + ", ".join(sorted(running)))
             switch(strictness=SwitchControllerRequest.BEST_EFFORT, stop_controllers=sorted(running))
             stopped.update(running)
+
+    def stop_again(_: object) -> None:
+        try:
+            stop()
+        except rospy.ServiceException as error:  # the manager may come back
+            rospy.logwarn("%s", error)
 
     def start() -> None:
         timer.shutdown()
@@ -49,7 +55,7 @@ def main() -> int:
         switch.wait_for_service()
         list_.wait_for_service()
         stop()
-        timer = rospy.Timer(rospy.Duration(_PERIOD_SECONDS), stop)
+        timer = rospy.Timer(rospy.Duration(_PERIOD_SECONDS), stop_again)
         rospy.on_shutdown(start)
         rospy.spin()
     except rospy.ROSInterruptException:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,7 +54,7 @@ class Recorder(Controller):
 
     def __init__(self) -> None:
         self.calls: list[str] = []
-        self.faults: dict[str, Exception] = {}
+        self.faults: dict[str, BaseException] = {}
 
     def _record(self, name: str) -> None:
         self.calls.append(name)
@@ -166,6 +167,23 @@ def test_start_forgets_an_old_position_command(bench: Bench) -> None:
     joint.position, joint.position_command = 0.7, -2.0
     bench.switch(start="one")
     assert joint.position_command == 0.7
+
+
+@pytest.mark.parametrize("position", [math.nan, math.inf])
+def test_controller_is_not_started_while_the_position_of_its_joint_is_unknown(
+    bench: Bench, position: float
+) -> None:
+    controller = bench.load("one")
+    joint = bench.hardware.joints["a"]
+    joint.position = position
+    bench.switch(start="one")
+    assert controller.calls == ["init"]
+    assert (joint.active, joint.position_command) == (None, 0.5)
+    assert bench.states() == {"one": "stopped"}
+    assert bench.log == [f"8 Controller 'one' is not started: the position of joint 'a' is {position}"]
+    joint.position = 0.6
+    bench.switch(start="one")
+    assert bench.states() == {"one": "running"}
 
 
 @pytest.mark.parametrize(
@@ -369,6 +387,32 @@ def test_controller_that_raises_in_starting_is_stopped(bench: Bench) -> None:
     assert bench.states() == {"one": "stopped"}
     assert bench.hardware.joints["a"].active is None
     assert "starting raised RuntimeError (" in bench.log[0]
+
+
+@pytest.mark.parametrize("method", ["init", "starting", "update", "stopping", "close"])
+def test_controller_that_exits_is_stopped_and_the_loop_goes_on(bench: Bench, method: str) -> None:
+    bad = bench.load("bad", faults={method: SystemExit(3)})
+    good = bench.load("good", joints=("b",))
+    bench.switch(start="good")
+    bench.switch(start="bad", strictness=BEST_EFFORT)
+    bench.update()
+    bench.switch(stop="bad", strictness=BEST_EFFORT)
+    if unloaded := bench.table.unload("bad"):
+        bench.table.close(unloaded)
+    assert bench.hardware.joints["a"].active is None
+    assert good.calls.count("update") == 3
+    assert method in bad.calls
+    assert any("SystemExit: 3" in line for line in bench.log)
+
+
+def test_commands_that_a_failed_controller_sets_in_stopping_are_forgotten(bench: Bench) -> None:
+    bad = bench.load("bad")
+    joint = bench.hardware.joints["a"]
+    bad.stopping = lambda time: setattr(joint, "velocity_command", 2.0)  # type: ignore[method-assign]
+    bench.switch(start="bad")
+    bad.faults = {"update": ValueError()}
+    bench.update()
+    assert (joint.active, joint.velocity_command) == (None, 0.0)
 
 
 def test_reset_restarts_running_controllers(bench: Bench) -> None:

@@ -81,8 +81,8 @@ class GripperActionController(Controller):
     def starting(self, time: Time) -> None:
         """Hold the present position."""
         self._hold()
-        self.is_running = True
         self._action.start()
+        self.is_running = True  # only now, so that the action is ready for each accepted goal
 
     def update(self, time: Time, period: Duration) -> None:
         """Send the command of this cycle, and a goal's result when it is due."""

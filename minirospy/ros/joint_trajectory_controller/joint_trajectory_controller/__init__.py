@@ -120,9 +120,9 @@ class JointTrajectoryController(Controller):
             joint.position if math.isfinite(joint.position) else joint.position_command
             for joint in self.joints
         ]
+        self._action.start()  # first, so that it is ready for each goal that the follower accepts
         self.follower.start(time.to_nsec(), positions, [joint.velocity for joint in self.joints])
         self._state_due = self._state_period
-        self._action.start()
         self.reset()
 
     def update(self, time: Time, period: Duration) -> None:

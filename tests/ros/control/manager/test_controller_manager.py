@@ -132,6 +132,22 @@ def test_controller_that_raises_is_stopped_and_the_loop_goes_on(start: Start, wo
     assert line.endswith(f"Controller 'faulty' is stopped: update raised RuntimeError: no oil {place}")
 
 
+def test_start_that_fails_is_not_reported_as_success(start: Start, workspace: Path) -> None:
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    text = file.read_text()
+    file.write_text(
+        text.replace(
+            "    def update(self, time, period):\n        raise",
+            "    def starting(self, time):\n        raise",
+        )
+    )
+    start("-c", ROBOT)
+    assert call(LOADS + 'cm.load_controller("faulty"), cm.start_controller("faulty")').splitlines() == [
+        "Loaded 'faulty'",
+        "Error when starting ['faulty'] and stopping []",
+    ]
+
+
 def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
     robot = start("-c", ROBOT)
     loads = LOADS + 'cm.load_controller("one"), cm.start_controller("one")'
@@ -176,6 +192,35 @@ def test_hardware_that_fails_ends_the_node_with_status_1(start: Start, workspace
     assert "the hardware failed, so the robot is stopped: OSError: the cable is loose (<string>:" in line
 
 
+def test_driver_that_exits_stops_the_robot_and_ends_the_node(start: Start, workspace: Path) -> None:
+    robot = start("-c", ROBOT.replace('raise OSError("the cable is loose")', "sys.exit(7)"))
+    call(LOADS + 'cm.load_controller("one"); cm.start_controllers(["one"])')
+    robot.read_until("a 0.")
+    (workspace.parent / "fails").touch()
+    status, output, errors = robot.end()
+    assert status == 1
+    last = [line for line in output.splitlines() if not line.startswith("a 0")]
+    assert last == ["one stops", "one closes", "closed, active: [None, None]", "status 1"]
+    (line,) = lines_of(errors)
+    assert "the hardware failed, so the robot is stopped: SystemExit: 7 (<string>:" in line
+
+
+def test_joints_are_released_before_controllers_close_their_topics(start: Start, workspace: Path) -> None:
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    file.write_text(
+        file.read_text() + "    def close(self):\n        import time\n        time.sleep(1000)\n"
+    )
+    file.write_text(file.read_text().replace("class Other:\n    pass", "class Faulty(Hold):"))
+    write = "        if not any(joint.active for joint in self.joints.values()):\n            print('released', flush=True)\n"
+    robot = start("-c", ROBOT.replace("        time_.sleep(", write + "        time_.sleep("))
+    call(LOADS + 'cm.load_controller("faulty"); cm.start_controllers(["faulty"])')
+    robot.read_until("b 0.")
+    robot.process.send_signal(signal.SIGINT)
+    robot.read_until("faulty stops")
+    robot.read_until("released")
+    assert robot.end()[0] == 1
+
+
 CLOCK = """
 import itertools, threading, time
 import rospy
@@ -210,6 +255,52 @@ def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: St
     status, _, errors = robot.end()
     assert status == 0
     assert "time jumped back by 49." in errors
+
+
+JUMP = """
+import sys
+import rospy
+from minirospy.client.session import current_session
+from controller_manager import ControlLoop
+from hardware_interface import RobotHardware
+
+rospy.init_node("robot")
+clock, times = current_session().clock, []
+
+
+class Robot(RobotHardware):
+    def write(self, time, period):
+        times.append((time.to_nsec() // 10_000_000, period.to_nsec() // 10_000_000))
+        if len(times) == 2:
+            clock.set(1_000_000_000)  # a simulation is reset while a cycle runs
+        elif len(times) == 5:
+            loop._stop.set()
+
+
+loop = ControlLoop(Robot())
+loop.start()
+import threading, time
+def tick():
+    clock.set(50_000_000_000)
+    while not loop._stop.is_set():
+        time.sleep(0.01)
+        clock.set(clock.now() + 10_000_000)
+threading.Thread(target=tick, daemon=True).start()
+loop.wait()
+print(times, max(loop._times.take()[0]), flush=True)
+"""
+
+
+def test_loop_goes_on_if_time_jumps_back_during_a_cycle(start: Start) -> None:
+    call("rospy.set_param('/use_sim_time', True)")
+    robot = start("-c", JUMP)
+    status, output, errors = robot.end()
+    assert status == 0
+    assert "time jumped back by 49." in errors
+    times, _, late = output.strip().rpartition(" ")
+    assert all(5000 <= hundredths < 5010 for hundredths, _ in eval(times)[:2])
+    assert all(100 < hundredths < 110 for hundredths, _ in eval(times)[2:5])
+    assert int(late) < 1_000_000_000  # also of the first cycle, although time began at 0
 
 
 SET_BACK = """
@@ -250,6 +341,32 @@ def test_diagnostics_have_the_loops_times(start: Start) -> None:
     )
 
 
+TWO_ROBOTS = """
+import rospy
+from controller_manager import ControlLoop
+from hardware_interface import RobotHardware
+
+rospy.init_node("robots")
+for namespace in ("", "left"):
+    ControlLoop(RobotHardware(), 100.0, namespace).start()
+rospy.spin()
+"""
+
+
+def test_diagnostics_tell_the_loops_of_a_node_apart(start: Start) -> None:
+    start("-c", TWO_ROBOTS)
+    printed = call(
+        "from diagnostic_msgs.msg import DiagnosticArray\n"
+        "rospy.init_node('reader')\n"
+        "names = set()\n"
+        "rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: names.add(message.status[0].name))\n"
+        "while len(names) < 2:\n"
+        "    rospy.wait_for_message('/diagnostics', DiagnosticArray)\n"
+        "print(sorted(names))"
+    )
+    assert printed == "['robots: control loop', 'robots: control loop /left']\n"
+
+
 def test_commands_are_limited_by_parameters(start: Start) -> None:
     call(LOADS + "rospy.set_param('/joint_limits/a', {'has_velocity_limits': True, 'max_velocity': 0.01})")
     call("rospy.set_param('/one/step', 1.0); rospy.set_param('/two/step', float('nan'))")
@@ -281,6 +398,7 @@ def test_overruns_are_counted_and_not_caught_up(start: Start, workspace: Path) -
     robot.process.send_signal(signal.SIGINT)
     _, _, errors = robot.end()
     assert "cycles ended after the next one was due; the period is 10 ms, the longest cycle took" in errors
+    assert " ms late" in errors
 
 
 def test_driver_that_hangs_does_not_keep_the_node(start: Start, workspace: Path) -> None:
@@ -294,6 +412,14 @@ def test_driver_that_hangs_does_not_keep_the_node(start: Start, workspace: Path)
     assert lines_of(errors)[-1] == (
         "the control loop does not end: a controller, or read() or write() of the hardware, hangs"
     )
+
+
+def test_slow_loop_ends_at_once(start: Start) -> None:
+    robot = start("-c", ROBOT, "_rate:=0.02")
+    call("cm.list_controllers()")
+    robot.process.send_signal(signal.SIGINT)
+    status, output, errors = robot.end()
+    assert (status, output, errors) == (0, "closed, active: [None, None]\nstatus 0\n", "")
 
 
 def test_manager_starts_cleanly_after_a_kill_in_mid_motion(start: Start) -> None:

@@ -86,6 +86,48 @@ def test_spawner_without_a_manager_warns_and_ends_with_status_0(start: Start) ->
     ]
 
 
+def test_spawner_ends_while_the_manager_is_busy_with_its_controller(start: Start, workspace: Path) -> None:
+    file = workspace / "src" / "my_controllers" / "hold.py"
+    init = "    def init(self, hardware, context):\n        print('waits', flush=True)\n        threading.Event().wait()\n"
+    file.write_text("import threading\n" + file.read_text() + "\n\nclass Faulty(Hold):\n" + init)
+    robot = start("-c", ROBOT)
+    call("rospy.set_param('/slow', {'type': 'my_controllers/Faulty', 'joint': 'a'})")
+    spawner = start("controller_manager", "spawner", "slow")
+    robot.read_until("waits")
+    status, log, errors = interrupt(spawner)
+    assert (status, errors) == (0, [])
+    assert log[-2:] == [
+        "Shutting down spawner. Stopping and unloading controllers...",
+        "Stopping all controllers...",
+    ]
+
+
+def test_spawner_takes_the_name_of_a_folder_for_a_controller(start: Start, workspace: Path) -> None:
+    start("-c", ROBOT)
+    call(HOLD % ("one", "a"))
+    (workspace.parent / "one").mkdir()
+    spawner = start("controller_manager", "spawner", "one")
+    spawner.read_until("Started controllers: one")
+
+
+def test_unspawner_goes_on_without_the_manager(start: Start) -> None:
+    robot = start("-c", ROBOT)
+    call(HOLD % ("one", "a") + "cm.load_controller('one'), cm.start_controller('one')")
+    unspawner = start("controller_manager", "unspawner", "one")
+    unspawner.read_until("Inhibiting controllers: one")
+    robot.read_until("one stops")
+    call("cm.list_controllers()")  # answered after the switch
+    robot.process.kill()
+    robot.process.wait()
+    assert unspawner.process.stderr
+    assert "[WARN]" in (line := unspawner.process.stderr.readline()), line
+    robot = start("-c", ROBOT)
+    call("cm.load_controller('one'), cm.start_controller('one')")
+    unspawner.read_until("Inhibiting controllers: one")
+    robot.read_until("one stops")
+    assert interrupt(unspawner)[0] == 0
+
+
 def test_unspawner_and_groups(start: Start) -> None:
     start("-c", ROBOT)
     call(
