@@ -150,6 +150,16 @@ class TestHarm:
         assert world.models == ()
         assert "more than 16 levels deep" in world.warnings[0]
 
+    def test_warnings_have_a_limit(self) -> None:
+        visuals = "".join(f'<visual name="v{index}"/>' for index in range(1000))
+        (model,) = read(f'<model name="m"><link name="a">{visuals}</link></model>').models
+        assert len(model.warnings) == 201
+        assert model.warnings[-1] == "world: there are more than 200 warnings: the others are not listed"
+
+    def test_thousands_of_models_with_the_same_name(self) -> None:
+        world = read(MODEL.format("a") * 3000)
+        assert world.models[-1].name == "a_2998"
+
     def test_entities_of_a_document_type(self) -> None:
         text = '<!DOCTYPE sdf [<!ENTITY a "aaaa">]><sdf version="1.6"><world name="&a;"/></sdf>'
         with pytest.raises(SdfError, match="the entity &a; is declared, and entities are not supported"):
