@@ -164,6 +164,10 @@ class _Reader:
 
     def _include(self, child: Element) -> None:
         source = self.source
+        uri = source.text(child, "uri")
+        if uri and source.find(uri) is None:
+            source.warn(child, f"{uri} does not exist, and is left out of model [{self.name}]")
+            return
         included = open_include(child, source.inside(child))
         if included is None or included.entity.tag != "model":
             source.warn(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 from minirospy.base.errors import SdfError
@@ -77,6 +77,9 @@ class _Reader:
     lights: list[Light] = field(default_factory=list)
     plugins: list[Plugin] = field(default_factory=list)
     names: set[str] = field(default_factory=set)
+    numbers: dict[str, Iterator[int]] = field(
+        default_factory=dict
+    )  # the next ones for names that exist already
     ambient: Color = World.ambient
     background: Color = World.background
     camera: Pose | None = None
@@ -177,9 +180,8 @@ class _Reader:
         """Return a name that no other model or light has, by appending a number as Gazebo does."""
         unused = name
         if name in self.names:
-            unused = next(
-                each for number in itertools.count() if (each := f"{name}_{number}") not in self.names
-            )
+            numbers = self.numbers.setdefault(name, itertools.count())
+            unused = next(each for number in numbers if (each := f"{name}_{number}") not in self.names)
             self.source.warn(child, f"[{name}] exists already: this one is [{unused}]")
         self.names.add(unused)
         return unused

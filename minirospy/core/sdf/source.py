@@ -24,7 +24,8 @@ URIs begin with ``model://``, ``package://`` or ``file://``.
 
 MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
 MAX_INCLUDES = 16  # files and models inside each other; deeper ones are a mistake or an attack
-MAX_PARTS = 100_000  # links, joints and models that one world or spawn request may have
+MAX_WARNINGS = 200  # lines about one model or world; nobody reads more
+MAX_PARTS = 20_000  # links, joints and models that one world or spawn request may have
 _UNLIMITED = 1e16  # sdformat writes infinite limits as this number
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no", "")
@@ -68,10 +69,13 @@ class Source:
     depth: int = 0
 
     def warn(self, element: Element | None, text: str) -> None:
-        """Add a line about a part that is left out or changed. Repeated lines are added once."""
+        """Add a line about a part that is left out or changed. Repeated lines are added once, and there is a limit."""
         line = f"{self.file}:{element.line}: {text}" if element and element.line else f"{self.file}: {text}"
-        if line not in self.warnings[-100:]:
-            self.warnings.append(line)
+        if len(self.warnings) > MAX_WARNINGS or line in self.warnings:
+            return
+        if len(self.warnings) == MAX_WARNINGS:
+            line = f"{self.file}: there are more than {MAX_WARNINGS} warnings: the others are not listed"
+        self.warnings.append(line)
 
     def error(self, element: Element, text: str) -> SdfError:
         """Return the error for an element that cannot be read."""
@@ -203,7 +207,7 @@ class Source:
         values = []
         for part in element.text.split():
             try:
-                value = float(part)
+                value = float(part if "_" not in part else "")  # Python accepts 1_000
             except ValueError:
                 raise self.error(
                     element, f"<{element.tag}> is '{_short(element.text)}': '{_short(part)}' is not a number"

@@ -96,6 +96,16 @@ class TestIncludes:
         assert car.links["left::link"].pose.position == (0.0, 1.0, 0.0)
         assert car.joints["j"].child == "left::link"
 
+    def test_a_missing_part_of_a_model_is_named_and_the_rest_stays(self, library: Library) -> None:
+        include = "<include><uri>model://typo</uri><name>left</name></include>"
+        joint = '<joint name="j" type="fixed"><parent>body</parent><child>left::link</child></joint>'
+        (car,) = library.read(f'<model name="car"><link name="body"/>{include}{joint}</model>').models
+        assert list(car.links) == ["body"]
+        assert car.warnings == (
+            "world:1: model://typo does not exist, and is left out of model [car]",
+            "world:1: joint [j] is left out: its child link [left::link] does not exist",
+        )
+
     def test_a_missing_model_is_named_with_a_hint(self, library: Library) -> None:
         world = library.read(f"{MODEL.format('box')}\n<include><uri>model://typo</uri></include>")
         assert [model.name for model in world.models] == ["box"]
@@ -149,6 +159,16 @@ class TestHarm:
         world = library.read("<include><uri>model://l0</uri></include>")
         assert world.models == ()
         assert "more than 16 levels deep" in world.warnings[0]
+
+    def test_warnings_have_a_limit(self) -> None:
+        visuals = "".join(f'<visual name="v{index}"/>' for index in range(1000))
+        (model,) = read(f'<model name="m"><link name="a">{visuals}</link></model>').models
+        assert len(model.warnings) == 201
+        assert model.warnings[-1] == "world: there are more than 200 warnings: the others are not listed"
+
+    def test_thousands_of_models_with_the_same_name(self) -> None:
+        world = read(MODEL.format("a") * 3000)
+        assert world.models[-1].name == "a_2998"
 
     def test_entities_of_a_document_type(self) -> None:
         text = '<!DOCTYPE sdf [<!ENTITY a "aaaa">]><sdf version="1.6"><world name="&a;"/></sdf>'
