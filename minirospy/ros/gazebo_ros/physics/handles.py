@@ -296,7 +296,7 @@ class SimJoint:
         if math.isnan(max_force):
             raise SimulationError("a motor's maximum force is not finite")
         force = min(max(max_force, 0.0), MAX_FORCE)
-        same = force == self._max_force and self.dof >= 0
+        same = force == self._max_force > 0 and self.dof >= 0
         self._max_force = force
         if same and self._target is None and not self._engine.follows_position[self.dof]:
             self._engine.set_target(self.dof, self._velocity)
@@ -312,8 +312,9 @@ class SimJoint:
         engine, dof = self._engine, self.dof
         friction = max(self.axis.friction, 0.0)
         engine.model.dof_frictionloss[dof] = self._max_force or friction
-        engine.target_velocity[dof] = self._velocity
-        engine.follows_position[dof] = self._target is not None
+        # Without a motor the row is the joint's friction, whose target is to stand still.
+        engine.target_velocity[dof] = self._velocity if self._max_force else 0.0
+        engine.follows_position[dof] = self._target is not None and self._max_force > 0
         if self._target is not None:
             engine.target_position[dof] = self._target
         engine.max_velocity[dof] = self._max_velocity
