@@ -299,6 +299,28 @@ def test_a_motor_without_force_leaves_the_friction() -> None:
     assert handle.velocity == 0.0
 
 
+def test_a_gripper_lifts_a_cube_and_holds_it() -> None:
+    links = {"palm": body("palm", Box((0.05, 0.15, 0.02)), 1.0, at(z=0.57))}
+    joints = {"lift": Joint("lift", "prismatic", "world", "palm", axis=Axis((0, 0, 1), -1.0, 1.0))}
+    for name, side in (("left", 1.0), ("right", -1.0)):
+        links[name] = body(name, Box((0.02, 0.01, 0.06)), 0.05, at(y=side * 0.045, z=0.515))
+        joints[name] = Joint(name, "prismatic", "palm", name, axis=Axis((0, -side, 0), -0.02, 0.05))
+    cube = single("cube", Box((0.04, 0.04, 0.04)), 0.1, at(z=0.5))
+    table = still("table", Box((0.3, 0.3, 0.02)), at(z=0.47))
+    simulation = Simulation(World(models=(table, cube, Model("gripper", links, joints))))
+    gripper = simulation.model("gripper")
+    gripper.joints["lift"].set_position(0.0, 1000.0, 0.2)
+    for name in ("left", "right"):
+        gripper.joints[name].set_position(0.05, max_force=5.0, max_velocity=0.1)
+    simulation.step(1000)
+    gripper.joints["lift"].set_position(0.2, 1000.0, 0.2)
+
+    simulation.step(7000)
+
+    assert simulation.model("cube").pose.position == pytest.approx((0.0, 0.0, 0.7), abs=0.004)
+    assert gripper.joints["left"].effort == pytest.approx(5.0, rel=0.01)
+
+
 def test_a_joint_force_lasts_for_its_duration() -> None:
     rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
     joint = Joint("joint", "continuous", "world", "rotor")
