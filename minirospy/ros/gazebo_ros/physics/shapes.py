@@ -50,7 +50,9 @@ GROUP_CONTACT_ONLY = 3
 GROUP_RAY_ONLY = 4
 
 SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with steps of 1 to 2.5 ms
-SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
+# A contact begins soft and is stiff from 0.6 mm on. If it began stiff, a robot on four supports would rattle: each of them in
+# turn would lose the ground, and the wheels their grip.
+SOLIMP = (0.5, 0.99, 0.0006, 0.5, 2.0)
 # A larger coefficient, such as 1e5, holds no better, and a wheel that touches the ground at two points then resists turning.
 MAX_FRICTION = 2.0
 PART = "\t"  # separates the name of a collision from the number of its geom
@@ -187,7 +189,13 @@ class Shapes:
         return name
 
     def _heightmap(self, shape: Heightmap) -> _Piece:
-        heights = terrain(shape.path)
+        try:
+            heights = terrain(shape.path)
+        except MeshError as error:
+            raise SimulationError(str(error)) from error
+        # MuJoCo scales the lowest point to 0 and the highest one to 1. In SDF, the highest one has the given height.
+        highest = max(float(heights.max()), MIN_SIZE)
+        lowest = float(heights.min()) / highest
         self._count += 1
         name = f"terrain{self._count}"
         x, y, z = shape.size
@@ -196,10 +204,11 @@ class Shapes:
             name=name,
             nrow=rows,
             ncol=columns,
-            size=[x / 2, y / 2, max(z, MIN_SIZE), max(z, 1.0) / 10],
+            size=[x / 2, y / 2, max(z * (1 - lowest), MIN_SIZE), max(z, 1.0) / 10],
             userdata=heights.astype(np.float32).ravel(),
         )
-        return _Piece("HFIELD", asset=name, pose=Pose(shape.position))
+        px, py, pz = shape.position
+        return _Piece("HFIELD", asset=name, pose=Pose((px, py, pz + z * lowest)))
 
 
 def _primitive(geometry: Geometry) -> _Piece | None:
