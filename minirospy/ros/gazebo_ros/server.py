@@ -41,6 +41,7 @@ class Server:
         self.plugins = PluginHost(loop)
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._published_ns = -1
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         if not only_clock:
@@ -108,7 +109,9 @@ class Server:
         now = self.loop.simulation.time_ns
         if self._clock is not None:
             self._clock.set(now)
-        if not self.loop.is_paused or now == 0:
+        # Nothing is published while paused, except the new time after a reset or a single step.
+        if now != self._published_ns:
+            self._published_ns = now
             self._clock_publisher.publish(Clock(time_of(now)))
         self._publish_states()
 

@@ -156,6 +156,7 @@ class Services:
             ("clear_body_wrenches", BodyRequest, self._clear_body_wrenches),
             ("reset_simulation", Empty, self._reset_simulation),
             ("reset_world", Empty, self._reset_world),
+            ("step_physics", Empty, self._step_physics),
         )
         for name, kind, handler in in_loop:
             rospy.Service(f"~{name}", kind, functools.partial(self._in_loop, handler))
@@ -565,6 +566,11 @@ class Services:
 
     def _reset_simulation(self, _request: EmptyRequest) -> EmptyResponse:
         self._server.reset(with_time=True)
+        return EmptyResponse()
+
+    def _step_physics(self, _request: EmptyRequest) -> EmptyResponse:
+        """Advance by one step, for use while paused. Gazebo has this in its window only."""
+        self._loop.step(1)
         return EmptyResponse()
 
     def _reset_world(self, _request: EmptyRequest) -> EmptyResponse:

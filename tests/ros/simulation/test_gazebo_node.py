@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import math
+import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -203,6 +206,10 @@ def test_no_clock_while_paused_and_resets(master: str, start: Start) -> None:
         arguments = (0.002, 0.0, gravity, physics.ode_config)
         assert (await call(node, "set_physics_properties", SetPhysicsProperties, *arguments)).success
         assert (await call(node, "get_world_properties", GetWorldProperties)).sim_time == before
+        await call(node, "step_physics", Empty)
+        after = await call(node, "get_world_properties", GetWorldProperties)
+        assert math.isclose(after.sim_time, before + 0.002)
+        before = after.sim_time
         await call(node, "reset_world", Empty)
         after = await call(node, "get_world_properties", GetWorldProperties)
         assert after.sim_time == before
@@ -291,3 +298,24 @@ def test_a_world_that_does_not_exist(master: str, start: Start) -> None:
     assert (
         errors == "gzserver: no_such.world: there is no such world file, here or below GAZEBO_RESOURCE_PATH\n"
     )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
+def test_gzserver_ends_with_0_after_ctrl_c(master: str, start: Start) -> None:
+    process = start_world(start)
+
+    async def body(node: Node) -> None:
+        assert (await call(node, "get_world_properties", GetWorldProperties)).success
+        process.send_signal(signal.SIGINT)
+        assert await asyncio.to_thread(process.wait, SECONDS) == 0
+
+    run(body)
+
+
+def test_gzserver_ends_after_a_number_of_steps(master: str, start: Start) -> None:
+    assert start_world(start, "--iters", "300").wait(SECONDS) == 0
+
+
+def test_gzserver_names_itself(start: Start) -> None:
+    process = start("gazebo_ros", "gzserver", "--version")
+    assert process.communicate(timeout=SECONDS)[0] == "minirospy's simulation (MuJoCo) under Gazebo's names\n"
