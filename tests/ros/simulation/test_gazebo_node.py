@@ -319,3 +319,12 @@ def test_gzserver_ends_after_a_number_of_steps(master: str, start: Start) -> Non
 def test_gzserver_names_itself(start: Start) -> None:
     process = start("gazebo_ros", "gzserver", "--version")
     assert process.communicate(timeout=SECONDS)[0] == "minirospy's simulation (MuJoCo) under Gazebo's names\n"
+
+
+def test_gzclient_prints_the_address_of_the_world(master: str, start: Start) -> None:
+    pytest.importorskip("websockets")
+    process = start("gazebo_ros", "gzclient", "--no-browser")
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert line.startswith("Open in a browser: http://127.0.0.1:")
+    assert "/#/3d?file=1&frame=world" in line
