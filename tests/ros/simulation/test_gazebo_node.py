@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from gazebo_msgs.msg import LinkStates, ModelState, ModelStates
+from gazebo_msgs.msg import LinkStates, ModelState, ModelStates, ODEJointProperties
 from gazebo_msgs.srv import (
     ApplyBodyWrench,
     ApplyJointEffort,
@@ -23,6 +23,7 @@ from gazebo_msgs.srv import (
     GetModelState,
     GetPhysicsProperties,
     GetWorldProperties,
+    SetJointProperties,
     SetLinkProperties,
     SetLinkState,
     SetModelConfiguration,
@@ -141,9 +142,14 @@ def test_services_answer_with_the_texts_of_ros(master: str, start: Start) -> Non
         link = await call(node, "get_link_properties", GetLinkProperties, "box::base_link")
         assert (link.mass, link.ixx, link.gravity_mode) == (1.0, 0.1, True)
         inertia = (link.ixx, link.ixy, link.ixz, link.iyy, link.iyz, link.izz)
-        arguments = ("box::base_link", Pose(), False, 1.0, *inertia)
+        arguments = ("box::base_link", Pose(), False, 3.0, *inertia)
         assert (await call(node, "set_link_properties", SetLinkProperties, *arguments)).success
-        assert not (await call(node, "get_link_properties", GetLinkProperties, "box::base_link")).gravity_mode
+        link = await call(node, "get_link_properties", GetLinkProperties, "box::base_link")
+        assert (link.mass, link.gravity_mode) == (3.0, False)
+        refused = await call(
+            node, "set_link_properties", SetLinkProperties, "box::base_link", Pose(), True, -1.0, *inertia
+        )
+        assert (refused.success, refused.status_message) == (False, "SetLinkProperties: the mass is -1.0")
 
         world = await call(node, "get_world_properties", GetWorldProperties)
         assert world.model_names == ["ground_plane", "box", "other"]
@@ -167,6 +173,12 @@ def test_joints_and_forces_of_models(master: str, start: Start) -> None:
             node, "set_model_configuration", SetModelConfiguration, "arm", "", ["hinge"], []
         )
         assert response.status_message.endswith("joint name and position list have different lengths")
+
+        config = ODEJointProperties(damping=[0.5], hiStop=[0.2], loStop=[-0.2])
+        arguments = ("hinge", config)
+        assert (await call(node, "set_joint_properties", SetJointProperties, *arguments)).success
+        config = ODEJointProperties(damping=[0.0], hiStop=[1e16], loStop=[-1e16])
+        assert (await call(node, "set_joint_properties", SetJointProperties, "hinge", config)).success
 
         effort = await call(node, "apply_joint_effort", ApplyJointEffort, "hinge", 0.1, Time(), Duration(-1))
         assert effort.status_message == "ApplyJointEffort: effort set"
@@ -284,6 +296,11 @@ def test_spawn_model_sets_joints_and_deletes_at_its_end(master: str, tmp_path: P
     async def body(node: Node) -> None:
         while (await call(node, "get_joint_properties", GetJointProperties, "hinge")).position != (0.25,):
             await asyncio.sleep(0.05)
+        assert process.stdout is not None
+        while "Waiting for shutdown to delete model arm" not in await asyncio.to_thread(
+            process.stdout.readline
+        ):
+            pass
         await asyncio.to_thread(end, process)
         world = await call(node, "get_world_properties", GetWorldProperties)
         assert world.model_names == ["ground_plane"]
