@@ -8,7 +8,7 @@ from rosgraph_msgs.msg import Clock
 from minirospy import client as rospy
 from minirospy.base.clock import SimulatedClock
 from minirospy.core.sdf.model import Light, Model, Pose, Vector, World
-from minirospy.ros.gazebo_ros.loop import SimulationLoop
+from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
 from minirospy.ros.gazebo_ros.markers import WorldMarkers
 from minirospy.ros.gazebo_ros.messages import time_of, to_pose, to_twist
 from minirospy.ros.gazebo_ros.paths import ResourcePaths
@@ -50,6 +50,7 @@ class Server:
         loop.before_step = self.plugins.update
         loop.on_tick = self._tick
         loop.on_lost = self._lost
+        loop.on_failure = self._fail
 
     def start(self, world: World) -> None:
         """Load the plugins of the world file, and publish the markers. Call it in the loop's thread."""
@@ -92,6 +93,8 @@ class Server:
         """Close the plugins and end the loop."""
         try:
             self.loop.call(self.plugins.close)
+        except LoopClosed:
+            self.plugins.close()
         finally:
             self.loop.close()
 
@@ -104,6 +107,11 @@ class Server:
         rospy.logerr("model '%s' %s", lost.name, lost.reason)
         self.plugins.remove_model(lost.name)
         self._changed()
+
+    @staticmethod
+    def _fail(error: Exception) -> None:
+        rospy.logfatal("the simulation failed: %s: %s", type(error).__name__, error)
+        rospy.signal_shutdown("the simulation failed")
 
     def _tick(self) -> None:
         now = self.loop.simulation.time_ns
