@@ -37,7 +37,7 @@ def at(x: float = 0.0, y: float = 0.0, z: float = 0.0, yaw: float = 0.0) -> Pose
 
 
 def solid(mass: float, geometry: Geometry) -> Inertial:
-    """Return the inertia of a solid box, cylinder or sphere."""
+    """Return the inertia of a solid box, cylinder or sphere, or a default."""
     if isinstance(geometry, Box):
         x, y, z = (side * side for side in geometry.size)
         return Inertial(
@@ -46,7 +46,8 @@ def solid(mass: float, geometry: Geometry) -> Inertial:
     if isinstance(geometry, Cylinder):
         side = mass * (3 * geometry.radius**2 + geometry.length**2) / 12
         return Inertial(mass, IDENTITY, (side, 0, 0, side, 0, mass * geometry.radius**2 / 2))
-    assert isinstance(geometry, Sphere)
+    if not isinstance(geometry, Sphere):
+        return Inertial()
     value = 0.4 * mass * geometry.radius**2
     return Inertial(mass, IDENTITY, (value, 0, 0, value, 0, value))
 

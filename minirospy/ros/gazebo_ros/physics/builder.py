@@ -6,7 +6,20 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from minirospy.core.sdf.model import IDENTITY, Axis, Joint, Link, Model, Physics, Pose, Quaternion, Vector
+from minirospy.core.sdf.model import (
+    IDENTITY,
+    Axis,
+    Collision,
+    Cylinder,
+    Joint,
+    Link,
+    Model,
+    Physics,
+    Pose,
+    Quaternion,
+    Vector,
+    World,
+)
 from minirospy.core.sdf.pose_math import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
@@ -18,6 +31,8 @@ __all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits"]
 FIXED_KINDS = ("fixed",)
 MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
 MIN_RANGE = 1e-5  # MuJoCo refuses a range of length zero
+MAX_LIGHTS = 8  # of OpenGL
+VISUAL = "\tvisual"  # separates the names of visuals from those of collisions
 MOTOR_DAMPING = (
     0.9999  # MuJoCo's largest impedance: rows of joint friction and motors are as hard as it allows
 )
@@ -54,6 +69,7 @@ class Builder:
         option.impratio = 10.0  # friction creeps less
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.set_physics(physics)
+        self.has_visuals = False  # they cost time and memory, and only cameras need them
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity of the next compilation."""
@@ -76,10 +92,55 @@ class Builder:
         except (ValueError, TypeError, OSError) as error:
             self.delete(built)
             raise SimulationError(f"model '{name}': {_first_line(error)}") from error
-        except SimulationError:
+        except SimulationError as error:
             self.delete(built)
-            raise
+            raise SimulationError(f"model '{name}': {error}") from error.__cause__
         return built
+
+    def add_scene(self, world: World) -> None:
+        """Add the background and the lights of a world, and from now on the visuals of models."""
+        self.has_visuals = True
+        mujoco = self._mujoco
+        red, green, blue, _ = world.background
+        self.spec.add_texture(
+            name="background",
+            type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+            rgb1=[red, green, blue],
+            rgb2=[red, green, blue],
+            width=8,
+            height=48,
+        )
+        ambient = [min(value, 1.0) for value in world.ambient[:3]]
+        head = self.spec.visual.headlight
+        head.ambient = ambient
+        head.diffuse = [0.2, 0.2, 0.2] if world.lights else [0.6, 0.6, 0.6]
+        head.specular = [0.0, 0.0, 0.0]
+        for light in world.lights[:MAX_LIGHTS]:
+            row = self.spec.worldbody.add_light(
+                pos=light.pose.position, dir=rotate(light.pose.orientation, light.direction)
+            )
+            row.diffuse, row.specular = light.diffuse[:3], light.specular[:3]
+            row.castshadow = light.casts_shadows
+            is_directional = light.kind == "directional"
+            if hasattr(row, "directional"):
+                row.directional = is_directional
+            else:
+                kinds = mujoco.mjtLightType
+                names = {"directional": kinds.mjLIGHT_DIRECTIONAL, "spot": kinds.mjLIGHT_SPOT}
+                row.type = names.get(light.kind, kinds.mjLIGHT_POINT)
+
+    def add_visuals(self, built: BuiltModel, model: Model, name: str) -> list[str]:
+        """Add a model's visuals. Return a line for each one that cannot be read: the picture lacks it."""
+        warnings: list[str] = []
+        for link in model.links.values():
+            for visual in link.visuals:
+                scoped = f"{name}::{link.name}::{visual.name}{VISUAL}"
+                try:
+                    self.shapes.add_visual(built.bodies[link.name], scoped, visual)
+                except (SimulationError, ValueError, TypeError) as error:
+                    warnings.append(f"model '{name}': visual '{visual.name}': {_first_line(error)}")
+        return warnings
 
     def delete(self, built: BuiltModel) -> None:
         """Delete a model from the spec."""
@@ -93,6 +154,7 @@ class Builder:
         self, built: BuiltModel, tree: LinkTree, model: Model, name: str, pose: Pose, link: Link
     ) -> None:
         joint = tree.joint_of.get(link.name)
+        _check_numbers(link, joint)
         scoped = f"{name}::{link.name}"
         if joint is None or joint.parent == WORLD:
             body = self.spec.worldbody.add_body(name=scoped)
@@ -123,7 +185,7 @@ class Builder:
                 f"{scoped}::{collision.name}",
                 collision,
                 is_static=model.is_static or joint_is_rigid(tree, link.name),
-                pose=collision.pose,
+                is_wheel=joint is not None and _is_wheel(joint, collision),
             )
 
     def _add_joint(self, body: Any, scoped: str, joint: Joint) -> None:
@@ -201,7 +263,7 @@ class Builder:
     def _add_equality(self, built: BuiltModel, kind: Any, first: str, second: str, data: list[float]) -> None:
         row = self.spec.add_equality(type=kind, objtype=self._mujoco.mjtObj.mjOBJ_BODY, name1=first)
         row.name2 = second
-        row.data = data
+        row.data[: len(data)] = data
         row.solref = [0.005, 1.0]
         built.others.append(row)
 
@@ -215,7 +277,8 @@ class Builder:
                 type=self._mujoco.mjtEq.mjEQ_JOINT, objtype=self._mujoco.mjtObj.mjOBJ_JOINT
             )
             row.name1, row.name2 = f"{name}::{joint.name}", f"{name}::{mimic.joint}"
-            row.data = [mimic.offset, mimic.multiplier] + [0.0] * 9
+            row.data[:2] = (mimic.offset, mimic.multiplier)
+            row.data[2:] = 0.0
             row.solref = [0.005, 1.0]
             built.others.append(row)
 
@@ -237,6 +300,37 @@ def joint_is_rigid(tree: LinkTree, link: str) -> bool:
     while (joint := tree.joint_of.get(link)) is not None and joint.kind in FIXED_KINDS:
         link = joint.parent
     return link == WORLD
+
+
+def _is_wheel(joint: Joint, collision: Collision) -> bool:
+    """Return whether a collision is a short cylinder that a joint without limits turns about its own axis."""
+    shape = collision.geometry
+    if joint.kind not in ("continuous", "revolute") or not isinstance(shape, Cylinder):
+        return False
+    if (joint.kind == "revolute" and has_limits(joint.axis)) or shape.length > 2 * shape.radius:
+        return False
+    axis, along = _direction(joint, joint.axis), rotate(collision.pose.orientation, (0.0, 0.0, 1.0))
+    length = math.hypot(*axis)
+    cosine = sum(a * b for a, b in zip(axis, along, strict=True)) / length
+    offset = [a - b for a, b in zip(joint.pose.position, collision.pose.position, strict=True)]
+    shift = sum(a * b for a, b in zip(offset, along, strict=True))
+    distance = math.sqrt(max(sum(a * a for a in offset) - shift * shift, 0.0))
+    return abs(cosine) > 0.999 and distance < 0.01 * shape.radius
+
+
+def _check_numbers(link: Link, joint: Joint | None) -> None:
+    """Raise SimulationError if a pose or an inertia is not finite: MuJoCo accepts NaN."""
+    inertial = link.inertial
+    values = [*link.pose.position, *link.pose.orientation, inertial.mass, *inertial.inertia]
+    values += [*inertial.pose.position, *inertial.pose.orientation]
+    for collision in link.collisions:
+        values += [*collision.pose.position, *collision.pose.orientation]
+    if not all(map(math.isfinite, values)):
+        raise SimulationError(f"link '{link.name}' has a pose or inertia that is not finite")
+    if joint is not None and not all(
+        map(math.isfinite, (*joint.pose.position, *joint.axis.xyz, *joint.axis2.xyz))
+    ):
+        raise SimulationError(f"joint '{joint.name}' has a pose or axis that is not finite")
 
 
 def _direction(joint: Joint, axis: Axis) -> Vector:

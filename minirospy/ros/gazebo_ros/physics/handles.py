@@ -16,6 +16,7 @@ from minirospy.core.sdf.model import Axis, Joint, Link, Model, Pose, Vector
 from minirospy.core.sdf.pose_math import compose, inverse, normalized, rotate, transform
 from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names
 from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, Engine
+from minirospy.ros.gazebo_ros.physics.library import SimulationError
 from minirospy.ros.gazebo_ros.physics.states import ZERO, State, Wrench
 
 __all__ = ["Owner", "SimJoint", "SimLink", "SimModel"]
@@ -93,6 +94,7 @@ class SimLink:
 
     def set_state(self, state: State) -> None:
         """Move the whole model so that this link has the state, with joint angles kept and joint velocities zero."""
+        _check(*state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         change = compose(state.pose, inverse(self.pose))
         self.model.move(change, state.linear, state.angular, state.pose.position)
 
@@ -130,6 +132,7 @@ class SimLink:
 
         ``start``: time of the simulation in seconds; a time in the past means now. A negative duration means for ever.
         """
+        _check(*force, *torque, *point)
         start = max(start, self.model.time())
         end = start + duration if duration >= 0 else math.inf
         self.wrenches.append(TimedWrench(force, torque, point, start, end))
@@ -137,6 +140,7 @@ class SimLink:
 
     def push(self, force: Vector = ZERO, torque: Vector = ZERO, *, point: Vector = ZERO) -> None:
         """Apply a force and a torque in world axes at a point of the link's frame for the next step."""
+        _check(*force, *torque, *point)
         now = self.model.time()
         self.wrenches.append(TimedWrench(force, torque, point, now, now))
         self.model.forces_changed()
@@ -218,6 +222,7 @@ class SimJoint:
 
     def set_state(self, position: float, velocity: float = 0.0) -> None:
         """Set position and velocity at once."""
+        _check(position, velocity)
         if self.dof >= 0:
             self._engine.data.qpos[self._address] = position
             self._engine.data.qvel[self.dof] = velocity
@@ -231,11 +236,13 @@ class SimJoint:
 
     def set_force(self, force: float) -> None:
         """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
+        _check(force)
         self._force = force
         self.model.forces_changed()
 
     def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
         """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: for ever)."""
+        _check(force)
         start = max(start, self.model.time())
         end = start + duration if duration >= 0 else math.inf
         self._timed.append(TimedForce(force, start, end))
@@ -249,6 +256,7 @@ class SimJoint:
 
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
         """Start or change a motor that holds a velocity with at most a force."""
+        _check(velocity)
         self._velocity, self._target = velocity, None
         self._start_motor(max_force)
 
@@ -256,6 +264,7 @@ class SimJoint:
         self, position: float, max_force: float = math.inf, max_velocity: float = math.inf
     ) -> None:
         """Start or change a motor that moves to a position, with at most a force and a velocity."""
+        _check(position)
         self._velocity, self._target, self._max_velocity = 0.0, position, max_velocity
         self._start_motor(max_force)
 
@@ -265,6 +274,8 @@ class SimJoint:
         self._write_motor()
 
     def _start_motor(self, max_force: float) -> None:
+        if math.isnan(max_force):
+            raise SimulationError("a motor's maximum force is not finite")
         force = min(max(max_force, 0.0), MAX_FORCE)
         same = force == self._max_force and self.dof >= 0
         self._max_force = force
@@ -396,11 +407,13 @@ class SimModel:
 
     def set_state(self, state: State) -> None:
         """Move the model; joint angles are kept, joint velocities become zero."""
+        _check(*state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         change = compose(state.pose, inverse(self.pose))
         self.move(change, state.linear, state.angular, state.pose.position)
 
     def set_velocity(self, linear: Vector, angular: Vector) -> None:
         """Set the velocity of the model's origin in world axes; the pose and the joints stay as they are."""
+        _check(*linear, *angular)
         origin = self.pose.position
         for name in self.built.free:
             self._set_free_velocity(self.links[name], linear, angular, origin)
@@ -495,6 +508,12 @@ class SimModel:
     def forces_changed(self) -> None:
         """Tell the simulation that a force acts on this model."""
         self._owner.forced[self.name] = None
+
+
+def _check(*values: float) -> None:
+    """Raise SimulationError if a value is infinite or NaN."""
+    if not all(map(math.isfinite, values)):
+        raise SimulationError("a force, position or velocity is not finite")
 
 
 def _sum(left: Vector, right: Vector) -> Vector:

@@ -19,13 +19,16 @@ class SimulationError(MinirospyError):
 def load_mujoco() -> Any:
     """Return the module ``mujoco``. Raise SimulationError with the command that installs it if it is missing."""
     try:
-        return importlib.import_module("mujoco")
+        mujoco = importlib.import_module("mujoco")
     except ImportError as error:
         from minirospy.base.installation import install_command
 
         raise SimulationError(
             f"the simulation needs MuJoCo: {install_command('minirospy[sim]')} ({error})"
         ) from None
+    # Invalid states are found after each step. By default, warnings are printed and written to MUJOCO_LOG.TXT.
+    mujoco.set_mju_user_warning(lambda text: None)
+    return mujoco
 
 
 def import_context(backend: str) -> Any:

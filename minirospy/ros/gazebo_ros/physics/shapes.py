@@ -33,7 +33,15 @@ from minirospy.core.sdf.model import (
 from minirospy.core.sdf.pose_math import compose
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 
-__all__ = ["GROUP_COLLISION", "GROUP_CONTACT_ONLY", "GROUP_RAY_ONLY", "GROUP_VISUAL", "Shapes", "friction"]
+__all__ = [
+    "GROUP_COLLISION",
+    "GROUP_CONTACT_ONLY",
+    "GROUP_RAY_ONLY",
+    "GROUP_VISUAL",
+    "PART",
+    "Shapes",
+    "friction",
+]
 
 # MuJoCo's groups of geoms, of which a ray or a camera selects some.
 GROUP_COLLISION = 0
@@ -43,7 +51,9 @@ GROUP_RAY_ONLY = 4
 
 SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with steps of 1 to 2.5 ms
 SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
-MAX_FRICTION = 20.0  # a larger coefficient changes nothing, and makes the solver slow
+# A larger coefficient, such as 1e5, holds no better, and a wheel that touches the ground at two points then resists turning.
+MAX_FRICTION = 2.0
+PART = "\t"  # separates the name of a collision from the number of its geom
 MIN_SIZE = 1e-6  # m; MuJoCo refuses sizes of zero
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 
@@ -80,12 +90,17 @@ class Shapes:
         self._count = 0
 
     def add_collision(
-        self, body: Any, name: str, collision: Collision, *, is_static: bool, pose: Pose
+        self, body: Any, name: str, collision: Collision, *, is_static: bool, is_wheel: bool = False
     ) -> None:
-        """Add a collision's geoms; ``pose`` is that of the collision in the body."""
+        """Add a collision's geoms. ``is_wheel``: the collision is a cylinder that turns about its axis."""
         mu, priority = friction(collision.surface)
-        for index, piece in enumerate(self._pieces(collision.geometry, is_static=is_static)):
-            geom = self._add(body, f"{name}#{index}" if index else name, piece, pose)
+        pose = collision.pose
+        if is_wheel and isinstance(collision.geometry, Cylinder):
+            pieces = _wheel(collision.geometry)
+        else:
+            pieces = self._pieces(collision.geometry, is_static=is_static)
+        for index, piece in enumerate(pieces):
+            geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, pose)
             geom.group = piece.group
             geom.friction = [mu, 0.0, 0.0]
             geom.priority = priority
@@ -93,11 +108,11 @@ class Shapes:
             if piece.group == GROUP_RAY_ONLY:
                 geom.contype = geom.conaffinity = 0
 
-    def add_visual(self, body: Any, name: str, visual: Visual, pose: Pose) -> None:
-        """Add a visual's geoms, which touch nothing; ``pose`` is that of the visual in the body."""
+    def add_visual(self, body: Any, name: str, visual: Visual) -> None:
+        """Add a visual's geoms, which touch nothing."""
         opacity = 1.0 - min(max(visual.transparency, 0.0), 1.0)
         for index, piece in enumerate(self._visible(visual.geometry)):
-            geom = self._add(body, f"{name}#{index}" if index else name, piece, pose)
+            geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, visual.pose)
             geom.group = GROUP_VISUAL
             geom.contype = geom.conaffinity = 0
             red, green, blue, alpha = visual.material.color or piece.color or _GREY
@@ -199,6 +214,19 @@ def _primitive(geometry: Geometry) -> _Piece | None:
     if isinstance(geometry, Plane):
         return _Piece("PLANE", (0.0, 0.0, 1.0), Pose(orientation=_turn_to(geometry.normal)))
     return None
+
+
+def _wheel(shape: Cylinder) -> list[_Piece]:
+    """Return an ellipsoid for contacts, and the cylinder for rays.
+
+    A cylinder touches the ground along a line. When a robot turns, one end of that line slips forward and the other one
+    backward, and the effective distance of the wheels depends on the friction. An ellipsoid touches at its middle.
+    """
+    radius, half = max(shape.radius, MIN_SIZE), max(shape.length / 2, MIN_SIZE)
+    return [
+        _Piece("ELLIPSOID", (radius, radius, half), group=GROUP_CONTACT_ONLY),
+        _Piece("CYLINDER", (radius, half, 0.0), group=GROUP_RAY_ONLY),
+    ]
 
 
 def _meshes(geometry: Geometry) -> list[Mesh]:

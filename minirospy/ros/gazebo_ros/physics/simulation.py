@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,11 @@ from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
+from minirospy.ros.gazebo_ros.physics.shapes import PART
 from minirospy.ros.gazebo_ros.physics.states import Contact, LostModel, RayHits, Wrench
+
+if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.physics.rendering import Renderer
 
 __all__ = ["Simulation"]
 
@@ -126,7 +131,8 @@ class Simulation:
             speeds = dict.fromkeys(candidates, 0.0)
             for dof, name in enumerate(self._model_of_dof):
                 if name in speeds:
-                    speeds[name] = max(speeds[name], abs(float(velocities[dof])))
+                    speed = abs(float(velocities[dof]))
+                    speeds[name] = max(speeds[name], speed if math.isfinite(speed) else math.inf)
             if speeds:
                 source = max(speeds, key=lambda name: speeds[name])
                 lost = {name: why for name, why in lost.items() if name == source or name not in candidates}
@@ -205,6 +211,8 @@ class Simulation:
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise SimulationError(f"model '{name}': the pose is not finite")
         built = self._builder.add(model, name, pose)
+        if self._builder.has_visuals:
+            self.warnings += self._builder.add_visuals(built, model, name)
         added = SimModel(self._engine, name, model, pose, built, self)
         self._models[name] = added
         return added
@@ -234,7 +242,7 @@ class Simulation:
         for model in self._models.values():
             model.bind()
         model = self._engine.model
-        self._geom_names = [model.geom(index).name.partition("#")[0] for index in range(model.ngeom)]
+        self._geom_names = [model.geom(index).name.partition(PART)[0] for index in range(model.ngeom)]
         bodies = [model.body(index).name for index in range(model.nbody)]
         owners = {link.id: name for name, each in self._models.items() for link in each.links.values()}
         assert len(owners) == len(bodies) - 1
@@ -303,6 +311,26 @@ class Simulation:
         ids[missed] = -1
         names = self._geom_names
         return RayHits(distances, tuple(names[each] if each >= 0 else "" for each in ids.tolist()))
+
+    def renderer(self, width: int, height: int) -> Renderer:
+        """Return a renderer of pictures, for the calling thread. Raise SimulationError if OpenGL or a library is missing.
+
+        The first call adds the visuals to the compiled world, which takes time and memory.
+        """
+        from minirospy.ros.gazebo_ros.physics.rendering import Renderer
+
+        renderer = Renderer(self._engine, width, height)
+        self.add_visuals()
+        return renderer
+
+    def add_visuals(self) -> None:
+        """Add the visible shapes and the lights for cameras, now and for models that come later."""
+        if self._builder.has_visuals:
+            return
+        self._builder.add_scene(self.world)
+        for model in self._models.values():
+            self.warnings += self._builder.add_visuals(model.built, model.record, model.name)
+        self.recompile()
 
     def contacts(self) -> list[Contact]:
         """Return the contacts of the last step; ``records_details`` must have been set before it."""

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from minirospy.core.sdf.model import IDENTITY, Pose, Vector
 
 __all__ = ["ZERO", "Contact", "LostModel", "RayHits", "State", "Wrench"]
@@ -44,7 +47,7 @@ class Contact(NamedTuple):
 class RayHits(NamedTuple):
     """The distances (m, infinite if nothing is hit) and the names of the collisions (empty if nothing is hit)."""
 
-    distances: object
+    distances: NDArray[np.float64]
     collisions: tuple[str, ...]
 
 

@@ -31,7 +31,7 @@ def plan_tree(model: Model) -> LinkTree:
     for joint in model.joints.values():
         for link in (joint.parent, joint.child):
             if link not in model.links and not (link == WORLD and link == joint.parent):
-                raise SimulationError(f"model '{model.name}': joint '{joint.name}' names no link '{link}'")
+                raise SimulationError(f"joint '{joint.name}' names no link '{link}'")
         if joint.child in tree.joint_of or _is_above(tree, joint.child, joint.parent):
             tree.loops.append(joint)
         else:

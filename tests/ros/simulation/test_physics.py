@@ -1,0 +1,399 @@
+"""The physics of the simulation against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
+
+from minirospy.core.sdf.model import (
+    Axis,
+    Box,
+    Joint,
+    Link,
+    Model,
+    Physics,
+    Pose,
+    Sphere,
+    Surface,
+    Vector,
+    World,
+)
+from minirospy.core.sdf.pose_math import compose, rotate
+from minirospy.ros.gazebo_ros.physics import Simulation, State
+from tests.ros.simulation.worlds import GROUND, arm, at, body, diff_drive, pendulum, single, still
+
+G = 9.8
+
+
+def tilted(angle: float) -> Pose:
+    return Pose((0.0, 0.0, 0.0), (0.0, math.sin(angle / 2), 0.0, math.cos(angle / 2)))
+
+
+def test_a_falling_ball_follows_the_parabola() -> None:
+    simulation = Simulation(World(models=(single("ball", Sphere(0.1), pose=at(1.0, 2.0, 100.0)),)))
+    ball = simulation.model("ball")
+    ball.set_velocity((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    simulation.step(2000)
+
+    x, y, z = ball.pose.position
+    assert simulation.time == 2.0
+    assert (x, y) == (pytest.approx(3.0, abs=1e-9), pytest.approx(2.0, abs=1e-9))
+    assert z == pytest.approx(100 - G * 2.0**2 / 2, abs=0.01)  # half a step of the velocity
+    assert ball.state.linear[2] == pytest.approx(-G * 2.0, rel=1e-9)
+
+
+def test_a_pendulum_has_its_period() -> None:
+    start, length = 0.1, 0.5
+    simulation = Simulation(World(models=(pendulum(start=start, length=length),)))
+    joint = simulation.model("pendulum").joints["joint0"]
+
+    crossings: list[float] = []
+    previous = joint.position
+    while len(crossings) < 21:
+        simulation.step()
+        if previous > 0 >= joint.position:
+            share = previous / (previous - joint.position)
+            crossings.append(simulation.time - (1 - share) * simulation.physics.step)
+        previous = joint.position
+
+    period = (crossings[-1] - crossings[0]) / 20
+    expected = 2 * math.pi * math.sqrt(2 * length / (3 * G)) * (1 + start**2 / 16)
+    assert period == pytest.approx(expected, rel=0.003)
+
+
+@pytest.mark.parametrize("mu", [0.3, 0.8])
+def test_a_box_rests_below_the_angle_of_friction(mu: float) -> None:
+    slope = tilted(0.9 * math.atan(mu))
+    simulation = Simulation(World(models=(still("slope", Box((20, 5, 0.2)), slope, mu=100.0),)))
+    box = simulation.add_model(single("box", Box((0.3, 0.3, 0.1)), mu=mu), compose(slope, at(z=0.15)))
+    simulation.step(500)
+    before = box.pose.position
+
+    simulation.step(2000)
+
+    assert math.dist(before, box.pose.position) < 0.001
+
+
+@pytest.mark.parametrize("mu", [0.3, 0.8])
+def test_a_box_slips_above_the_angle_of_friction(mu: float) -> None:
+    angle = 1.1 * math.atan(mu)
+    slope = tilted(angle)
+    simulation = Simulation(World(models=(still("slope", Box((40, 5, 0.2)), slope, mu=100.0),)))
+    box = simulation.add_model(single("box", Box((0.3, 0.3, 0.1)), mu=mu), compose(slope, at(z=0.15)))
+    simulation.step(500)
+    before = math.hypot(*box.state.linear)
+
+    simulation.step(1000)
+
+    expected = G * (math.sin(angle) - mu * math.cos(angle))
+    assert math.hypot(*box.state.linear) - before == pytest.approx(expected, abs=0.01 * mu * G)
+
+
+def energy(simulation: Simulation) -> float:
+    """Return the energy of rods with mass 1 kg, from their states."""
+    total = 0.0
+    for link in simulation.model("pendulum").links.values():
+        state = link.state
+        length = -2 * link.record.inertial.pose.position[2]
+        arm_to_center = rotate(state.pose.orientation, (0.0, 0.0, -length / 2))
+        velocity = np.add(state.linear, np.cross(state.angular, arm_to_center))
+        height = state.pose.position[2] + arm_to_center[2]
+        total += 0.5 * float(velocity @ velocity) + 0.5 * length**2 / 12 * state.angular[1] ** 2 + G * height
+    return total
+
+
+def test_a_double_pendulum_keeps_its_energy_for_a_minute() -> None:
+    simulation = Simulation(World(models=(pendulum(2, start=1.2),)))
+    lowest = G * (2 * 2 - 0.25 - 0.75)  # both rods hang down
+    means: list[float] = []
+
+    for _ in range(60):
+        second: list[float] = []
+        for _ in range(50):
+            simulation.step(20)
+            second.append(energy(simulation))
+        means.append(sum(second) / len(second))
+
+    # Means, because the velocities belong to half a step before the positions.
+    assert max(abs(mean - means[0]) for mean in means) < 0.005 * (means[0] - lowest)
+
+
+def test_a_stack_of_ten_boxes_stands_for_a_minute() -> None:
+    boxes = tuple(single(f"box{i}", Box((0.2, 0.2, 0.2)), pose=at(z=0.1 + 0.2 * i)) for i in range(10))
+    simulation = Simulation(World(models=(GROUND, *boxes)))
+
+    assert simulation.step(60_000) == []
+
+    for index in range(10):
+        x, y, z = simulation.model(f"box{index}").pose.position
+        assert math.hypot(x, y) < 0.002
+        assert z == pytest.approx(0.1 + 0.2 * index, abs=0.002)
+
+
+def test_a_diff_drive_robot_drives_the_circle() -> None:
+    simulation = Simulation(World(models=(GROUND, diff_drive())))
+    robot = simulation.model("robot")
+    v, w = 0.2, 0.5
+    simulation.step(200)
+    robot.joints["left_joint"].set_velocity((v - w * 0.15) / 0.05, 5.0)
+    robot.joints["right_joint"].set_velocity((v + w * 0.15) / 0.05, 5.0)
+    simulation.step(500)
+
+    points: list[Vector] = []
+    for _ in range(126):
+        simulation.step(100)
+        points.append(robot.pose.position)
+
+    x, y = np.array(points)[:, :2].T
+    assert np.ptp(x) / 2 == pytest.approx(v / w, rel=0.01)
+    assert np.ptp(y) / 2 == pytest.approx(v / w, rel=0.01)
+    state = robot.state
+    assert math.hypot(*state.linear[:2]) == pytest.approx(v, rel=0.01)
+    assert state.angular[2] == pytest.approx(w, rel=0.01)
+
+
+def test_of_two_frictions_the_smaller_counts() -> None:
+    floor = still("floor", Box((20, 20, 0.2)), at(z=-0.1), mu=0.1)
+    simulation = Simulation(
+        World(models=(floor, single("rough", Box((0.2, 0.2, 0.1)), pose=at(z=0.05), mu=1.0)))
+    )
+    box = simulation.model("rough")
+    simulation.step(100)
+    box.set_velocity((2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    simulation.step(1000)
+
+    assert box.state.linear[0] == pytest.approx(2.0 - 0.1 * G, rel=0.03)
+
+
+def test_a_velocity_motor_is_limited_by_its_force() -> None:
+    rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
+    inertia = rotor.inertial.inertia[5]
+    model = Model("fan", {"rotor": rotor}, {"joint": Joint("joint", "continuous", "world", "rotor")})
+    simulation = Simulation(World(models=(model,)))
+    joint = simulation.model("fan").joints["joint"]
+    joint.set_velocity(10.0, max_force=0.5)
+
+    simulation.step(1000)
+    assert joint.velocity == pytest.approx(0.5 / inertia, rel=1e-3)
+    assert joint.effort == pytest.approx(0.5, rel=1e-3)
+
+    simulation.step(3000)
+    assert joint.velocity == pytest.approx(10.0, rel=1e-3)
+    assert joint.effort == pytest.approx(0.0, abs=1e-3)
+
+    joint.stop_motor()
+    simulation.step(1000)
+    assert joint.velocity == pytest.approx(10.0, rel=1e-3)
+
+
+def test_position_motors_hold_an_arm_and_follow() -> None:
+    simulation = Simulation(World(models=(GROUND, arm(7))))
+    joints = [simulation.model("arm").joints[f"joint{i}"] for i in range(7)]
+    for joint in joints:
+        joint.set_position(0.5)
+    simulation.step(1000)
+    assert [joint.position for joint in joints] == pytest.approx([0.5] * 7, abs=1e-3)
+
+    worst = 0.0
+    for step in range(2000):
+        target = 0.5 + 0.3 * math.sin(math.pi * step * 0.001)
+        for joint in joints:
+            joint.set_position(target)
+        simulation.step()
+        worst = max(worst, *(abs(joint.position - target) for joint in joints))
+    assert worst < 0.002
+
+
+def test_a_position_motor_moves_with_its_velocity() -> None:
+    simulation = Simulation(World(models=(pendulum(start=0.0),)))
+    joint = simulation.model("pendulum").joints["joint0"]
+    joint.set_position(1.0, max_velocity=0.5)
+
+    simulation.step(1000)
+    assert joint.position == pytest.approx(0.5, abs=0.002)
+    simulation.step(2000)
+    assert joint.position == pytest.approx(1.0, abs=0.001)
+
+
+def test_limits_stop_a_joint() -> None:
+    model = pendulum(start=0.0, axis=Axis(lower=-0.5, upper=0.25))
+    joint = Joint("joint0", "revolute", "world", "rod0", axis=model.joints["joint0"].axis)
+    simulation = Simulation(World(models=(Model("pendulum", model.links, {"joint0": joint}),)))
+    handle = simulation.model("pendulum").joints["joint0"]
+
+    handle.set_force(50.0)
+    simulation.step(2000)
+    assert handle.position == pytest.approx(0.25, abs=0.01)
+    handle.set_force(-50.0)
+    simulation.step(2000)
+    assert handle.position == pytest.approx(-0.5, abs=0.01)
+
+
+def test_damping_slows_a_joint() -> None:
+    rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
+    axis = Axis(damping=0.1)
+    joint = Joint("joint", "continuous", "world", "rotor", axis=axis)
+    simulation = Simulation(World(models=(Model("fan", {"rotor": rotor}, {"joint": joint}),)))
+    handle = simulation.model("fan").joints["joint"]
+    handle.set_state(0.0, 5.0)
+
+    simulation.step(1000)
+
+    assert handle.velocity == pytest.approx(5.0 * math.exp(-0.1 / rotor.inertial.inertia[5]), rel=0.002)
+
+
+def test_joint_friction_stops_a_joint() -> None:
+    rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
+    joint = Joint("joint", "continuous", "world", "rotor", axis=Axis(friction=0.1))
+    simulation = Simulation(World(models=(Model("fan", {"rotor": rotor}, {"joint": joint}),)))
+    handle = simulation.model("fan").joints["joint"]
+    handle.set_state(0.0, 1.0)
+
+    simulation.step(1000)
+    assert handle.velocity == pytest.approx(1.0 - 0.1 / rotor.inertial.inertia[5], rel=0.01)
+    simulation.step(1000)
+    assert handle.velocity == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_joint_force_lasts_for_its_duration() -> None:
+    rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
+    joint = Joint("joint", "continuous", "world", "rotor")
+    simulation = Simulation(World(models=(Model("fan", {"rotor": rotor}, {"joint": joint}),)))
+    handle = simulation.model("fan").joints["joint"]
+    handle.add_force(0.5, start=0.1, duration=0.2)
+
+    simulation.step(100)
+    assert handle.velocity == 0.0
+    simulation.step(900)
+    assert handle.velocity == pytest.approx(0.5 * 0.2 / rotor.inertial.inertia[5], rel=1e-6)
+
+
+def test_the_limit_of_effort_reduces_a_force() -> None:
+    rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
+    joint = Joint("joint", "continuous", "world", "rotor", axis=Axis(effort=0.5))
+    simulation = Simulation(World(models=(Model("fan", {"rotor": rotor}, {"joint": joint}),)))
+    handle = simulation.model("fan").joints["joint"]
+    handle.set_force(100.0)
+
+    simulation.step(100)
+
+    assert handle.velocity == pytest.approx(0.5 * 0.1 / rotor.inertial.inertia[5], rel=1e-6)
+    assert handle.effort == 0.5
+
+
+def test_a_wrench_lasts_for_its_duration_and_turns_a_body() -> None:
+    simulation = Simulation(
+        World(models=(single("ball", Sphere(0.1), 2.0),), physics=Physics(gravity=(0, 0, 0)))
+    )
+    ball = simulation.model("ball")
+    link = ball.canonical_link
+    link.add_wrench((4.0, 0.0, 0.0), point=(0.0, 0.1, 0.0), duration=0.001)
+
+    simulation.step(10)
+
+    state = ball.state
+    inertia = 0.4 * 2.0 * 0.1**2
+    assert state.linear[0] == pytest.approx(4.0 * 0.001 / 2.0, rel=1e-3)
+    assert state.angular[2] == pytest.approx(-0.1 * 4.0 * 0.001 / inertia, rel=1e-6)
+
+    link.add_wrench((2.0, 0.0, 0.0), duration=-1)
+    simulation.step(1000)
+    assert ball.state.linear[0] == pytest.approx(0.002 + 1.0, rel=1e-2)
+    link.clear_wrenches()
+    before = ball.state.linear
+    simulation.step(1000)
+    assert ball.state.linear == pytest.approx(before, abs=1e-9)
+
+
+def test_a_link_without_gravity_floats() -> None:
+    floating = Model("floating", {"link": Link("link", has_gravity=False)}, pose=at(z=1.0))
+    falling = Model("falling", {"link": Link("link")}, pose=at(x=2.0, z=10.0))
+    simulation = Simulation(World(models=(floating, falling)))
+    simulation.step(1000)
+    assert simulation.model("floating").pose.position == pytest.approx((0.0, 0.0, 1.0), abs=1e-9)
+    assert simulation.model("falling").pose.position[2] == pytest.approx(10 - G / 2, abs=0.01)
+
+    simulation.model("floating").canonical_link.has_gravity = True
+    simulation.model("falling").canonical_link.has_gravity = False
+    speed = simulation.model("falling").state.linear[2]
+    simulation.step(1000)
+    assert simulation.model("floating").state.linear[2] == pytest.approx(-G, rel=1e-6)
+    assert simulation.model("falling").state.linear[2] == pytest.approx(speed, rel=1e-6)
+
+
+def test_velocity_decay_slows_a_body() -> None:
+    link = Link("link", linear_damping=0.01, has_gravity=False)
+    simulation = Simulation(World(models=(Model("body", {"link": link}),)))
+    simulation.model("body").set_velocity((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    simulation.step(100)
+
+    assert simulation.model("body").state.linear[0] == pytest.approx(0.99**100, rel=1e-3)
+
+
+def test_the_step_and_gravity_can_be_changed() -> None:
+    simulation = Simulation(World(models=(single("ball", Sphere(0.1), pose=at(z=10.0)), pendulum())))
+    simulation.set_physics(Physics(step=0.002, gravity=(1.0, 0.0, 0.0)))
+    joint = simulation.model("pendulum").joints["joint0"]
+    joint.set_velocity(1.0)
+
+    simulation.step(500)
+
+    assert simulation.time_ns == 1_000_000_000
+    assert simulation.model("ball").state.linear == pytest.approx((1.0, 0.0, 0.0), abs=1e-9)
+    assert joint.velocity == pytest.approx(1.0, rel=1e-3)
+
+
+def scene() -> Simulation:
+    boxes = tuple(single(f"box{i}", Box((0.2, 0.2, 0.2)), pose=at(x=1.0, z=0.1 + 0.21 * i)) for i in range(4))
+    return Simulation(World(models=(GROUND, diff_drive(), arm(3, (-2.0, 0.0, 0.0)), *boxes)))
+
+
+def drive(simulation: Simulation) -> bytes:
+    """Drive through the boxes, add and remove models; return all states."""
+    robot = simulation.model("robot")
+    for name in ("left_joint", "right_joint"):
+        robot.joints[name].set_velocity(10.0, 5.0)
+    result: list[float] = []
+    for index in range(30):
+        simulation.model("arm").joints["joint1"].set_force(5.0 * math.sin(index))
+        if index == 10:
+            simulation.add_model(single("ball", Sphere(0.1)), at(0.8, 0.05, 1.0))
+        if index == 20:
+            simulation.remove_model("box2")
+        simulation.step(100)
+        for model in simulation.models.values():
+            for link in model.links.values():
+                state = link.state
+                result += [*state.pose.position, *state.pose.orientation, *state.linear, *state.angular]
+    return np.array(result).tobytes()
+
+
+def test_the_same_commands_give_the_same_bytes() -> None:
+    assert drive(scene()) == drive(scene())
+
+
+def test_rotation_and_offset_of_a_state_are_kept() -> None:
+    simulation = Simulation(World(models=(diff_drive(),), physics=Physics(gravity=(0, 0, 0))))
+    state = State(at(1.0, 2.0, 3.0, yaw=0.7), (0.1, 0.2, 0.3), (0.4, 0.5, 0.6))
+    robot = simulation.model("robot")
+    robot.set_state(state)
+
+    found = robot.state
+
+    for left, right in zip((*found.pose, *found[1:]), (*state.pose, *state[1:]), strict=True):
+        assert left == pytest.approx(right, abs=1e-9)
+
+
+def test_surface_defaults_do_not_matter_for_static_models() -> None:
+    """A static model never falls."""
+    simulation = Simulation(World(models=(still("shelf", Box((1, 1, 1)), at(z=5.0)),)))
+    simulation.step(100)
+    assert simulation.model("shelf").pose == at(z=5.0)
+    assert Surface().mu == 1.0
