@@ -7,7 +7,17 @@ import math
 from minirospy.core.sdf.model import Inertial, Pose, Quaternion, Vector
 from minirospy.core.urdf.poses import matrix_from_quaternion, quaternion_from_rpy
 
-__all__ = ["add_inertials", "inverse", "moved", "multiply", "pose_from_rpy", "rotate", "unit"]
+__all__ = [
+    "Inertia",
+    "add_inertials",
+    "inverse",
+    "moved",
+    "multiply",
+    "pose_from_rpy",
+    "rotate",
+    "turned_inertia",
+    "unit",
+]
 
 Inertia = tuple[float, float, float, float, float, float]
 
@@ -65,7 +75,7 @@ def add_inertials(first: Inertial, second: Inertial) -> Inertial:
     mass = first.mass + second.mass
     x1, y1, z1 = first.pose.position
     x2, y2, z2 = second.pose.position
-    a, b = first.mass / mass, second.mass / mass
+    a, b = (first.mass / mass, second.mass / mass) if mass else (1.0, 0.0)
     centre = (a * x1 + b * x2, a * y1 + b * y2, a * z1 + b * z2)
     sums = [left + right for left, right in zip(_about(first, centre), _about(second, centre), strict=True)]
     xx, xy, xz, yy, yz, zz = sums
@@ -74,7 +84,7 @@ def add_inertials(first: Inertial, second: Inertial) -> Inertial:
 
 def _about(inertial: Inertial, centre: Vector) -> Inertia:
     """Return an inertia about a point, in the axes of the link's frame."""
-    xx, xy, xz, yy, yz, zz = _turned(inertial.inertia, inertial.pose.orientation)
+    xx, xy, xz, yy, yz, zz = turned_inertia(inertial.inertia, inertial.pose.orientation)
     x, y, z = (here - there for here, there in zip(inertial.pose.position, centre, strict=True))
     mass = inertial.mass
     return (
@@ -83,7 +93,7 @@ def _about(inertial: Inertial, centre: Vector) -> Inertia:
     )  # fmt: skip
 
 
-def _turned(inertia: Inertia, rotation: Quaternion) -> Inertia:
+def turned_inertia(inertia: Inertia, rotation: Quaternion) -> Inertia:
     """Return R I R^T."""
     if rotation[3] == 1.0:
         return inertia

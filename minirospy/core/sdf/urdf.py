@@ -4,7 +4,8 @@
   the joint, ``disableFixedJointLumping`` makes a revolute one with the limits 0 and 0.
 - A link without mass is left out, with all links below it. A massless root whose fixed children have masses gets theirs.
 - Joints to a root link named ``world`` fix the robot.
-- Unlike sdformat: colours of the URDF are kept, mimic joints are read, and friction applies to collisions that have a name.
+- Unlike sdformat: colours of the URDF are kept, mimic joints are read, friction applies to collisions that have a name, children
+  of floating and planar joints are free bodies, and links below a massless link stay if a fixed joint merges it.
 
 Source: http://sdformat.org/tutorials?tut=pose_frame_semantics, https://classic.gazebosim.org/tutorials?tut=ros_urdf.
 """
@@ -154,7 +155,7 @@ class _Converter:
         )
 
     def _tree(self) -> Iterator[str]:
-        """Yield the links from the root in sdformat's order: merged children first, each with what is merged into it."""
+        """Yield the links from the root, each before those below it; children are sorted by their joints' names."""
         seen: set[str] = set()
         stack = [self._robot.root]
         while stack:
@@ -163,9 +164,7 @@ class _Converter:
                 continue
             seen.add(name)
             yield name
-            below = self._robot.child_joints(name)
-            below = sorted(below, key=lambda joint: not self._is_merged(joint))
-            stack.extend(joint.child for joint in reversed(below))
+            stack.extend(joint.child for joint in reversed(self._robot.child_joints(name)))
 
     def _merge(self, name: str) -> None:
         """Add a link to the bodies, or its parts to its parent's body."""
@@ -186,7 +185,7 @@ class _Converter:
             link = self._robot.links[name]
             body.visuals += [(name, pose, visual) for visual in link.visuals]
             body.collisions += [(name, pose, collision) for collision in link.collisions]
-            if link.inertial is not None and link.inertial.mass > 0.0:
+            if link.inertial is not None and link.inertial.mass >= 0.0:
                 own = Inertial(link.inertial.mass, _pose(link.inertial.origin), link.inertial.inertia)
                 inertial = moved(own, pose) if name != body.link.name else own
                 body.inertial = inertial if body.inertial is None else add_inertials(body.inertial, inertial)
@@ -317,16 +316,20 @@ class _Converter:
 
     def _add_link_extensions(self, link: Element, owner: str, pose: Pose) -> None:
         """Copy what ``<gazebo reference="owner">`` contains for the link; sensors and lights of merged links move along."""
-        for child in self._extensions.get(owner, ()):
+        children = self._extensions.get(owner, [])
+        # As in sdformat, unknown tags come last: <turnGravityOff> wins over <gravity>.
+        for child in sorted(children, key=lambda child: child.tag not in _LINK_TAGS):
             tag = child.tag
             if tag == "turnGravityOff":
                 _replace(link, "gravity", "true" if _value(child).lower() in _FALSE else "false", child.line)
             elif tag == "dampingFactor":
+                if link.first("velocity_decay") is not None:
+                    continue
                 decay = new_element(
                     "velocity_decay", "", new_element("linear", _value(child), line=child.line),
                     new_element("angular", _value(child), line=child.line), line=child.line,
                 )  # fmt: skip
-                link.children = [*(part for part in link.children if part.tag != "velocity_decay"), decay]
+                link.children.append(decay)
             elif tag == "selfCollide":
                 _replace(
                     link, "self_collide", "true" if _value(child).lower() in _TRUE else "false", child.line
@@ -438,6 +441,7 @@ class _Converter:
                 part.text = self.lumped[old][0]
 
 
+_LINK_TAGS = ("turnGravityOff", "dampingFactor", "selfCollide")
 _OWN_TAGS = frozenset(("material", "visual", "collision", "static")) | _WITHOUT_EFFECT | frozenset(_DYNAMICS)
 
 
@@ -520,7 +524,8 @@ def _set(parent: Element, tag: str, value: Element) -> None:
 
 
 def _replace(parent: Element, tag: str, text: str, line: int) -> None:
-    parent.children = [child for child in parent.children if child.tag != tag]
+    first = parent.first(tag)
+    parent.children = [child for child in parent.children if child is not first]
     parent.children.append(new_element(tag, text, line=line))
 
 

@@ -39,8 +39,8 @@ class DiffDrive(ModelPlugin):
         rate = self.number("updateRate", 100.0)
         self._period_ns = round(1e9 / rate) if rate > 0 else 0
         self._frames = (
-            self.text("odometryFrame", "odom"),
-            self.text("robotBaseFrame", "base_footprint"),
+            self.frame("odometryFrame", "odom"),
+            self.frame("robotBaseFrame", "base_footprint"),
         )
         self._uses_encoders = self.text("odometrySource", "world") == "encoder"
         self._publishes_transform = self.flag("publishOdomTF", True)
@@ -133,4 +133,3 @@ class DiffDrive(ModelPlugin):
         if parent in self.model.links:
             pose = multiply(inverse(self.model.links[parent].pose), self.model.links[child].pose)
             self._transforms.send(self.now, parent, child, pose)
-

@@ -131,6 +131,10 @@ class PluginBase:
         text = self.text(tag).lower()
         return text in ("true", "1") if text else default
 
+    def frame(self, tag: str, default: str) -> str:
+        """Return a parameter's name of a frame, without the slash at its start."""
+        return self.text(tag, default).lstrip("/")
+
     def resolve(self, topic: str) -> str:
         """Return a topic's name in the plugin's namespace."""
         return topic if topic.startswith("/") else f"{self.namespace}/{topic}"

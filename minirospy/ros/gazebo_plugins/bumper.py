@@ -1,0 +1,59 @@
+"""libgazebo_ros_bumper.so: the contacts of a collision."""
+
+from __future__ import annotations
+
+from gazebo_msgs.msg import ContactsState, ContactState
+from geometry_msgs.msg import Wrench
+
+from minirospy.ros.gazebo_ros.messages import to_vector
+from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+
+__all__ = ["Bumper"]
+
+
+class Bumper(SensorPlugin):
+    """The plugin. Parameters: bumperTopicName, frameName. All vectors are in world axes."""
+
+    def load(self) -> None:
+        """Find the collisions, of which ``<contact>`` may name several."""
+        self.simulation.records_details = True
+        contact = self.sensor.element.first("contact")
+        names = [each.text.strip() for each in contact.all("collision")] if contact is not None else []
+        link = self.sensor_link
+        known = {each.name for each in link.record.collisions}
+        # A name that sdformat changed when it merged links is not known: all collisions of the link count.
+        chosen = known.intersection(names) or known
+        self._collisions = {f"{link.scoped_name}::{name}" for name in chosen}
+        self._frame = self.frame("frameName", "world")
+        self._publisher = self.publish_to(self.text("bumperTopicName", "bumper_states"), ContactsState)
+
+    def is_needed(self) -> bool:
+        """Return whether there is a subscriber."""
+        return self._publisher.get_num_connections() > 0
+
+    def sense(self) -> None:
+        """Publish the contacts, also if there are none."""
+        message = ContactsState()
+        message.header.stamp = self.now
+        message.header.frame_id = self._frame
+        for contact in self.simulation.contacts():
+            if not self._collisions.intersection((contact.collision1, contact.collision2)):
+                continue
+            state = ContactState(collision1_name=contact.collision1, collision2_name=contact.collision2)
+            state.info = (
+                f"Debug:  i:(0/1)     my geom:{contact.collision1}   other geom:{contact.collision2}"
+                f"         time:{self.simulation.time}"
+            )
+            state.contact_positions = [to_vector(each) for each in contact.positions]
+            state.contact_normals = [to_vector(each) for each in contact.normals]
+            state.depths = list(contact.depths)
+            state.wrenches = [
+                Wrench(to_vector(each.force), to_vector(each.torque)) for each in contact.wrenches
+            ]
+            for part in ("force", "torque"):
+                total = getattr(state.total_wrench, part)
+                for wrench in contact.wrenches:
+                    x, y, z = getattr(wrench, part)
+                    total.x, total.y, total.z = total.x + x, total.y + y, total.z + z
+            message.states.append(state)
+        self._publisher.publish(message)

@@ -1,0 +1,45 @@
+"""libgazebo_ros_laser.so and libgazebo_ros_gpu_laser.so: a laser scanner."""
+
+from __future__ import annotations
+
+import numpy as np
+from sensor_msgs.msg import LaserScan
+
+from minirospy.ros.gazebo_plugins.rays import read_rays
+from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+
+__all__ = ["Laser"]
+
+
+class Laser(SensorPlugin):
+    """The plugin. Parameters: topicName, frameName."""
+
+    def load(self) -> None:
+        """Read the sensor's rays."""
+        self._rays = read_rays(self.sensor)
+        self._frame = self.frame("frameName", "/world")
+        self._publisher = self.publish_to(self.text("topicName", "/world"), LaserScan)
+
+    def is_needed(self) -> bool:
+        """Return whether there is a subscriber."""
+        return self._publisher.get_num_connections() > 0
+
+    def sense(self) -> None:
+        """Publish a scan."""
+        rays = self._rays
+        first = len(rays.directions) // rays.count // 2 * rays.count  # the middle row, if there are several
+        directions = rays.directions[first : first + rays.count]
+        hits = self.simulation.cast_rays(
+            self.sensor_pose, directions, rays.max_range, min_range=rays.min_range
+        )
+        ranges = rays.noisy(self.simulation, np.asarray(hits.distances))
+        scan = LaserScan()
+        scan.header.stamp = self.now
+        scan.header.frame_id = self._frame
+        scan.angle_min, scan.angle_max = rays.min_angle, rays.max_angle
+        scan.angle_increment = (rays.max_angle - rays.min_angle) / max(rays.count - 1, 1)
+        scan.range_min, scan.range_max = rays.min_range, rays.max_range
+        ranges = np.where(ranges >= rays.max_range, np.inf, ranges)
+        scan.ranges = np.where(ranges <= rays.min_range, -np.inf, ranges).tolist()
+        scan.intensities = [0.0] * rays.count
+        self._publisher.publish(scan)

@@ -1,0 +1,27 @@
+"""The mimic joint plugin of roboticsgroup: a joint that follows another one."""
+
+from __future__ import annotations
+
+import math
+
+from minirospy.ros.gazebo_ros.plugins import ModelPlugin
+
+__all__ = ["MimicJoint"]
+
+
+class MimicJoint(ModelPlugin):
+    """The plugin. Parameters: joint, mimicJoint, multiplier, offset, maxEffort. A motor takes the place of its PID controller."""
+
+    def load(self) -> None:
+        """Find the joints."""
+        self._leader = self.joint(self.text("joint"))
+        self._follower = self.joint(self.text("mimicJoint"))
+        self._multiplier = self.number("multiplier", 1.0)
+        self._offset = self.number("offset", 0.0)
+        limit = self.number("maxEffort", 0.0)
+        self._max_effort = limit if limit > 0 and self.element.first("hasPID") is not None else math.inf
+
+    def update(self) -> None:
+        """Move the motor's target."""
+        target = self._multiplier * self._leader.position + self._offset
+        self._follower.set_position(target, self._max_effort)

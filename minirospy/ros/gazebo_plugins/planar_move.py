@@ -1,0 +1,62 @@
+"""libgazebo_ros_planar_move.so: moves a whole model over the ground by /cmd_vel, and publishes /odom."""
+
+from __future__ import annotations
+
+import math
+
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+
+from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, body_velocity, to_odometry
+from minirospy.ros.gazebo_ros.messages import yaw_of
+from minirospy.ros.gazebo_ros.plugins import ModelPlugin, Timer
+
+__all__ = ["PlanarMove"]
+
+_VARIANCES = (1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3)
+
+
+class PlanarMove(ModelPlugin):
+    """The plugin. Parameters: commandTopic, odometryTopic, odometryFrame, robotBaseFrame, odometryRate, cmdTimeout."""
+
+    def load(self) -> None:
+        """Read the parameters."""
+        self._rate = self.number("odometryRate", 20.0)
+        self._timeout = self.number("cmdTimeout", -1.0)
+        self._frames = (
+            self.frame("odometryFrame", "odom"),
+            self.frame("robotBaseFrame", "base_footprint"),
+        )
+        self._odometry = self.publish_to(self.text("odometryTopic", "odom"), Odometry)
+        self._transforms = TransformPublisher()
+        self._closing.append(self._transforms.close)
+        self.reset()
+        self.subscribe_to(self.text("commandTopic", "cmd_vel"), Twist, self._on_command)
+
+    def reset(self) -> None:
+        """Stop."""
+        self._command = (0.0, 0.0, 0.0)
+        self._commanded_ns = self.simulation.time_ns
+        self._timer = Timer(self._rate)
+
+    def _on_command(self, message: Twist) -> None:
+        self._command = (message.linear.x, message.linear.y, message.angular.z)
+        self._commanded_ns = self.simulation.time_ns
+
+    def update(self) -> None:
+        """Set the model's velocity, and publish."""
+        now_ns = self.simulation.time_ns
+        if 0 <= self._timeout < (now_ns - self._commanded_ns) / 1e9:
+            self._command = (0.0, 0.0, 0.0)
+        state = self.model.state
+        yaw = yaw_of(state.pose.orientation)
+        x, y, turn = self._command
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        self.model.set_velocity((x * cos - y * sin, y * cos + x * sin, 0.0), (0.0, 0.0, turn))
+        if self._rate > 0 and self._timer.is_due(now_ns):
+            pose = state.pose
+            self._transforms.send(self.now, *self._frames, pose)
+            velocity = body_velocity(state)
+            px, py, _ = pose.position
+            flat = pose._replace(position=(px, py, 0.0))
+            self._odometry.publish(to_odometry(self.now, self._frames, flat, velocity, _VARIANCES))

@@ -1,0 +1,85 @@
+"""The rays of a ``<ray>`` sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from minirospy.base.xml_text import XmlElement
+from minirospy.core.sdf.model import Sensor
+from minirospy.ros.gazebo_ros.physics import Simulation
+
+__all__ = ["Rays", "read_rays"]
+
+
+@dataclass(frozen=True)
+class Rays:
+    """The rays of a sensor.
+
+    directions: (n, 3) unit vectors in the sensor's frame; the rows of angles follow each other. min_angle, max_angle: of a row,
+    in rad. count: of a row. noise_mean, noise_deviation: of distances, in m.
+    """
+
+    directions: NDArray[np.float64]
+    min_angle: float
+    max_angle: float
+    count: int
+    min_range: float
+    max_range: float
+    noise_mean: float = 0.0
+    noise_deviation: float = 0.0
+
+    def noisy(self, simulation: Simulation, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return distances with noise, within the range's limits. Infinite distances are not changed."""
+        if self.noise_deviation <= 0 and self.noise_mean == 0:
+            return ranges
+        noise = simulation.random.normal(self.noise_mean, self.noise_deviation, len(ranges))
+        return np.where(np.isfinite(ranges), np.clip(ranges + noise, self.min_range, self.max_range), ranges)
+
+
+def read_rays(sensor: Sensor) -> Rays:
+    """Read ``<ray>``, or ``<lidar>``. Raise ValueError if a value is not a number."""
+    ray = sensor.element.first("ray") or sensor.element.first("lidar")
+    scan = _child(ray, "scan")
+    horizontal, vertical = _child(scan, "horizontal"), _child(scan, "vertical")
+    low, high, count = _angles(horizontal, 640)
+    bottom, top, rows = _angles(vertical, 1)
+    around = np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
+    upwards = np.linspace(bottom, top, rows) if rows > 1 else np.array([(bottom + top) / 2])
+    pitch, yaw = (grid.ravel() for grid in np.meshgrid(upwards, around, indexing="ij"))
+    columns = (np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch))
+    limits, noise = _child(ray, "range"), _child(ray, "noise")
+    is_noisy = noise is not None and _text(noise, "type") in ("gaussian", "gaussian_quantized")
+    return Rays(
+        np.stack(columns, axis=1),
+        low,
+        high,
+        count,
+        _number(limits, "min", 0.0),
+        _number(limits, "max", 0.0),
+        _number(noise, "mean", 0.0) if is_noisy else 0.0,
+        _number(noise, "stddev", 0.0) if is_noisy else 0.0,
+    )
+
+
+def _angles(element: XmlElement | None, samples: int) -> tuple[float, float, int]:
+    if element is None:
+        return 0.0, 0.0, 1
+    count = int(_number(element, "samples", samples) * _number(element, "resolution", 1.0))
+    return _number(element, "min_angle", 0.0), _number(element, "max_angle", 0.0), max(1, count)
+
+
+def _child(element: XmlElement | None, tag: str) -> XmlElement | None:
+    return element.first(tag) if element is not None else None
+
+
+def _text(element: XmlElement | None, tag: str) -> str:
+    child = _child(element, tag)
+    return child.text.strip() if child is not None else ""
+
+
+def _number(element: XmlElement | None, tag: str, default: float) -> float:
+    text = _text(element, tag)
+    return float(text) if text else default
