@@ -5,8 +5,9 @@ from __future__ import annotations
 import threading
 import time as wall
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.base.errors import MinirospyError
@@ -31,7 +32,7 @@ class SimulationLoop:
 
     simulation: only this loop's thread uses it; other threads use :meth:`call`.
     before_step: is called before each step. on_tick: is called at the tick rate of simulated time, and after each reset.
-    on_lost: is called for each model that the simulation removed.
+    on_lost: is called for each model that the simulation removed. reported: problems that were logged once.
     """
 
     def __init__(self, simulation: Simulation, *, paused: bool = False, tick_rate: float = 0.0) -> None:
@@ -39,6 +40,7 @@ class SimulationLoop:
         self.before_step: Callable[[], None] = lambda: None
         self.on_tick: Callable[[], None] = lambda: None
         self.on_lost: Callable[[LostModel], None] = lambda lost: None
+        self.reported: set[str] = set()
         self.real_time_factor = 0.0  # of the last second of wall time
         self._paused = paused
         self._rate = simulation.physics.update_rate
@@ -68,13 +70,38 @@ class SimulationLoop:
         """Run a function between two steps, in the loop's thread; return its result. Raise LoopClosed after the end."""
         if threading.current_thread() is self._thread:
             return function()
+        return self._submit(function).result()
+
+    @contextmanager
+    def held(self) -> Iterator[Simulation]:
+        """Keep the simulation between two steps while the calling thread uses it. Raise LoopClosed after the end.
+
+        Do not use it in the loop's thread.
+        """
+        entered, left = threading.Event(), threading.Event()
+
+        def hold() -> None:
+            entered.set()
+            left.wait()
+
+        future = self._submit(hold)
+        future.add_done_callback(lambda _: entered.set())
+        entered.wait()
+        try:
+            if future.done():
+                future.result()
+            yield self.simulation
+        finally:
+            left.set()
+
+    def _submit(self, function: Callable[[], _T]) -> Future[_T]:
         future: Future[_T] = Future()
         with self._wake:
             if self._is_closed:
                 raise LoopClosed("the simulation has ended")
             self._jobs.append((function, future))  # type: ignore[arg-type]
             self._wake.notify_all()
-        return future.result()
+        return future
 
     @property
     def is_paused(self) -> bool:

@@ -6,6 +6,7 @@ while there are subscribers.
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from minirospy import client as rospy
 from minirospy.core.sdf.model import Box, Color, Cylinder, MeshShape, Plane, Pose, Sphere, Visual
 from minirospy.core.sdf.poses import multiply
 from minirospy.ros.gazebo_ros.messages import time_of, to_pose
+from minirospy.workspace.packages import package_name
 
 if TYPE_CHECKING:
     from minirospy.ros.gazebo_ros.physics import SimLink, Simulation
@@ -41,12 +43,12 @@ class WorldMarkers:
 
     def publish_all(self) -> None:
         """Replace all markers."""
-        markers = [Marker(action=Marker.DELETEALL)]
         self._published.clear()
-        for model in self._simulation.models.values():
-            for link in model.links.values():
-                markers += self._markers(link)
-        self._send(markers)
+        self._send([Marker(action=Marker.DELETEALL), *self._all()])
+
+    def _all(self) -> list[Marker]:
+        links = [link for model in self._simulation.models.values() for link in model.links.values()]
+        return [marker for link in links for marker in self._markers(link)]
 
     def publish_moved(self) -> None:
         """Publish the links that have moved, at a low rate, if there are subscribers."""
@@ -54,16 +56,11 @@ class WorldMarkers:
         if 0 <= self._next_ns - now <= 1e9 / RATE_HZ or not self._publisher.get_num_connections():
             return
         self._next_ns = now + round(1e9 / RATE_HZ)
-        markers: list[Marker] = []
         for model in self._simulation.models.values():
-            if model.is_static and all(link.scoped_name in self._published for link in model.links.values()):
-                continue
-            for link in model.links.values():
-                if self._published.get(link.scoped_name) != link.pose:
-                    markers += self._markers(link)
-        if markers:
-            # The latch keeps only the last message, so it contains all markers.
-            self.publish_all()
+            if any(self._published.get(link.scoped_name) != link.pose for link in model.links.values()):
+                # The latch keeps only the last message, so it contains all markers.
+                self._send(self._all())
+                return
 
     def _send(self, markers: list[Marker]) -> None:
         stamp = time_of(self._simulation.time_ns)
@@ -86,6 +83,16 @@ class WorldMarkers:
         return found
 
 
+@functools.cache
+def _uri(path: str) -> str:
+    """Return a file's URI: package://, which the dashboard can read, if the file is in a package."""
+    file = Path(path)
+    for folder in file.parents:
+        if name := package_name(folder):
+            return f"package://{name}/{file.relative_to(folder).as_posix()}"
+    return file.as_uri()
+
+
 def _marker(visual: Visual) -> Marker | None:
     marker = Marker(action=Marker.ADD)
     red, green, blue, opacity = visual.material.color or GREY
@@ -104,7 +111,7 @@ def _marker(visual: Visual) -> Marker | None:
         marker.scale = Vector3(width, height, PLANE_THICKNESS)
     elif isinstance(shape, MeshShape):
         marker.type, marker.scale = Marker.MESH_RESOURCE, Vector3(*shape.scale)
-        marker.mesh_resource = Path(shape.path).as_uri()
+        marker.mesh_resource = _uri(shape.path)
         if visual.material.color is None:
             marker.mesh_use_embedded_materials = True
             marker.color = ColorRGBA(0.0, 0.0, 0.0, 0.0)

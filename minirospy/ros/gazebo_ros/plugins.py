@@ -14,7 +14,7 @@ import importlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy import client as rospy
 from minirospy.base.errors import ManifestError, MinirospyError
@@ -51,6 +51,9 @@ LIBRARIES = {
     "gazebo_ros_joint_state_publisher": f"{_PLUGINS}.joint_state_publisher:JointStatePublisher",
     "gazebo_ros_laser": f"{_PLUGINS}.laser:Laser",
     "gazebo_ros_gpu_laser": f"{_PLUGINS}.laser:Laser",
+    "gazebo_ros_camera": f"{_PLUGINS}.camera:Camera",
+    "gazebo_ros_depth_camera": f"{_PLUGINS}.camera:DepthCamera",
+    "gazebo_ros_openni_kinect": f"{_PLUGINS}.camera:DepthCamera",
     "gazebo_ros_imu": f"{_PLUGINS}.imu:Imu",
     "gazebo_ros_imu_sensor": f"{_PLUGINS}.imu:ImuSensor",
     "gazebo_ros_p3d": f"{_PLUGINS}.p3d:P3D",
@@ -139,7 +142,9 @@ class PluginBase:
         """Return a topic's name in the plugin's namespace."""
         return topic if topic.startswith("/") else f"{self.namespace}/{topic}"
 
-    def publish_to(self, topic: str, kind: type[rospy.Message], *, latch: bool = False) -> rospy.Publisher:
+    def publish_to(
+        self, topic: str, kind: type[rospy.Message], *, latch: bool = False
+    ) -> rospy.Publisher[Any]:
         """Return a publisher in the plugin's namespace."""
         publisher = rospy.Publisher(self.resolve(topic), kind, queue_size=1, latch=latch)
         self._closing.append(publisher.unregister)
@@ -147,7 +152,7 @@ class PluginBase:
 
     def subscribe_to(
         self, topic: str, kind: type[rospy.Message], callback: Callable[..., object]
-    ) -> rospy.Subscriber:
+    ) -> rospy.Subscriber[Any]:
         """Subscribe to a topic in the plugin's namespace."""
         subscriber = rospy.Subscriber(self.resolve(topic), kind, callback, queue_size=1)
         self._closing.append(subscriber.unregister)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pytest
 from gazebo_msgs.msg import ContactsState
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState, LaserScan, Range
+from std_msgs.msg import Float64
+from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
 from minirospy import Node
+from tests.conftest import write_files
 from tests.ros.simulation.processes import Start, call, end, run, start_world, until
 
 ROVER = (Path(__file__).parent / "rover.urdf").read_text()
@@ -71,7 +75,9 @@ def test_the_robot_drives_a_circle(master: str, start: Start) -> None:
     run(body)
     output, errors = end(process)
     text = output + errors
-    assert text.count("libgazebo_ros_hand_of_god.so of model 'rover' is not part of minirospy's simulation") == 1
+    assert (
+        text.count("libgazebo_ros_hand_of_god.so of model 'rover' is not part of minirospy's simulation") == 1
+    )
 
 
 def test_sensors_measure_the_geometry(master: str, start: Start) -> None:
@@ -104,5 +110,42 @@ def test_sensors_measure_the_geometry(master: str, start: Start) -> None:
         contact = message.states[0]
         assert {contact.collision1_name, contact.collision2_name} >= {"wall::link::wall"}
         assert contact.depths
+
+    run(body)
+
+
+def test_a_plugin_of_the_users_own(
+    master: str, tmp_path: Path, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_files(
+        tmp_path,
+        {
+            "my_robot/package.xml": (
+                '<package format="2"><name>my_robot</name><version>1.0.0</version><description>d</description>'
+                '<maintainer email="a@b.c">a</maintainer><license>BSD</license>'
+                '<export><gazebo_ros library="libheight.so" python="height.Height"/></export></package>'
+            ),
+            "my_robot/src/height.py": (
+                "from std_msgs.msg import Float64\n"
+                "from gazebo_ros.plugins import ModelPlugin\n\n\n"
+                "class Height(ModelPlugin):\n"
+                "    def load(self):\n"
+                "        self.factor = self.number('factor', 1.0)\n"
+                "        self.publisher = self.publish_to('height', Float64)\n\n"
+                "    def update(self):\n"
+                "        self.publisher.publish(self.factor * self.model.pose.position[2])\n"
+            ),
+        },
+    )
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    start_world(start, "-u")
+    plugin = '<plugin name="height" filename="libheight.so"><factor>2</factor></plugin>'
+
+    async def body(node: Node) -> None:
+        text = WALL.replace("</link>", f"</link>{plugin}")
+        pose = Pose(Point(0.0, 0.0, 3.0), UP)
+        assert (await call(node, "spawn_sdf_model", SpawnModel, "wall", text, "/robot", pose, "")).success
+        await call(node, "unpause_physics", Empty)
+        await until(node, "/robot/height", Float64, lambda each: each.data == 6.0)
 
     run(body)
