@@ -24,6 +24,7 @@ __all__ = ["MAX_PIXELS", "Renderer"]
 
 MAX_GEOMS = 20_000  # in one picture
 MAX_PIXELS = 4096  # on a side
+SPARE_GEOMS = 100  # for shapes that are not geoms, such as lights
 _VARIABLE = "MUJOCO_GL"
 
 
@@ -55,7 +56,7 @@ class Renderer:
         engine.refresh()
         if self._generation != engine.generation:
             self._model = engine.model
-            self._scene = mujoco.MjvScene(engine.model, MAX_GEOMS)
+            self._scene = mujoco.MjvScene(engine.model, min(engine.model.ngeom + SPARE_GEOMS, MAX_GEOMS))
             self._generation = engine.generation
         camera = mujoco.MjvCamera()
         mujoco.mjv_updateScene(
