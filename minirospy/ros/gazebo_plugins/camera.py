@@ -1,215 +1,250 @@
-"""libgazebo_ros_camera.so, libgazebo_ros_depth_camera.so and libgazebo_ros_openni_kinect.so: cameras.
-
-Each camera renders in a thread of its own, so that the simulation goes on meanwhile. A picture is late rather than the
-simulation: its stamp is the time of the world that it shows.
-"""
+"""libgazebo_ros_camera.so and libgazebo_ros_multicamera.so: pictures in colour, with camera_info."""
 
 from __future__ import annotations
 
+import copy
 import math
-import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
-from std_msgs.msg import Header
+from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.srv import SetCameraInfo, SetCameraInfoRequest, SetCameraInfoResponse
 
 from minirospy import client as rospy
-from minirospy.base.xml_text import XmlElement
-from minirospy.ros.gazebo_ros.loop import LoopClosed
-from minirospy.ros.gazebo_ros.messages import time_of
-from minirospy.ros.gazebo_ros.physics import SimulationError
-from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+from minirospy.base.times import Time
+from minirospy.core.sdf.poses import multiply
+from minirospy.ros.dynamic_reconfigure.definition import Definition
+from minirospy.ros.gazebo_plugins.optics import (
+    Optics,
+    add_noise,
+    encode,
+    encoding_of,
+    read_optics,
+    to_camera_info,
+)
+from minirospy.ros.gazebo_plugins.pictures import Photographer
+from minirospy.ros.gazebo_ros.plugins import PluginError, SensorPlugin
 
 if TYPE_CHECKING:
     from minirospy.ros.gazebo_ros.physics.rendering import Renderer
 
-__all__ = ["Camera", "DepthCamera"]
+__all__ = ["Camera", "CameraPlugin", "Lens", "MultiCamera"]
 
-_POINT_STEP = 32  # bytes: x, y, z and rgb, each aligned as PCL does
-
-
-class Camera(SensorPlugin):
-    """Colour pictures. Parameters: cameraName, imageTopicName, cameraInfoTopicName, frameName, updateRate, hackBaseline."""
-
-    def load(self) -> None:
-        """Read the sensor, and start the thread."""
-        camera = self.sensor.element.first("camera")
-        image, clip = _child(camera, "image"), _child(camera, "clip")
-        self._width, self._height = int(_number(image, "width", 320)), int(_number(image, "height", 240))
-        self._encoding = {"L8": "mono8", "B8G8R8": "bgr8", "BGR8": "bgr8"}.get(_text(image, "format"), "rgb8")
-        self._fov = _number(camera, "horizontal_fov", 1.047)
-        self._near, self._far = _number(clip, "near", 0.1), _number(clip, "far", 100.0)
-        self._focal = self._width / (2 * math.tan(self._fov / 2))
-        self._frame = self.frame("frameName", "/world")
-        self._baseline = self.number("hackBaseline", 0.0)
-        self.rate = self.number("updateRate", 0.0) or self.rate
-        self._images = self.camera_publisher("imageTopicName", "image_raw", Image)
-        self._infos = self.camera_publisher("cameraInfoTopicName", "camera_info", CameraInfo)
-        self._publishers = [self._images, self._infos]
-        self._wanted, self._is_closed = threading.Event(), False
-        threading.Thread(target=self._run, name=f"camera {self.sensor.name}").start()
-
-    def camera_publisher(self, tag: str, default: str, kind: Any) -> rospy.Publisher[Any]:
-        """Return a publisher in the camera's namespace, whose topic is a parameter."""
-        topic = self.text(tag, default)
-        name = self.text("cameraName", self.sensor.name).rstrip("/")
-        return self.publish_to(topic if topic.startswith("/") else f"{name}/{topic}", kind)
-
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return any(each.get_num_connections() for each in self._publishers)
-
-    def sense(self) -> None:
-        """Ask the thread for a picture."""
-        self._wanted.set()
-
-    def close(self) -> None:
-        """End the thread."""
-        self._is_closed = True
-        self._wanted.set()
-        super().close()
-
-    def _run(self) -> None:
-        renderer: Renderer | None = None
-        try:
-            while True:
-                self._wanted.wait()
-                if self._is_closed:
-                    return
-                self._wanted.clear()
-                with self.loop.held() as simulation:
-                    if self.model.is_removed:
-                        return
-                    if renderer is None:
-                        renderer = simulation.renderer(self._width, self._height)
-                    renderer.capture(self.sensor_pose, self._fov, self._near, self._far)
-                    stamp = time_of(simulation.time_ns)
-                self._publish(renderer, Header(stamp=stamp, frame_id=self._frame))
-        except LoopClosed:
-            pass
-        except (SimulationError, rospy.ROSException) as error:
-            if not self._is_closed and str(error) not in self.loop.reported:
-                self.loop.reported.add(str(error))
-                rospy.logerr("there are no pictures: %s", error)
-        finally:
-            if renderer is not None:
-                renderer.close()
-
-    def _publish(self, renderer: Renderer, header: Header) -> None:
-        if self._images.get_num_connections():
-            self._images.publish(self._image(header, renderer.color()))
-        if self._infos.get_num_connections():
-            self._infos.publish(self._info(header))
-
-    def _image(self, header: Header, color: NDArray[np.uint8]) -> Image:
-        if self._encoding == "mono8":
-            color = (color @ np.array([0.299, 0.587, 0.114])).astype(np.uint8)
-        elif self._encoding == "bgr8":
-            color = color[:, :, ::-1]
-        return _to_image(header, self._encoding, color)
-
-    def _info(self, header: Header) -> CameraInfo:
-        width, height, focal = self._width, self._height, self._focal
-        x, y = (width + 1) / 2, (height + 1) / 2
-        return CameraInfo(
-            header=header,
-            height=height,
-            width=width,
-            distortion_model="plumb_bob",
-            D=[0.0] * 5,
-            K=[focal, 0.0, x, 0.0, focal, y, 0.0, 0.0, 1.0],
-            R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            P=[focal, 0.0, x, -focal * self._baseline, 0.0, focal, y, 0.0, 0.0, 0.0, 1.0, 0.0],
-        )
+RATES = (2.0, 1.0, 50.0)  # Hz; default, least and greatest of dynamic reconfigure
 
 
-class DepthCamera(Camera):
-    """Colour and depth pictures, and points in optical axes (z forwards).
+class CameraPlugin(SensorPlugin):
+    """The base of all cameras' plugins.
 
-    Additional parameters: depthImageTopicName, depthImageCameraInfoTopicName (or depthImageInfoTopicName),
-    pointCloudTopicName, pointCloudCutoff, pointCloudCutoffMax, useDepth16UC1Format.
+    Parameters: cameraName, frameName, imageTopicName, cameraInfoTopicName, updateRate (0: the sensor's), hackBaseline, Cx, Cy,
+    focalLength, distortionK1, K2, K3, T1, T2, autoDistortion.
     """
 
+    image_topic = "image_raw"
+    info_topic = "camera_info"
+
     def load(self) -> None:
-        """Read the sensor, and start the thread."""
-        self._nearest = self.number("pointCloudCutoff", 0.4)
-        self._farthest = self.number("pointCloudCutoffMax", 5.0)
-        self._uses_millimetres = self.flag("useDepth16UC1Format", False)
-        self._depths = self.camera_publisher("depthImageTopicName", "depth/image_raw", Image)
-        tag = "depthImageCameraInfoTopicName"
-        tag = tag if self.element.first(tag) is not None else "depthImageInfoTopicName"
-        self._depth_infos = self.camera_publisher(tag, "depth/camera_info", CameraInfo)
-        self._points = self.camera_publisher("pointCloudTopicName", "points", PointCloud2)
-        super().load()
-        self._publishers += [self._depths, self._depth_infos, self._points]
-
-    def _publish(self, renderer: Renderer, header: Header) -> None:
-        super()._publish(renderer, header)
-        if self._depth_infos.get_num_connections():
-            self._depth_infos.publish(self._info(header))
-        has_points = self._points.get_num_connections() > 0
-        if not has_points and not self._depths.get_num_connections():
+        """Read the common parameters."""
+        if self.element.first("robotNamespace") is not None:
+            self.default_namespace = self.model.name
+        self.camera_name = self.text("cameraName").strip("/")
+        prefix = str(rospy.get_param(f"{self.namespace}/tf_prefix", "")).strip("/")
+        self.frame_id = "/".join(filter(None, (prefix, self.frame("frameName", ""))))
+        rate = self.number("updateRate", 0.0)
+        self.period_ns = round(1e9 / rate) if rate > 0 else 0
+        self.lenses: list[Lens] = []
+        self._last_ns: int | None = None
+        if not self.camera_name:
+            rospy.logwarn(
+                "dynamic reconfigure is not enabled for this image topic [%s] becuase <cameraName> is not specified",
+                self.text("imageTopicName", self.image_topic),
+            )
             return
-        depths = renderer.depth()
-        is_outside = (depths < self._nearest) | (depths > self._farthest)
-        depths = np.where(is_outside, np.float32(np.nan), depths).astype(np.float32)
-        if self._depths.get_num_connections():
-            if self._uses_millimetres:
-                values = np.nan_to_num(depths * 1000).astype(np.uint16)
-                self._depths.publish(_to_image(header, "16UC1", values))
-            else:
-                self._depths.publish(_to_image(header, "32FC1", depths))
-        if has_points:
-            self._points.publish(self._cloud(header, depths, renderer.color()))
+        self._offer_rate()
 
-    def _cloud(self, header: Header, depths: NDArray[np.float32], color: NDArray[np.uint8]) -> PointCloud2:
-        height, width = depths.shape
-        rows, columns = np.mgrid[0:height, 0:width]
-        cloud = np.zeros((height, width, _POINT_STEP // 4), np.float32)
-        cloud[:, :, 0] = (columns - (width - 1) / 2) / self._focal * depths
-        cloud[:, :, 1] = (rows - (height - 1) / 2) / self._focal * depths
-        cloud[:, :, 2] = depths
-        red, green, blue = (color[:, :, index].astype(np.uint32) for index in range(3))
-        cloud[:, :, 4] = ((red << 16) | (green << 8) | blue).view(np.float32)
-        names = (("x", 0), ("y", 4), ("z", 8), ("rgb", 16))
-        return PointCloud2(
-            header=header,
-            height=height,
-            width=width,
-            fields=[PointField(name, offset, PointField.FLOAT32, 1) for name, offset in names],
-            is_bigendian=False,
-            point_step=_POINT_STEP,
-            row_step=_POINT_STEP * width,
-            data=cloud.tobytes(),
-            is_dense=False,
+    def add_lens(self, optics: Optics, suffix: str = "", baseline: float | None = None) -> Lens:
+        """Add a camera whose topics are below the camera's name and a suffix. Raise PluginError if its size is impossible."""
+        if min(optics.width, optics.height) < 1 or not 0 < optics.horizontal_fov < math.pi:
+            raise PluginError(
+                f"a camera of {optics.width}x{optics.height} pixels and {optics.horizontal_fov} rad is not possible"
+            )
+        lens = Lens(self, optics, suffix, self.number("hackBaseline", 0.0) if baseline is None else baseline)
+        self.lenses.append(lens)
+        return lens
+
+    def is_needed(self) -> bool:
+        """Return whether any topic has a subscriber."""
+        return any(lens.has_subscribers() for lens in self.lenses)
+
+    def is_due(self) -> bool:
+        """Return whether ``updateRate`` allows a picture of this moment."""
+        now_ns = self.simulation.time_ns
+        if self._last_ns is not None and 0 <= now_ns - self._last_ns < self.period_ns:
+            return False
+        self._last_ns = now_ns
+        return True
+
+    def sense(self) -> None:
+        """Publish a picture of each camera."""
+        if self.is_due():
+            for lens in self.lenses:
+                lens.sense()
+
+    def reset(self) -> None:
+        """Start the periods again."""
+        super().reset()
+        self._last_ns = None
+
+    def close(self) -> None:
+        """Free OpenGL, and unregister the topics."""
+        for lens in self.lenses:
+            lens.photographer.close()
+        super().close()
+
+    def _offer_rate(self) -> None:
+        """Offer the rate by dynamic reconfigure; the sensor's rate stays until somebody changes it."""
+        from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
+
+        definition = Definition()
+        default, least, greatest = RATES
+        text = (
+            "Sets the frame rate of the imager. In externally triggered mode this must be more than trig_rate"
         )
+        definition.add("imager_rate", "double", 3, text, default, least, greatest)
+        started: list[bool] = []
+
+        def change(config: dict[str, float], _level: int) -> dict[str, float]:
+            if started:
+                rospy.loginfo(
+                    "Reconfigure request for the gazebo ros camera_: %s. New rate: %.2f",
+                    self.camera_name,
+                    config["imager_rate"],
+                )
+                self.call(lambda: self._set_rate(config["imager_rate"]))
+            started.append(True)
+            return config
+
+        server = Server(definition, change, self.resolve(self.camera_name))  # type: ignore[arg-type]
+        self._closing += [
+            server.set_service.shutdown,
+            server.descr_topic.unregister,
+            server.update_topic.unregister,
+        ]
+
+    def _set_rate(self, rate: float) -> None:
+        self.rate = rate
+        self._timer = None
 
 
-def _to_image(header: Header, encoding: str, values: NDArray[Any]) -> Image:
-    values = np.ascontiguousarray(values)
-    height, width = values.shape[:2]
-    return Image(
-        header=header,
-        height=height,
-        width=width,
-        encoding=encoding,
-        is_bigendian=0,
-        step=values.strides[0],
-        data=values.tobytes(),
-    )
+class Lens:
+    """One camera of a sensor: its topics, and the thread that draws its pictures."""
+
+    def __init__(self, plugin: CameraPlugin, optics: Optics, suffix: str, baseline: float) -> None:
+        self.plugin = plugin
+        self.optics = optics
+        self.folder = "/".join(filter(None, (plugin.camera_name, suffix)))
+        self.encoding, is_known = encoding_of(optics.format)
+        if not is_known:
+            rospy.logerr("Unsupported Gazebo ImageFormat\n")
+        self.info = to_camera_info(
+            optics, plugin.number, automatic=plugin.flag("autoDistortion", False), baseline=baseline
+        )
+        self.info.header.frame_id = plugin.frame_id
+        self._check_focal_length()
+        # The picture is drawn in another thread, which must not use the simulation's generator.
+        self._random = np.random.default_rng(int(plugin.simulation.random.integers(1 << 32)))
+        self.photographer = Photographer(plugin.simulation, optics.width, optics.height)
+        self.images = self.publish_to("imageTopicName", plugin.image_topic, Image, latch=True)
+        self.infos = self.publish_to("cameraInfoTopicName", plugin.info_topic, CameraInfo)
+        if self.folder:
+            plugin.serve(f"{self.folder}/set_camera_info", SetCameraInfo, self._set_info)
+
+    def publish_to(
+        self, tag: str, topic: str, kind: type[rospy.Message], *, latch: bool = False
+    ) -> rospy.Publisher[Any]:
+        """Return a publisher below the camera's name; a parameter may name the topic."""
+        name = self.plugin.text(tag, topic)
+        full = name if name.startswith("/") or not self.folder else f"{self.folder}/{name}"
+        return self.plugin.publish_to(full, kind, latch=latch)
+
+    def has_subscribers(self) -> bool:
+        """Return whether a topic has a subscriber."""
+        return bool(self.images.get_num_connections() or self.infos.get_num_connections())
+
+    def sense(self) -> None:
+        """Publish a picture, and its camera_info; camera_info alone needs no picture."""
+        now = self.plugin.now
+        if not self.images.get_num_connections() or self.photographer.is_broken:
+            self.publish_info(now, self.infos)
+            return
+        self.take(lambda renderer: self._publish(renderer, now))
+
+    def take(self, draw: Callable[[Renderer], None]) -> None:
+        """Copy the scene, and draw it later."""
+        optics = self.optics
+        pose = multiply(self.plugin.sensor_pose, optics.pose)
+        self.photographer.take(pose, optics.horizontal_fov, (optics.near, optics.far), draw)
+
+    def publish_info(self, stamp: Time, publisher: rospy.Publisher[Any]) -> None:
+        """Publish camera_info if there is a subscriber."""
+        if publisher.get_num_connections():
+            info = copy.copy(self.info)
+            info.header = copy.copy(info.header)
+            info.header.stamp = stamp
+            publisher.publish(info)
+
+    def to_image(self, renderer: Renderer, stamp: Time) -> Image:
+        """Draw, and return the picture in the sensor's format."""
+        picture = add_noise(renderer.color(), self.optics, self._random)
+        image = Image(height=self.optics.height, width=self.optics.width, encoding=self.encoding)
+        image.header.stamp, image.header.frame_id = stamp, self.plugin.frame_id
+        image.data, image.step = encode(picture, self.encoding)
+        return image
+
+    def _publish(self, renderer: Renderer, stamp: Time) -> None:
+        self.images.publish(self.to_image(renderer, stamp))
+        self.publish_info(stamp, self.infos)
+
+    def _set_info(self, request: SetCameraInfoRequest) -> SetCameraInfoResponse:
+        frame = self.info.header.frame_id
+        self.info = request.camera_info
+        self.info.header.frame_id = frame
+        return SetCameraInfoResponse(success=True)
+
+    def _check_focal_length(self) -> None:
+        focal, right = self.info.K[0], self.optics.focal_length
+        if not math.isclose(focal, right, rel_tol=1e-6):
+            rospy.logwarn(
+                "<focalLength> %f of sensor '%s' does not match width %d and horizontal_fov %f: %f is right",
+                focal,
+                self.plugin.sensor.name,
+                self.optics.width,
+                self.optics.horizontal_fov,
+                right,
+            )
 
 
-def _child(element: XmlElement | None, tag: str) -> XmlElement | None:
-    return element.first(tag) if element is not None else None
+class Camera(CameraPlugin):
+    """libgazebo_ros_camera.so."""
+
+    def load(self) -> None:
+        """Start the topics."""
+        super().load()
+        self.add_lens(read_optics(self.sensor.element.first("camera")))
 
 
-def _text(element: XmlElement | None, tag: str) -> str:
-    child = _child(element, tag)
-    return child.text.strip() if child is not None else ""
+class MultiCamera(CameraPlugin):
+    """libgazebo_ros_multicamera.so: cameras whose names contain ``left`` or ``right``; pictures have the same stamp."""
 
-
-def _number(element: XmlElement | None, tag: str, default: float) -> float:
-    text = _text(element, tag)
-    return float(text) if text else default
+    def load(self) -> None:
+        """Start the topics."""
+        super().load()
+        for element in self.sensor.element.all("camera"):
+            optics = read_optics(element)
+            if "left" in optics.name:
+                self.add_lens(optics, "left", 0.0)
+            elif "right" in optics.name:
+                self.add_lens(optics, "right")
+        if not self.lenses:
+            raise PluginError("no <camera> has a name with 'left' or 'right'")

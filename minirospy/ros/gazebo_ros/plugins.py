@@ -51,9 +51,6 @@ LIBRARIES = {
     "gazebo_ros_joint_state_publisher": f"{_PLUGINS}.joint_state_publisher:JointStatePublisher",
     "gazebo_ros_laser": f"{_PLUGINS}.laser:Laser",
     "gazebo_ros_gpu_laser": f"{_PLUGINS}.laser:Laser",
-    "gazebo_ros_camera": f"{_PLUGINS}.camera:Camera",
-    "gazebo_ros_depth_camera": f"{_PLUGINS}.camera:DepthCamera",
-    "gazebo_ros_openni_kinect": f"{_PLUGINS}.camera:DepthCamera",
     "gazebo_ros_imu": f"{_PLUGINS}.imu:Imu",
     "gazebo_ros_imu_sensor": f"{_PLUGINS}.imu:ImuSensor",
     "gazebo_ros_p3d": f"{_PLUGINS}.p3d:P3D",
@@ -63,6 +60,11 @@ LIBRARIES = {
     "gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
     "roboticsgroup_gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
     "roboticsgroup_upatras_gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
+    # Cameras.
+    "gazebo_ros_camera": f"{_PLUGINS}.camera:Camera",
+    "gazebo_ros_multicamera": f"{_PLUGINS}.camera:MultiCamera",
+    "gazebo_ros_depth_camera": f"{_PLUGINS}.depth_camera:DepthCamera",
+    "gazebo_ros_openni_kinect": f"{_PLUGINS}.depth_camera:OpenniKinect",
 }
 """Dict from library, without ``lib`` and ``.so``, to module and class."""
 

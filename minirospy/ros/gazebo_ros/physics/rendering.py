@@ -1,7 +1,7 @@
 """Colour and depth pictures of the world, rendered off screen.
 
-A :class:`Renderer` belongs to the thread that creates it. ``capture`` reads the simulation, so it needs the same lock as
-``step``; ``color`` and ``depth`` only draw, and may run at the same time as the simulation.
+A :class:`Renderer` belongs to the thread that creates it. Only ``capture`` reads the simulation: it runs in the simulation's
+thread, and uses no OpenGL. ``color`` and ``depth`` only draw, and may run at the same time as steps of the simulation.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ __all__ = ["MAX_PIXELS", "Renderer"]
 
 MAX_GEOMS = 20_000  # in one picture
 MAX_PIXELS = 4096  # on a side
+SPARE_GEOMS = 100  # for shapes that are not geoms, such as lights
 _VARIABLE = "MUJOCO_GL"
 
 
@@ -39,6 +40,8 @@ class Renderer:
         self.width, self.height = width, height
         self.backend, self._gl = open_context(width, height)
         self._generation = -1
+        self._model: Any = None  # the compiled model of the scene
+        self._loaded: Any = None  # the one whose meshes the context has
         self._scene: Any = None
         self._context: Any = None
         self._near, self._far = 0.1, 100.0
@@ -52,7 +55,9 @@ class Renderer:
         engine, mujoco = self._engine, self._mujoco
         engine.refresh()
         if self._generation != engine.generation:
-            self._prepare()
+            self._model = engine.model
+            self._scene = mujoco.MjvScene(engine.model, min(engine.model.ngeom + SPARE_GEOMS, MAX_GEOMS))
+            self._generation = engine.generation
         camera = mujoco.MjvCamera()
         mujoco.mjv_updateScene(
             engine.model, engine.data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
@@ -98,27 +103,27 @@ class Renderer:
             self._gl.free()
             self._gl = None
 
-    def _prepare(self) -> None:
-        """Load the meshes of the compiled model into the context."""
-        engine, mujoco = self._engine, self._mujoco
-        self._gl.make_current()
+    def _load(self) -> None:
+        """Load the meshes of the captured model into the context."""
+        model, mujoco = self._model, self._mujoco
         if self._context is not None:
             self._context.free()
-        engine.model.vis.global_.offwidth = self.width
-        engine.model.vis.global_.offheight = self.height
+        model.vis.global_.offwidth = self.width
+        model.vis.global_.offheight = self.height
         # With multisampling, depths belong to points beside the middle of the pixel.
-        engine.model.vis.quality.offsamples = 0
-        self._scene = mujoco.MjvScene(engine.model, MAX_GEOMS)
-        self._context = mujoco.MjrContext(engine.model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        model.vis.quality.offsamples = 0
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self._generation = engine.generation
+        self._loaded = model
 
     def _draw(self, *, has_background: bool = True) -> None:
         if self._scene is None:
             raise SimulationError("a picture is drawn after it is captured")
         self._scene.flags[self._mujoco.mjtRndFlag.mjRND_SKYBOX] = has_background
         self._gl.make_current()
+        if self._loaded is not self._model:
+            self._load()
         self._mujoco.mjr_render(self._area, self._scene, self._context)
 
 

@@ -322,11 +322,18 @@ class Simulation:
 
         The first call adds the visuals to the compiled world, which takes time and memory.
         """
-        from minirospy.ros.gazebo_ros.physics.rendering import Renderer
-
-        renderer = Renderer(self._engine, width, height)
+        renderer = self.open_renderer(width, height)
         self.add_visuals()
         return renderer
+
+    def open_renderer(self, width: int, height: int) -> Renderer:
+        """Return a renderer for the calling thread, which need not be the simulation's. :meth:`add_visuals` is the caller's work.
+
+        Raise SimulationError if OpenGL or a library is missing.
+        """
+        from minirospy.ros.gazebo_ros.physics.rendering import Renderer
+
+        return Renderer(self._engine, width, height)
 
     def add_visuals(self) -> None:
         """Add the visible shapes and the lights for cameras, now and for models that come later."""
