@@ -345,3 +345,18 @@ def test_gzclient_prints_the_address_of_the_world(master: str, start: Start) -> 
     line = process.stdout.readline()
     assert line.startswith("Open in a browser: http://127.0.0.1:")
     assert "/#/3d?file=1&frame=world" in line
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="BROWSER names a program of POSIX")
+def test_gazebo_opens_the_window_too(master: str, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("websockets")
+    monkeypatch.setenv("BROWSER", "true")
+    process = start("gazebo_ros", "gazebo", "-u")
+    assert process.stdout is not None
+    while not process.stdout.readline().startswith("The browser opens http://127.0.0.1:"):
+        assert process.poll() is None
+
+    async def body(node: Node) -> None:
+        assert (await call(node, "get_world_properties", GetWorldProperties)).success
+
+    run(body)
