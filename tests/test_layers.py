@@ -52,7 +52,13 @@ CONTROL_PACKAGES = [
     "ros_controllers", "transmission_interface", "velocity_controllers",
 ]  # fmt: skip
 """The packages of ros_control, which depend on each other."""
-SIMULATION_PACKAGES = ["diff_drive_robot", "gazebo_plugins", "gazebo_ros", "two_link_arm_gazebo"]
+SIMULATION_PACKAGES = [
+    "diff_drive_robot",
+    "gazebo_plugins",
+    "gazebo_ros",
+    "six_joint_arm",
+    "two_link_arm_gazebo",
+]
 """The packages of the simulation, which depend on each other."""
 LEAVES = {
     **{room: [room] for room in ("web", "fleet", "ros2")},

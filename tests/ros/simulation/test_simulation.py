@@ -170,7 +170,7 @@ def test_an_exploding_model_is_removed_and_named(reason: str, capfd: pytest.Capt
     simulation.add_model(single("bomb", Sphere(0.1)), at(x=5.0, z=1.0))
     simulation.step(100)
     if reason == "became NaN":
-        simulation._engine.data.qvel[6:12] = math.nan
+        simulation.engine.data.qvel[6:12] = math.nan
     else:
         simulation.model("bomb").canonical_link.push((1e12, 0.0, 0.0))
 

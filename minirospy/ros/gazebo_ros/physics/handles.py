@@ -62,7 +62,7 @@ class SimLink:
     """A rigid body."""
 
     def __init__(self, engine: Engine, model: SimModel, record: Link) -> None:
-        self._engine = engine
+        self.engine = engine
         self.model = model
         self.record = record
         self.name = record.name
@@ -78,8 +78,8 @@ class SimLink:
     @property
     def pose(self) -> Pose:
         """Return the pose in the world."""
-        self._engine.refresh()
-        data = self._engine.data
+        self.engine.refresh()
+        data = self.engine.data
         x, y, z = data.xpos[self.id].tolist()
         w, qx, qy, qz = data.xquat[self.id].tolist()
         return Pose((x, y, z), (qx, qy, qz, w))
@@ -88,7 +88,7 @@ class SimLink:
     def state(self) -> State:
         """Return the pose and the velocity of the link's origin."""
         pose = self.pose
-        engine = self._engine
+        engine = self.engine
         velocity = np.zeros(6)
         kind = engine.mujoco.mjtObj.mjOBJ_XBODY
         engine.mujoco.mj_objectVelocity(engine.model, engine.data, kind, self.id, velocity, 0)
@@ -104,21 +104,21 @@ class SimLink:
     @property
     def center_of_mass(self) -> Vector:
         """Return the centre of mass in the world."""
-        self._engine.refresh()
-        x, y, z = self._engine.data.xipos[self.id].tolist()
+        self.engine.refresh()
+        x, y, z = self.engine.data.xipos[self.id].tolist()
         return x, y, z
 
     @property
     def has_gravity(self) -> bool:
         """Return whether gravity acts on the link."""
-        return float(self._engine.model.body_gravcomp[self.id]) == 0.0
+        return float(self.engine.model.body_gravcomp[self.id]) == 0.0
 
     @has_gravity.setter
     def has_gravity(self, value: bool) -> None:
         self.model.built.bodies[self.name].gravcomp = 0.0 if value else 1.0
-        if self._engine.model.ngravcomp:
-            self._engine.model.body_gravcomp[self.id] = 0.0 if value else 1.0
-            self._engine.is_stale = True
+        if self.engine.model.ngravcomp:
+            self.engine.model.body_gravcomp[self.id] = 0.0 if value else 1.0
+            self.engine.is_stale = True
         else:
             self.model.recompile()
 
@@ -164,8 +164,8 @@ class SimLink:
 
     def apply_wrenches(self, now: float) -> bool:
         """Add the forces of this step to MuJoCo's, and drop those that have ended. Return whether some remain."""
-        step = self._engine.physics.step
-        row = self._engine.data.xfrc_applied[self.id]
+        step = self.engine.physics.step
+        row = self.engine.data.xfrc_applied[self.id]
         position, orientation = self.pose
         center = self.center_of_mass
         for each in self.wrenches:
@@ -178,8 +178,8 @@ class SimLink:
         if self.has_damping:
             # As in ODE, a share of the velocity is lost in each step.
             _, linear, angular = self.state
-            mass = float(self._engine.model.body_mass[self.id])
-            moments = self._engine.model.body_inertia[self.id].tolist()
+            mass = float(self.engine.model.body_mass[self.id])
+            moments = self.engine.model.body_inertia[self.id].tolist()
             loss = self.record.linear_damping * mass / step
             slow = self.record.angular_damping * min(moments) / step
             row[:3] -= [loss * value for value in linear]
@@ -194,7 +194,7 @@ class SimJoint:
     """
 
     def __init__(self, engine: Engine, model: SimModel, record: Joint, axis: Axis, scoped: str) -> None:
-        self._engine = engine
+        self.engine = engine
         self.model = model
         self.record = record
         self.axis = axis
@@ -218,28 +218,28 @@ class SimJoint:
     @property
     def position(self) -> float:
         """Return the position."""
-        return float(self._engine.data.qpos[self._address]) if self.dof >= 0 else 0.0
+        return float(self.engine.data.qpos[self._address]) if self.dof >= 0 else 0.0
 
     @property
     def velocity(self) -> float:
         """Return the velocity."""
-        return float(self._engine.data.qvel[self.dof]) if self.dof >= 0 else 0.0
+        return float(self.engine.data.qvel[self.dof]) if self.dof >= 0 else 0.0
 
     @property
     def effort(self) -> float:
         """Return the force of the last step: what was applied, and that of the motor or of the joint's friction."""
         if self.dof < 0:
             return 0.0
-        engine = self._engine
+        engine = self.engine
         return float(engine.data.qfrc_applied[self.dof] + engine.motor_force[self.dof])
 
     def set_state(self, position: float, velocity: float = 0.0) -> None:
         """Set position and velocity at once."""
         _check(position, velocity)
         if self.dof >= 0:
-            self._engine.data.qpos[self._address] = position
-            self._engine.data.qvel[self.dof] = velocity
-            self._engine.is_stale = True
+            self.engine.data.qpos[self._address] = position
+            self.engine.data.qvel[self.dof] = velocity
+            self.engine.is_stale = True
 
     def set_axis(self, axis: Axis) -> None:
         """Change limits, damping, friction and spring, but not the direction; the world is compiled again."""
@@ -250,8 +250,8 @@ class SimJoint:
     def set_velocity_now(self, velocity: float) -> None:
         """Set the velocity at once."""
         if self.dof >= 0:
-            self._engine.data.qvel[self.dof] = velocity
-            self._engine.is_stale = True
+            self.engine.data.qvel[self.dof] = velocity
+            self.engine.is_stale = True
 
     def set_force(self, force: float) -> None:
         """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
@@ -298,18 +298,18 @@ class SimJoint:
         force = min(max(max_force, 0.0), MAX_FORCE)
         same = force == self._max_force > 0 and self.dof >= 0
         self._max_force = force
-        if same and self._target is None and not self._engine.follows_position[self.dof]:
-            self._engine.set_target(self.dof, self._velocity)
-        elif same and self._target is not None and self._engine.follows_position[self.dof]:
-            self._engine.target_position[self.dof] = self._target
-            self._engine.max_velocity[self.dof] = self._max_velocity
+        if same and self._target is None and not self.engine.follows_position[self.dof]:
+            self.engine.set_target(self.dof, self._velocity)
+        elif same and self._target is not None and self.engine.follows_position[self.dof]:
+            self.engine.target_position[self.dof] = self._target
+            self.engine.max_velocity[self.dof] = self._max_velocity
         else:
             self._write_motor()
 
     def _write_motor(self) -> None:
         if self.dof < 0:
             return
-        engine, dof = self._engine, self.dof
+        engine, dof = self.engine, self.dof
         friction = max(self.axis.friction, 0.0)
         engine.model.dof_frictionloss[dof] = self._max_force or friction
         # Without a motor the row is the joint's friction, whose target is to stand still.
@@ -325,9 +325,9 @@ class SimJoint:
         """Find MuJoCo's ids after a compilation, and write the motor again."""
         if not self.scoped or self.record.kind == "ball":
             return
-        row = self._engine.model.joint(self.scoped)
+        row = self.engine.model.joint(self.scoped)
         self.dof, self._address = int(row.dofadr[0]), int(row.qposadr[0])
-        if self._max_force or self._engine.model.dof_frictionloss[self.dof] != max(self.axis.friction, 0.0):
+        if self._max_force or self.engine.model.dof_frictionloss[self.dof] != max(self.axis.friction, 0.0):
             self._write_motor()
 
     def apply_forces(self, now: float) -> bool:
@@ -336,7 +336,7 @@ class SimJoint:
             return False
         force = self._force
         if self._timed:
-            step = self._engine.physics.step
+            step = self.engine.physics.step
             force += sum(each.force for each in self._timed if each.start <= now + 0.5 * step)
             self._timed = [each for each in self._timed if each.end > now + 1.5 * step]
         limit, fastest = self.axis.effort, self.axis.velocity
@@ -346,7 +346,7 @@ class SimJoint:
             velocity = self.velocity
             if (velocity > fastest and force > 0) or (velocity < -fastest and force < 0):
                 force = 0.0
-        self._engine.data.qfrc_applied[self.dof] = force
+        self.engine.data.qfrc_applied[self.dof] = force
         return bool(self._force or self._timed)
 
     def reset(self) -> None:
@@ -360,7 +360,7 @@ class SimJoint:
 
         It belongs to the last step, and needs ``Simulation.records_details``.
         """
-        engine = self._engine
+        engine = self.engine
         link = self.model.links[self.record.child]
         torque_x, torque_y, torque_z, *rest = engine.joint_wrenches[link.id].tolist()
         force: Vector = (rest[0], rest[1], rest[2])
@@ -382,7 +382,7 @@ class SimModel:
     def __init__(
         self, engine: Engine, name: str, record: Model, start: Pose, built: BuiltModel, owner: Owner
     ) -> None:
-        self._engine = engine
+        self.engine = engine
         self._owner = owner
         self.name = name
         self.record = record
@@ -437,31 +437,31 @@ class SimModel:
         origin = self.pose.position
         for name in self.built.free:
             self._set_free_velocity(self.links[name], linear, angular, origin)
-        self._engine.is_stale = True
+        self.engine.is_stale = True
 
     def move(self, change: Pose, linear: Vector, angular: Vector, origin: Vector) -> None:
         """Apply a change of pose in the world, and set the velocity of a rigid motion with ``linear`` at ``origin``."""
-        self._engine.refresh()
+        self.engine.refresh()
         for joint in self.all_joints():
             joint.set_velocity_now(0.0)
         for name in self.built.roots:
             base = self.links[name].pose if name in self.built.free else self._rest_pose(name)
             self._place(name, compose(change, base))
-        self._engine.is_stale = True
+        self.engine.is_stale = True
         for name in self.built.free:
             self._set_free_velocity(self.links[name], linear, angular, origin)
-        self._engine.is_stale = True
+        self.engine.is_stale = True
 
     def _rest_pose(self, root: str) -> Pose:
         """Return the pose in the world of a root body that is not free, with its joint at position 0."""
-        model, body = self._engine.model, self.links[root].id
+        model, body = self.engine.model, self.links[root].id
         x, y, z = model.body_pos[body].tolist()
         w, qx, qy, qz = model.body_quat[body].tolist()
         return Pose((x, y, z), (qx, qy, qz, w))
 
     def _place(self, root: str, pose: Pose) -> None:
         """Set a root body's pose, with its joint at position 0 if it has one."""
-        engine = self._engine
+        engine = self.engine
         body = self.links[root].id
         x, y, z, w = normalized(pose.orientation)
         if root in self.built.free:
@@ -475,7 +475,7 @@ class SimModel:
 
     def _set_free_velocity(self, link: SimLink, linear: Vector, angular: Vector, origin: Vector) -> None:
         """Set a free body's velocity; MuJoCo's angular part is in the body's axes."""
-        engine = self._engine
+        engine = self.engine
         pose = link.pose
         dof = int(engine.model.body_dofadr[link.id])
         moved = _sum(linear, _cross(angular, _difference(pose.position, origin)))
@@ -492,7 +492,7 @@ class SimModel:
     def bind(self) -> None:
         """Find MuJoCo's ids after a compilation."""
         for link in self.links.values():
-            link.id = int(self._engine.model.body(link.scoped_name).id)
+            link.id = int(self.engine.model.body(link.scoped_name).id)
         for joint in self.all_joints():
             joint.bind()
 
@@ -504,7 +504,7 @@ class SimModel:
             joint.reset()
         for name in self.built.roots:
             self._place(name, compose(self.start, self.links[name].record.pose))
-        self._engine.is_stale = True
+        self.engine.is_stale = True
         self.set_velocity(ZERO, ZERO)
 
     def apply_forces(self, now: float) -> bool:

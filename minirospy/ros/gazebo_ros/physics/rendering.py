@@ -35,7 +35,7 @@ class Renderer:
         """Open an OpenGL context. Raise SimulationError that names the library to install if there is none."""
         if not (0 < width <= MAX_PIXELS and 0 < height <= MAX_PIXELS):
             raise SimulationError(f"a picture of {width}x{height} is not possible: at most {MAX_PIXELS}")
-        self._engine = engine
+        self.engine = engine
         self._mujoco = engine.mujoco
         self.width, self.height = width, height
         self.backend, self._gl = open_context(width, height)
@@ -52,7 +52,7 @@ class Renderer:
 
     def capture(self, pose: Pose, horizontal_fov: float, near: float = 0.1, far: float = 100.0) -> None:
         """Copy the world as seen from a pose: x looks forward, z up; the angle is in radians, distances in metres."""
-        engine, mujoco = self._engine, self._mujoco
+        engine, mujoco = self.engine, self._mujoco
         engine.refresh()
         if self._generation != engine.generation:
             self._model = engine.model

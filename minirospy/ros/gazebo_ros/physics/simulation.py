@@ -46,7 +46,7 @@ class Simulation:
         self._time_ns = 0
         self._models: dict[str, SimModel] = {}
         self._builder = Builder(world.physics)
-        self._engine = Engine(self._builder, world.physics)
+        self.engine = Engine(self._builder, world.physics)
         self._geom_names: list[str] = []
         self._model_of_dof: list[str] = []
         self._model_of_position: list[str] = []
@@ -70,22 +70,22 @@ class Simulation:
     @property
     def physics(self) -> Physics:
         """Return the step, the gravity and the other parameters."""
-        return self._engine.physics
+        return self.engine.physics
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity. Raise SimulationError if a value is not finite or the step is not positive."""
         if not (0 < physics.step <= 1 and all(map(math.isfinite, physics.gravity))):
             raise SimulationError("the step must be positive and at most 1 s, and gravity finite")
-        self._engine.set_physics(physics)
+        self.engine.set_physics(physics)
 
     @property
     def records_details(self) -> bool:
         """Return whether contacts and joints' wrenches of each step are recorded, which takes time."""
-        return self._engine.records_details
+        return self.engine.records_details
 
     @records_details.setter
     def records_details(self, value: bool) -> None:
-        self._engine.records_details = value
+        self.engine.records_details = value
 
     def step(self, count: int = 1) -> list[LostModel]:
         """Advance by steps. Return the models that were removed because they became NaN or left the world."""
@@ -93,7 +93,7 @@ class Simulation:
         for _ in range(count):
             if self.forced or self._had_forces:
                 self._apply_forces()
-            engine = self._engine
+            engine = self.engine
             engine.refresh()
             positions, velocities = engine.data.qpos.copy(), engine.data.qvel.copy()
             engine.step()
@@ -102,11 +102,11 @@ class Simulation:
             if not (abs(data.qvel) < MAX_SPEED).all() or not (abs(data.qpos) < self._farthest).all():
                 lost += self._remove_lost(positions, velocities)
             self._time_ns += round(self.physics.step * NANOSECONDS)
-            self._engine.data.time = self.time
+            self.engine.data.time = self.time
         return lost
 
     def _apply_forces(self) -> None:
-        data = self._engine.data
+        data = self.engine.data
         data.xfrc_applied[:] = 0
         data.qfrc_applied[:] = 0
         now = self.time
@@ -119,7 +119,7 @@ class Simulation:
         self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
     ) -> list[LostModel]:
         """Remove the models with invalid states; the others return to the state before the step."""
-        data = self._engine.data
+        data = self.engine.data
         lost: dict[str, str] = {}
         fastest = np.full(len(data.qvel), MAX_SPEED)
         _find_lost(lost, data.qvel, fastest, "is faster than 100 km/s", self._model_of_dof)
@@ -139,7 +139,7 @@ class Simulation:
 
         data.qpos[:], data.qvel[:] = positions, velocities
         data.qacc_warmstart[:] = 0
-        self._engine.is_stale = True
+        self.engine.is_stale = True
         result = [LostModel(name, f"{reason}: removed") for name, reason in lost.items()]
         self._remove([each.name for each in result])
         return result
@@ -165,7 +165,7 @@ class Simulation:
         """
         added = self._build(model, pose or model.pose, name or model.name)
         try:
-            self._engine.recompile()
+            self.engine.recompile()
         except ValueError as error:
             self._drop(added)
             raise SimulationError(f"model '{added.name}': {_one_line(error)}") from error
@@ -179,7 +179,7 @@ class Simulation:
 
     def recompile(self) -> None:
         """Compile the world again after a change of the spec."""
-        self._engine.recompile()
+        self.engine.recompile()
         self._bind()
 
     def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
@@ -196,7 +196,7 @@ class Simulation:
             except SimulationError as error:
                 self.warnings.append(str(error))
         try:
-            self._engine.recompile()
+            self.engine.recompile()
         except ValueError:
             for each in added:
                 self._drop(each)
@@ -218,7 +218,7 @@ class Simulation:
         built = self._builder.add(model, name, pose)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
-        added = SimModel(self._engine, name, model, pose, built, self)
+        added = SimModel(self.engine, name, model, pose, built, self)
         self._models[name] = added
         return added
 
@@ -240,13 +240,13 @@ class Simulation:
     def _remove(self, names: list[str]) -> None:
         for name in names:
             self._drop(self._models[name])
-        self._engine.recompile()
+        self.engine.recompile()
         self._bind()
 
     def _bind(self) -> None:
         for model in self._models.values():
             model.bind()
-        model = self._engine.model
+        model = self.engine.model
         self._geom_names = [model.geom(index).name.partition(PART)[0] for index in range(model.ngeom)]
         bodies = [model.body(index).name for index in range(model.nbody)]
         owners = {link.id: name for name, each in self._models.items() for link in each.links.values()}
@@ -268,12 +268,12 @@ class Simulation:
         """Return all models to their poses and joint positions of the start, at rest; the time goes on."""
         for model in self._models.values():
             model.reset()
-        self._engine.data.qacc_warmstart[:] = 0
+        self.engine.data.qacc_warmstart[:] = 0
 
     def reset(self) -> None:
         """Reset the models and the time."""
         self._time_ns = 0
-        self._engine.data.time = 0.0
+        self.engine.data.time = 0.0
         self.reset_models()
 
     # ---- sensing
@@ -292,7 +292,7 @@ class Simulation:
         A ray begins at ``min_range``: what is nearer, such as the sensor's own housing, does not stop it. ``exclude`` is a
         link (``model::link``) whose collisions are ignored.
         """
-        engine = self._engine
+        engine = self.engine
         engine.refresh()
         count = len(directions)
         ids = np.full(count, -1, np.int32)
@@ -333,7 +333,7 @@ class Simulation:
         """
         from minirospy.ros.gazebo_ros.physics.rendering import Renderer
 
-        return Renderer(self._engine, width, height)
+        return Renderer(self.engine, width, height)
 
     def add_visuals(self) -> None:
         """Add the visible shapes and the lights for cameras, now and for models that come later."""
@@ -346,7 +346,7 @@ class Simulation:
 
     def contacts(self) -> list[Contact]:
         """Return the contacts of the last step; ``records_details`` must have been set before it."""
-        engine = self._engine
+        engine = self.engine
         pairs: dict[tuple[str, str], list[int]] = {}
         for index, (first, second) in enumerate(engine.contacts.tolist()):
             if first >= 0 and second >= 0:
@@ -354,7 +354,7 @@ class Simulation:
         return [self._contact(first, second, rows) for (first, second), rows in pairs.items()]
 
     def _contact(self, first: str, second: str, rows: list[int]) -> Contact:
-        engine = self._engine
+        engine = self.engine
         # MuJoCo's normals point from the first geom to the second one, and its forces act on the second one.
         frames = engine.contact_frames[rows].reshape(-1, 3, 3)
         local = engine.contact_wrenches[rows].reshape(-1, 2, 3)
