@@ -7,7 +7,8 @@ import math
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, body_velocity, to_odometry
+from minirospy.core.sdf.model import Pose
+from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, to_odometry
 from minirospy.ros.gazebo_ros.messages import yaw_of
 from minirospy.ros.gazebo_ros.plugins import ModelPlugin, Timer
 
@@ -38,6 +39,7 @@ class PlanarMove(ModelPlugin):
         self._command = (0.0, 0.0, 0.0)
         self._commanded_ns = self.simulation.time_ns
         self._timer = Timer(self._rate)
+        self._last: tuple[int, Pose, float] | None = None  # time in ns, pose and yaw of the last message
 
     def _on_command(self, message: Twist) -> None:
         self._command = (message.linear.x, message.linear.y, message.angular.z)
@@ -56,7 +58,18 @@ class PlanarMove(ModelPlugin):
         if self._rate > 0 and self._timer.is_due(now_ns):
             pose = state.pose
             self._transforms.send(self.now, *self._frames, pose)
-            velocity = body_velocity(state)
+            velocity = self._mean_velocity(now_ns, pose, yaw)
             px, py, _ = pose.position
             flat = pose._replace(position=(px, py, 0.0))
             self._odometry.publish(to_odometry(self.now, self._frames, flat, velocity, _VARIANCES))
+
+    def _mean_velocity(self, now_ns: int, pose: Pose, yaw: float) -> tuple[float, float, float]:
+        """Return the velocity forwards, to the left and the turn rate since the last message, as in Gazebo."""
+        last, self._last = self._last, (now_ns, pose, yaw)
+        if last is None or now_ns <= last[0]:
+            return 0.0, 0.0, 0.0
+        seconds = (now_ns - last[0]) / 1e9
+        vx, vy = ((pose.position[axis] - last[1].position[axis]) / seconds for axis in (0, 1))
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        turn = math.remainder(yaw - last[2], math.tau) / seconds
+        return cos * vx + sin * vy, cos * vy - sin * vx, turn
