@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from gazebo_msgs.srv import (
+    SetJointTrajectory,
+    SetJointTrajectoryRequest,
+    SetJointTrajectoryResponse,
+)
 from trajectory_msgs.msg import JointTrajectory
 
 from minirospy import client as rospy
 from minirospy.core.sdf.model import Pose
+from minirospy.ros.gazebo_ros.messages import pose_of
 from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, State
 from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginError
 
@@ -16,7 +22,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 class JointPoseTrajectory(ModelPlugin):
-    """The plugin. Parameter: topicName.
+    """The plugin. Parameters: topicName, serviceName.
 
     The next point follows after a point's ``time_from_start``, as in the reference. While a trajectory runs, the link that
     ``header.frame_id`` names, or the model, keeps its pose. The reference stops the physics of the whole world meanwhile; here
@@ -26,7 +32,9 @@ class JointPoseTrajectory(ModelPlugin):
     def load(self) -> None:
         """Subscribe."""
         self.reset()
-        self.subscribe_to(self.text("topicName", "set_joint_trajectory"), JointTrajectory, self._on_message)
+        name = "set_joint_trajectory"
+        self.subscribe_to(self.text("topicName", name), JointTrajectory, self._on_message)
+        self.serve(self.text("serviceName", name), SetJointTrajectory, self._on_request)
 
     def reset(self) -> None:
         """End the trajectory."""
@@ -67,7 +75,22 @@ class JointPoseTrajectory(ModelPlugin):
     def _on_message(self, message: JointTrajectory) -> None:
         self.call(lambda: self._begin(message))
 
-    def _begin(self, message: JointTrajectory) -> None:
+    def _on_request(self, request: SetJointTrajectoryRequest) -> SetJointTrajectoryResponse:
+        name = request.model_name
+        if name not in ("", self.model.name):
+            text = f"SetJointTrajectory: this is model '{self.model.name}', not '{name}'"
+            return SetJointTrajectoryResponse(success=False, status_message=text)
+
+        def begin() -> bool:
+            if request.set_model_pose:
+                self.model.set_state(State(pose_of(request.model_pose), _ZERO, _ZERO))
+            return self._begin(request.joint_trajectory)
+
+        is_begun = self.call(begin)
+        text = "" if is_begun else "SetJointTrajectory: the reference link does not exist"
+        return SetJointTrajectoryResponse(success=is_begun, status_message=text)
+
+    def _begin(self, message: JointTrajectory) -> bool:
         self.reset()
         frame = message.header.frame_id.lstrip("/")
         if frame not in _WORLD:
@@ -77,7 +100,7 @@ class JointPoseTrajectory(ModelPlugin):
                 rospy.logerr(
                     "ros_joint_trajectory plugin needs a reference link [%s] as frame_id, aborting.\n", frame
                 )
-                return
+                return False
         self._joints = [self.model.joints.get(name) for name in message.joint_names]
         missing = [name for name in message.joint_names if name not in self.model.joints]
         if missing:
@@ -85,6 +108,7 @@ class JointPoseTrajectory(ModelPlugin):
         self._held = self._link.pose if self._link is not None else self.model.pose
         self._start_ns = max(message.header.stamp.to_nsec(), self.simulation.time_ns)
         self._message = message
+        return True
 
     def _hold(self) -> None:
         if self._held is None:

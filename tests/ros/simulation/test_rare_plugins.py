@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from gazebo_msgs.srv import ApplyBodyWrench, GetLinkState, SpawnModel
+from gazebo_msgs.srv import ApplyBodyWrench, GetLinkState, SetJointTrajectory, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench, WrenchStamped
 from sensor_msgs.msg import JointState, PointCloud
 from std_msgs.msg import Bool, Header
@@ -78,14 +78,20 @@ def test_a_trajectory_sets_the_joints(master: str, start: Start) -> None:
         ]
         publisher = await node.advertise("/set_joint_trajectory", JointTrajectory, latch=True)
         await publisher.publish(trajectory)
-        for position in (0.25, 0.75):
-            # Gravity does not move a held joint.
-            await until(
-                node,
-                "/arm/joint_states",
-                JointState,
-                lambda each, wanted=position: abs(each.position[0] - wanted) < 1e-3,
-            )
+        # Gravity does not move a held joint.
+        await until(node, "/arm/joint_states", JointState, lambda each: abs(each.position[0] - 0.25) < 1e-3)
+        await until(node, "/arm/joint_states", JointState, lambda each: abs(each.position[0] - 0.75) < 1e-3)
+        trajectory.points = [JointTrajectoryPoint(positions=[0.5], time_from_start=Duration(1000))]
+        arguments = ["arm", trajectory, Pose(orientation=UP), False, True]
+        response = await node.call("/set_joint_trajectory", SetJointTrajectory, *arguments)
+        assert response.success
+        await until(node, "/arm/joint_states", JointState, lambda each: abs(each.position[0] - 0.5) < 1e-3)
+        trajectory.header.frame_id = "nowhere"
+        response = await node.call("/set_joint_trajectory", SetJointTrajectory, *arguments)
+        assert (response.success, response.status_message) == (
+            False,
+            "SetJointTrajectory: the reference link does not exist",
+        )
 
     run(body)
 
