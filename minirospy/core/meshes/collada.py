@@ -1,6 +1,7 @@
-"""Parse Collada files (DAE): geometry, materials' colours, the scene's transforms, units and up axis.
+"""Parse Collada files (DAE): geometry, materials' colours, the scene's transforms and units.
 
-Source: https://www.khronos.org/files/collada_spec_1_4.pdf. Animations, skins, cameras and lights are ignored.
+Animations, skins, cameras and lights are ignored. So is ``up_axis``, as in Gazebo and RViz: robots' files are drawn with z up
+whatever it says. Source: https://www.khronos.org/files/collada_spec_1_4.pdf.
 """
 
 from __future__ import annotations
@@ -20,17 +21,11 @@ __all__ = ["parse_dae"]
 MAX_NODES = 20_000  # instances of nodes; nodes that refer to each other can multiply
 MAX_DEPTH = 100  # of nodes within nodes
 PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
-_UP = {
-    "X_UP": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
-    "Y_UP": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
-    "Z_UP": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-}
-
 Matrix = NDArray[np.float64]
 
 
 def parse_dae(data: bytes) -> list[Mesh]:
-    """Return the meshes of the scene in metres with z up; a mesh has the name of its node.
+    """Return the meshes of the scene in metres; a mesh has the name of its node.
 
     Raise MeshError if the data is not Collada, refers to parts that do not exist, or is too large.
     """
@@ -67,10 +62,7 @@ class _Reader:
         asset = _child(self._root, "asset")
         unit = _child(asset, "unit") if asset else None
         scale = float(unit.attributes.get("meter", "1")) if unit else 1.0
-        up = _child(asset, "up_axis") if asset else None
-        turn = np.array(_UP.get(up.text.strip() if up else "Y_UP", _UP["Y_UP"]), np.float64)
-        whole = np.eye(4)
-        whole[:3, :3] = turn * scale
+        whole = np.diag([scale, scale, scale, 1.0])
 
         result: list[Mesh] = []
         scene = _child(self._root, "scene")
@@ -177,6 +169,8 @@ class _Reader:
             corners = [_corners(each, width, offset) for each in lists]
             triangles = _triangulate(_tag(element), corners, element)
             if len(triangles):
+                if triangles.min() < 0 or triangles.max() >= len(vertices):
+                    raise MeshError("a triangle uses a vertex that does not exist")
                 yield element.attributes.get("material", ""), vertices, triangles
 
     def _positions(self, url: str) -> Matrix:

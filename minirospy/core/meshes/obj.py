@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> lis
                     raise ValueError
                 triangles, materials = objects.setdefault(name, ([], []))
                 index = used.setdefault(material, len(used))
-                for second, third in itertools.pairwise(corners):
+                for second, third in pairwise(corners[1:]):
                     triangles.append((corners[0], second, third))
                     materials.append(index)
                 count += len(corners) - 2

@@ -17,7 +17,8 @@ from minirospy.core.meshes.mesh import Mesh
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex"]
 
 MAX_HULLS = 32  # of a moving mesh; one with more parts collides as the hull of all
-MAX_PRISMS = 5000  # of a static mesh; a finer one is simplified first
+MAX_PRISMS = 1500  # of a static mesh; a finer one is simplified until it has fewer flat patches
+MAX_CONVEX = 5000  # triangles; the test of a larger part would take seconds
 THICKNESS = 0.02  # m, of a prism, below the surface
 FLAT = 1e-6  # of the mesh's size: what is thinner has no hull
 TOLERANCE = 1e-4  # of the part's size, for vertices in front of a face of a convex part
@@ -68,7 +69,7 @@ def connected_parts(mesh: Mesh) -> list[Mesh]:
 def is_convex(part: Mesh) -> bool:
     """Return whether a connected mesh is closed, oriented outwards, and has no vertex in front of a face."""
     triangles, vertices = part.triangles, part.vertices
-    if len(triangles) < 4 or len(triangles) > 20_000:
+    if len(triangles) < 4 or len(triangles) > MAX_CONVEX:
         return False
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
         np.int64
@@ -98,10 +99,9 @@ def _welded(mesh: Mesh) -> Mesh:
     _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     triangles = index.reshape(-1, 3).astype(np.int32)
     vertices = points[first]
-    corners = vertices[triangles]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    keep = areas > 1e-12 * size * size
-    return Mesh(vertices, triangles[keep] if keep.any() else triangles)
+    result = Mesh(vertices, triangles)
+    keep = _has_area(result)
+    return Mesh(vertices, triangles[keep]) if keep.any() else result
 
 
 def _labels(count: int, triangles: Triangles) -> NDArray[np.int64]:
@@ -140,30 +140,25 @@ def _thickened(part: Mesh) -> Mesh:
     """Give a flat part a thickness, because it has no hull otherwise."""
     centered = part.vertices - part.vertices.mean(axis=0)
     size = max(float(np.ptp(centered, axis=0).max()), 1e-9)
-    _, widths, axes = np.linalg.svd(centered, full_matrices=True)
-    scale = np.sqrt(len(centered))
+    _, axes = np.linalg.eigh(centered.T @ centered)
     vertices = part.vertices
-    for index in range(3):
-        width = widths[index] / scale if index < len(widths) else 0.0
-        if width < 1e-4 * size:
-            half = axes[index] * max(size * 1e-3, 5e-4)
+    for axis in axes.T:
+        if float(np.ptp(centered @ axis)) < 1e-4 * size:
+            half = axis * max(size * 1e-3, 5e-4)
             vertices = np.concatenate([vertices - half, vertices + half])
-    if len(vertices) == len(part.vertices):
-        return part
-    return Mesh(vertices, part.triangles)
+    return part if len(vertices) == len(part.vertices) else Mesh(vertices, part.triangles)
 
 
 def _prisms(mesh: Mesh) -> list[Mesh]:
     """Return a prism below each flat convex patch of the surface."""
-    mesh = _simplified(mesh)
-    normals = _normals(mesh)
-    patches: list[tuple[Points, Points]] = []
-    for rows in _coplanar(mesh, normals):
-        outline = _convex_outline(mesh, rows, normals[rows[0]])
-        if outline is not None:
-            patches.append((outline, normals[rows[0]]))
-        else:
-            patches.extend((mesh.vertices[mesh.triangles[row]], normals[row]) for row in rows)
+    patches = _patches(mesh)
+    cell = float(np.ptp(mesh.vertices, axis=0).max()) / 1000
+    simple = mesh
+    while patches is None:
+        simple = _simplified(mesh, cell)
+        patches = _patches(simple)
+        cell *= 1.6
+    mesh = simple
     depths = _depths(mesh, patches)
     return [
         Mesh(np.concatenate([outline, outline - depth * normal]), np.zeros((0, 3), np.int32))
@@ -171,22 +166,39 @@ def _prisms(mesh: Mesh) -> list[Mesh]:
     ]
 
 
-def _simplified(mesh: Mesh) -> Mesh:
-    """Merge vertices that are near each other until there are at most MAX_PRISMS triangles."""
-    size = float(np.ptp(mesh.vertices, axis=0).max())
-    cell = size / 2000
-    result = mesh
-    while len(result.triangles) > 2 * MAX_PRISMS:
-        grid = np.round(mesh.vertices / cell).astype(np.int64)
-        _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-        triangles = index.ravel()[mesh.triangles]
-        a, b, c = triangles.T
-        triangles = triangles[(a != b) & (b != c) & (c != a)]
-        if not len(triangles):
-            break
-        _, rows = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
-        result = _compact(mesh.vertices[first], triangles[np.sort(rows)].astype(np.int32))
-        cell *= 1.5
+def _patches(mesh: Mesh) -> list[tuple[Points, Points]] | None:
+    """Return the outlines of flat convex patches, and their normals, or None if there are too many."""
+    normals = _normals(mesh)
+    patches: list[tuple[Points, Points]] = []
+    groups = _coplanar(mesh, normals)
+    if len(groups) > MAX_PRISMS:
+        return None
+    for rows in groups:
+        outline = _convex_outline(mesh, rows, normals[rows[0]])
+        if outline is not None:
+            patches.append((outline, normals[rows[0]]))
+        else:
+            patches.extend((mesh.vertices[mesh.triangles[row]], normals[row]) for row in rows)
+    return patches if len(patches) <= 2 * MAX_PRISMS else None
+
+
+def _simplified(mesh: Mesh, cell: float) -> Mesh:
+    """Merge the vertices in each cube of a grid."""
+    grid = np.round(mesh.vertices / cell).astype(np.int64)
+    _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    triangles = index.ravel()[mesh.triangles]
+    _, rows = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    result = Mesh(mesh.vertices[first], triangles[np.sort(rows)].astype(np.int32))
+    return _compact(result.vertices, result.triangles[_has_area(result)])
+
+
+def _has_area(mesh: Mesh) -> NDArray[np.bool_]:
+    """Return for each triangle whether it has an area."""
+    corners = mesh.vertices[mesh.triangles]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = np.linalg.norm(np.cross(first, second), axis=1)
+    longest = np.maximum((first * first).sum(axis=1), (second * second).sum(axis=1))
+    result: NDArray[np.bool_] = areas > 1e-9 * longest
     return result
 
 

@@ -12,8 +12,9 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["polyline_mesh", "terrain"]
 
-MAX_POINTS = 2000
-MAX_TERRAIN = 2049  # pixels on a side
+MAX_POINTS = 2000  # of a polyline; triangulating takes the square of it
+MIN_EAR = 1e-12  # m^2
+MAX_TERRAIN = 2049  # pixels on a side; four million triangles
 
 
 def polyline_mesh(points: Sequence[tuple[float, float]], height: float) -> Mesh:
@@ -43,28 +44,31 @@ def _ears(points: NDArray[np.float64]) -> list[tuple[int, int, int]]:
     left = list(range(len(points)))
     result: list[tuple[int, int, int]] = []
     while len(left) > 3:
-        for at in range(len(left)):
-            a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
-            if _is_ear(points, a, b, c, left):
-                result.append((a, b, c))
-                del left[at]
-                break
-        else:
+        # Three points in a line are an ear without area, which is cut off only if there is no other one.
+        ears = (at for limit in (MIN_EAR, 0.0) for at in range(len(left)) if _is_ear(points, left, at, limit))
+        at = next(ears, None)
+        if at is None:
             raise MeshError("a polyline crosses itself")
+        result.append((left[at - 1], left[at], left[(at + 1) % len(left)]))
+        del left[at]
     return [*result, (left[0], left[1], left[2])]
 
 
-def _is_ear(points: NDArray[np.float64], a: int, b: int, c: int, left: list[int]) -> bool:
+def _is_ear(points: NDArray[np.float64], left: list[int], at: int, limit: float) -> bool:
+    """Return whether a corner's triangle has more than an area, and no other corner inside."""
+    a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
+
     def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
         value: NDArray[np.float64] = (q[0] - p[0]) * (r[..., 1] - p[1]) - (q[1] - p[1]) * (r[..., 0] - p[0])
         return value
 
     pa, pb, pc = points[a], points[b], points[c]
-    if side(pa, pb, pc) < 0:
+    if side(pa, pb, pc) < limit:
         return False
     others = points[[each for each in left if each not in (a, b, c)]]
-    inside = (side(pa, pb, others) > 0) & (side(pb, pc, others) > 0) & (side(pc, pa, others) > 0)
-    return not inside.any()
+    sides = np.minimum(np.minimum(side(pa, pb, others), side(pb, pc, others)), side(pc, pa, others))
+    # A corner on an edge would leave a triangle without area, so it counts as inside at first.
+    return bool(((sides <= 0) if not limit else (sides < 0)).all())
 
 
 def terrain(path: str) -> NDArray[np.float64]:

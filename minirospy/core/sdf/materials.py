@@ -16,7 +16,7 @@ _MAX_SCRIPT_BYTES = 1024 * 1024
 _MAX_SCRIPTS = 100  # files in a model's folder of scripts
 _PICTURES = (".jpg", ".jpeg", ".png")
 
-_BLOCK = re.compile(r"^[ \t]*material\s+([^\s{:]+)\s*(?::[^\n{]*)?\{", re.MULTILINE)
+_BLOCK = re.compile(r"^[ \t]*material\s+([^\s{:]+)\s*(?::[^\n{]*)?\s*\{", re.MULTILINE)
 _COLOR = re.compile(r"^\s*(ambient|diffuse|emissive)\s+([\d.eE+\- \t]+)", re.MULTILINE)
 _TEXTURE = re.compile(r"^\s*texture\s+(\S+)", re.MULTILINE)
 

@@ -13,7 +13,7 @@ from minirospy.core.sdf.includes import open_include, sdf_version
 from minirospy.core.sdf.model import Model, World
 from minirospy.core.sdf.read_model import read_included_model, read_model
 from minirospy.core.sdf.read_world import read_world
-from minirospy.core.sdf.source import Resolve, Shared, Source, no_files
+from minirospy.core.sdf.source import MAX_PARTS, Resolve, Shared, Source, no_files
 from minirospy.core.sdf.text import Element, parse_document
 from minirospy.core.sdf.urdf import read_urdf
 
@@ -51,24 +51,29 @@ def parse_model(
     raise SdfError(file, root.line, "there is no <model>")
 
 
-def parse_world(text: str | bytes, resolve: Resolve = no_files, *, file: str = "world") -> World:
+def parse_world(
+    text: str | bytes, resolve: Resolve = no_files, *, file: str = "world", max_parts: int = MAX_PARTS
+) -> World:
     """Return the first world in SDF text, or a world of its models and lights if it has none.
 
-    Models that cannot be used are left out, and named in ``warnings``. Raise SdfError if the text is not SDF.
+    Models that cannot be used, or that exceed ``max_parts`` links, joints and models, are left out, and named in
+    ``warnings``. Raise SdfError if the text is not SDF.
     """
     root = parse_document(text, file)
-    source = new_source(file, resolve)
+    source = new_source(file, resolve, max_parts)
     if root.tag not in ("sdf", "gazebo", "world"):
         raise source.error(root, f"the root is <{root.tag}>: <sdf> is expected")
     world = root if root.tag == "world" else root.first("world")
     return read_world(world or root, _versioned(source, root))
 
 
-def new_source(file: str, resolve: Resolve) -> Source:
+def new_source(file: str, resolve: Resolve, max_parts: int = MAX_PARTS) -> Source:
     """Return the source of a document. If ``file`` is the path of a file, relative URIs are below its folder."""
     is_file = os.path.isabs(file) and os.path.isfile(file)
     path = os.path.realpath(file) if is_file else ""
-    return Source(file, resolve, [], Shared(), os.path.dirname(path), chain=(path,) if path else ())
+    return Source(
+        file, resolve, [], Shared(max_parts=max_parts), os.path.dirname(path), chain=(path,) if path else ()
+    )
 
 
 def _versioned(source: Source, root: Element) -> Source:

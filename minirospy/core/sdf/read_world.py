@@ -95,7 +95,7 @@ class _Reader:
             if child.tag in _NOT_SIMULATED:
                 self.source.warn(child, f"{_title(child)} is not simulated")
             return
-        if self.source.shared.parts_left < 0 and child.tag in ("model", "include"):
+        if self.source.shared.is_full and child.tag in ("model", "include"):
             self.source.warn(None, "the models after it are left out, too")
             return
         try:

@@ -14,7 +14,7 @@ from minirospy.core.sdf.poses import pose_from_rpy
 from minirospy.core.sdf.text import Element, parse_document
 from minirospy.core.urdf.poses import quaternion_from_rpy
 
-__all__ = ["Resolve", "Shared", "Source", "no_files"]
+__all__ = ["MAX_PARTS", "Resolve", "Shared", "Source", "no_files"]
 
 Resolve = Callable[[str], "str | None"]
 """Return the path of the existing file or folder that a URI or a path names, or None.
@@ -38,11 +38,16 @@ def no_files(uri: str) -> str | None:
 
 @dataclass
 class Shared:
-    """What all files of one reading share: the documents by path, and the number of parts that are left."""
+    """What all files of one reading share: documents and found paths by name, and the number of parts so far."""
 
     documents: dict[str, Element] = field(default_factory=dict)
     found: dict[str, str | None] = field(default_factory=dict)
-    parts_left: int = MAX_PARTS
+    max_parts: int = MAX_PARTS
+    parts: int = 0
+
+    @property
+    def is_full(self) -> bool:
+        return self.parts > self.max_parts
 
 
 @dataclass(frozen=True)
@@ -74,9 +79,9 @@ class Source:
 
     def count(self, element: Element, parts: int = 1) -> None:
         """Count links, joints and models. Raise SdfError if there are too many."""
-        self.shared.parts_left -= parts
-        if self.shared.parts_left < 0:
-            raise self.error(element, f"there are more than {MAX_PARTS} links, joints and models")
+        self.shared.parts += parts
+        if self.shared.is_full:
+            raise self.error(element, f"there are more than {self.shared.max_parts} links, joints and models")
 
     # ---- other files
 

@@ -14,7 +14,7 @@ _DECLARATION = re.compile(r"<\?xml\s.*?\?>", re.DOTALL)
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _LONE_AMPERSAND = re.compile(r"&(?!#\d+;|#x[0-9a-fA-F]+;|\w+;)")
 _TAG = re.compile(r"<[A-Za-z][^<>]*>")
-_BARE_VALUE = re.compile(r"""(\s[\w:.-]+=)([^\s"'<>=]+)(?=[\s>])""")  # name=value without quotes
+_BARE_VALUE = re.compile(r"""(\s[\w:.-]+=)([^\s"'<>=]+?)(?=\s|/?>)""")  # name=value without quotes
 _NOT_ALLOWED = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 
 

@@ -1,7 +1,7 @@
 """`rosrun gazebo_ros gzserver`: the node /gazebo. `gazebo`, `debug` and `gzclient` are variants of it.
 
 Exit statuses: 0 after Ctrl-C or a request to shut down, 1 if the simulation's library or the world file is missing or
-invalid, 2 for wrong arguments.
+invalid or the simulation failed, 2 for wrong arguments.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from minirospy.ros.gazebo_ros.paths import ResourcePaths, resource_paths
 from minirospy.workspace.packages import Packages
 
 if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.loop import SimulationLoop
     from minirospy.ros.gazebo_ros.physics import Simulation
 
 __all__ = ["ABOUT", "main", "new_parser", "read_world_file"]
@@ -87,7 +88,8 @@ def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
         _start_node()
         for line in (*world.warnings, *simulation.warnings):
             rospy.logwarn("%s", line)
-        _run(simulation, world, resources, paused=arguments.pause, steps=arguments.iters)
+        loop = _run(simulation, world, resources, paused=arguments.pause, steps=arguments.iters)
+        return 1 if loop.failure is not None else 0
     except rospy.ROSInterruptException:
         pass
     except rospy.ROSException as error:
@@ -105,7 +107,9 @@ def _start_node() -> None:
         rospy.set_param("/use_sim_time", True)
 
 
-def _run(simulation: Simulation, world: World, resources: ResourcePaths, *, paused: bool, steps: int) -> None:
+def _run(
+    simulation: Simulation, world: World, resources: ResourcePaths, *, paused: bool, steps: int
+) -> SimulationLoop:
     from minirospy.ros.gazebo_ros.loop import SimulationLoop
     from minirospy.ros.gazebo_ros.reconfigure import PhysicsReconfigure
     from minirospy.ros.gazebo_ros.server import Server
@@ -132,6 +136,7 @@ def _run(simulation: Simulation, world: World, resources: ResourcePaths, *, paus
         rospy.spin()
     finally:
         server.close()
+    return loop
 
 
 def _is_number(value: object) -> bool:

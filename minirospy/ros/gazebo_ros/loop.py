@@ -33,6 +33,7 @@ class SimulationLoop:
     simulation: only this loop's thread uses it; other threads use :meth:`call`.
     before_step: is called before each step. on_tick: is called at the tick rate of simulated time, and after each reset.
     on_lost: is called for each model that the simulation removed. reported: problems that were logged once.
+    on_failure: is called if the thread ends by an error, which ``failure`` is then.
     """
 
     def __init__(self, simulation: Simulation, *, paused: bool = False, tick_rate: float = 0.0) -> None:
@@ -40,6 +41,8 @@ class SimulationLoop:
         self.before_step: Callable[[], None] = lambda: None
         self.on_tick: Callable[[], None] = lambda: None
         self.on_lost: Callable[[LostModel], None] = lambda lost: None
+        self.on_failure: Callable[[Exception], object] = lambda error: None
+        self.failure: Exception | None = None
         self.reported: set[str] = set()
         self.real_time_factor = 0.0  # of the last second of wall time
         self._paused = paused
@@ -144,6 +147,17 @@ class SimulationLoop:
         self.on_tick()
 
     def _run(self) -> None:
+        try:
+            self._run_until_closed()
+        except Exception as error:  # noqa: BLE001 - the services would wait for this thread for ever
+            self.failure = error
+            self.on_failure(error)
+        with self._wake:
+            self._is_closed = True
+            while self._jobs:
+                self._jobs.popleft()[1].set_exception(LoopClosed("the simulation has ended"))
+
+    def _run_until_closed(self) -> None:
         self.on_tick()
         while not self._is_closed:
             self._run_jobs()
@@ -158,9 +172,6 @@ class SimulationLoop:
                 self._paused = True
                 self._end[1]()
                 self._end = None
-        with self._wake:
-            while self._jobs:
-                self._jobs.popleft()[1].set_exception(LoopClosed("the simulation has ended"))
 
     def _run_jobs(self) -> None:
         while self._jobs:

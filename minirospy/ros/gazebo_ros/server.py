@@ -8,7 +8,7 @@ from rosgraph_msgs.msg import Clock
 from minirospy import client as rospy
 from minirospy.base.clock import SimulatedClock
 from minirospy.core.sdf.model import Light, Model, Pose, Vector, World
-from minirospy.ros.gazebo_ros.loop import SimulationLoop
+from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
 from minirospy.ros.gazebo_ros.markers import WorldMarkers
 from minirospy.ros.gazebo_ros.messages import time_of, to_pose, to_twist
 from minirospy.ros.gazebo_ros.paths import ResourcePaths
@@ -41,6 +41,7 @@ class Server:
         self.plugins = PluginHost(loop)
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._published_ns = -1
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         if not only_clock:
@@ -49,6 +50,7 @@ class Server:
         loop.before_step = self.plugins.update
         loop.on_tick = self._tick
         loop.on_lost = self._lost
+        loop.on_failure = self._fail
 
     def start(self, world: World) -> None:
         """Load the plugins of the world file, and publish the markers. Call it in the loop's thread."""
@@ -91,6 +93,8 @@ class Server:
         """Close the plugins and end the loop."""
         try:
             self.loop.call(self.plugins.close)
+        except LoopClosed:
+            self.plugins.close()
         finally:
             self.loop.close()
 
@@ -104,11 +108,18 @@ class Server:
         self.plugins.remove_model(lost.name)
         self._changed()
 
+    @staticmethod
+    def _fail(error: Exception) -> None:
+        rospy.logfatal("the simulation failed: %s: %s", type(error).__name__, error)
+        rospy.signal_shutdown("the simulation failed")
+
     def _tick(self) -> None:
         now = self.loop.simulation.time_ns
         if self._clock is not None:
             self._clock.set(now)
-        if not self.loop.is_paused or now == 0:
+        # Nothing is published while paused, except the new time after a reset or a single step.
+        if now != self._published_ns:
+            self._published_ns = now
             self._clock_publisher.publish(Clock(time_of(now)))
         self._publish_states()
 

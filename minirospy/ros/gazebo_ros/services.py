@@ -83,7 +83,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from minirospy import client as rospy
 from minirospy.base.errors import SdfError
-from minirospy.core.sdf.model import Light, Model, Pose, Vector
+from minirospy.core.sdf.model import Inertial, Light, Model, Pose, Vector
 from minirospy.core.sdf.poses import multiply, rotate
 from minirospy.ros.gazebo_ros.frames import (
     WORLD_FRAMES,
@@ -156,6 +156,7 @@ class Services:
             ("clear_body_wrenches", BodyRequest, self._clear_body_wrenches),
             ("reset_simulation", Empty, self._reset_simulation),
             ("reset_world", Empty, self._reset_world),
+            ("step_physics", Empty, self._step_physics),
         )
         for name, kind, handler in in_loop:
             rospy.Service(f"~{name}", kind, functools.partial(self._in_loop, handler))
@@ -356,13 +357,19 @@ class Services:
             return SetLinkPropertiesResponse(
                 False, "SetLinkProperties: link not found, did you forget to scope the link by model name?"
             )
-        inertial = link.record.inertial
-        inertia = (request.ixx, request.ixy, request.ixz, request.iyy, request.iyz, request.izz)
-        if request.mass != inertial.mass or inertia != inertial.inertia:
-            return SetLinkPropertiesResponse(
-                False,
-                "SetLinkProperties: minirospy's simulation can change gravity_mode, but no mass and no inertia",
-            )
+        if not request.mass > 0:
+            return SetLinkPropertiesResponse(False, f"SetLinkProperties: the mass is {request.mass}")
+        old = link.record.inertial
+        new = Inertial(
+            request.mass,
+            Pose(vector_of(request.com.position), old.pose.orientation),
+            (request.ixx, request.ixy, request.ixz, request.iyy, request.iyz, request.izz),
+        )
+        try:
+            if new != old:
+                link.set_inertial(new)
+        except SimulationError as error:
+            return SetLinkPropertiesResponse(False, f"SetLinkProperties: {error}")
         link.has_gravity = request.gravity_mode
         return SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
 
@@ -438,11 +445,18 @@ class Services:
                 joint.set_velocity(config.vel[0] if config.vel else 0.0, force)
             else:
                 joint.stop_motor()
-        if config.damping or config.hiStop or config.loStop:
-            return SetJointPropertiesResponse(
-                False,
-                "SetJointProperties: minirospy's simulation can change fmax and vel, but no damping and no limits",
-            )
+        axis = joint.axis
+        if config.damping:
+            axis = axis._replace(damping=config.damping[0])
+        if config.hiStop:
+            axis = axis._replace(upper=config.hiStop[0])
+        if config.loStop:
+            axis = axis._replace(lower=config.loStop[0])
+        try:
+            if axis != joint.axis:
+                joint.set_axis(axis)
+        except SimulationError as error:
+            return SetJointPropertiesResponse(False, f"SetJointProperties: {error}")
         return SetJointPropertiesResponse(True, "SetJointProperties: properties set")
 
     def _apply_body_wrench(self, request: ApplyBodyWrenchRequest) -> ApplyBodyWrenchResponse:
@@ -565,6 +579,11 @@ class Services:
 
     def _reset_simulation(self, _request: EmptyRequest) -> EmptyResponse:
         self._server.reset(with_time=True)
+        return EmptyResponse()
+
+    def _step_physics(self, _request: EmptyRequest) -> EmptyResponse:
+        """Advance by one step, for use while paused. Gazebo has this in its window only."""
+        self._loop.step(1)
         return EmptyResponse()
 
     def _reset_world(self, _request: EmptyRequest) -> EmptyResponse:

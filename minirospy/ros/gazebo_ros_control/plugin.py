@@ -118,7 +118,8 @@ class GazeboRosControl(ModelPlugin):
         return list(found.values())
 
     def _find_pid(self, joint: str) -> Pid | None:
-        namespace = f"{self.namespace}/gazebo_ros_control/pid_gains/{joint}"
+        base = "" if self.flag("legacyModeNS", False) else self.namespace
+        namespace = f"{base}/gazebo_ros_control/pid_gains/{joint}"
         values = rospy.get_param(namespace, None)
         if not isinstance(values, dict):
             return None

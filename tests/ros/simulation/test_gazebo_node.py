@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import math
+import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from gazebo_msgs.msg import LinkStates, ModelState, ModelStates
+from gazebo_msgs.msg import LinkStates, ModelState, ModelStates, ODEJointProperties
 from gazebo_msgs.srv import (
     ApplyBodyWrench,
     ApplyJointEffort,
@@ -20,6 +23,7 @@ from gazebo_msgs.srv import (
     GetModelState,
     GetPhysicsProperties,
     GetWorldProperties,
+    SetJointProperties,
     SetLinkProperties,
     SetLinkState,
     SetModelConfiguration,
@@ -138,9 +142,14 @@ def test_services_answer_with_the_texts_of_ros(master: str, start: Start) -> Non
         link = await call(node, "get_link_properties", GetLinkProperties, "box::base_link")
         assert (link.mass, link.ixx, link.gravity_mode) == (1.0, 0.1, True)
         inertia = (link.ixx, link.ixy, link.ixz, link.iyy, link.iyz, link.izz)
-        arguments = ("box::base_link", Pose(), False, 1.0, *inertia)
+        arguments = ("box::base_link", Pose(), False, 3.0, *inertia)
         assert (await call(node, "set_link_properties", SetLinkProperties, *arguments)).success
-        assert not (await call(node, "get_link_properties", GetLinkProperties, "box::base_link")).gravity_mode
+        link = await call(node, "get_link_properties", GetLinkProperties, "box::base_link")
+        assert (link.mass, link.gravity_mode) == (3.0, False)
+        refused = await call(
+            node, "set_link_properties", SetLinkProperties, "box::base_link", Pose(), True, -1.0, *inertia
+        )
+        assert (refused.success, refused.status_message) == (False, "SetLinkProperties: the mass is -1.0")
 
         world = await call(node, "get_world_properties", GetWorldProperties)
         assert world.model_names == ["ground_plane", "box", "other"]
@@ -164,6 +173,12 @@ def test_joints_and_forces_of_models(master: str, start: Start) -> None:
             node, "set_model_configuration", SetModelConfiguration, "arm", "", ["hinge"], []
         )
         assert response.status_message.endswith("joint name and position list have different lengths")
+
+        config = ODEJointProperties(damping=[0.5], hiStop=[0.2], loStop=[-0.2])
+        arguments = ("hinge", config)
+        assert (await call(node, "set_joint_properties", SetJointProperties, *arguments)).success
+        config = ODEJointProperties(damping=[0.0], hiStop=[1e16], loStop=[-1e16])
+        assert (await call(node, "set_joint_properties", SetJointProperties, "hinge", config)).success
 
         effort = await call(node, "apply_joint_effort", ApplyJointEffort, "hinge", 0.1, Time(), Duration(-1))
         assert effort.status_message == "ApplyJointEffort: effort set"
@@ -203,6 +218,10 @@ def test_no_clock_while_paused_and_resets(master: str, start: Start) -> None:
         arguments = (0.002, 0.0, gravity, physics.ode_config)
         assert (await call(node, "set_physics_properties", SetPhysicsProperties, *arguments)).success
         assert (await call(node, "get_world_properties", GetWorldProperties)).sim_time == before
+        await call(node, "step_physics", Empty)
+        after = await call(node, "get_world_properties", GetWorldProperties)
+        assert math.isclose(after.sim_time, before + 0.002)
+        before = after.sim_time
         await call(node, "reset_world", Empty)
         after = await call(node, "get_world_properties", GetWorldProperties)
         assert after.sim_time == before
@@ -277,6 +296,11 @@ def test_spawn_model_sets_joints_and_deletes_at_its_end(master: str, tmp_path: P
     async def body(node: Node) -> None:
         while (await call(node, "get_joint_properties", GetJointProperties, "hinge")).position != (0.25,):
             await asyncio.sleep(0.05)
+        assert process.stdout is not None
+        while "Waiting for shutdown to delete model arm" not in await asyncio.to_thread(
+            process.stdout.readline
+        ):
+            pass
         await asyncio.to_thread(end, process)
         world = await call(node, "get_world_properties", GetWorldProperties)
         assert world.model_names == ["ground_plane"]
@@ -291,3 +315,48 @@ def test_a_world_that_does_not_exist(master: str, start: Start) -> None:
     assert (
         errors == "gzserver: no_such.world: there is no such world file, here or below GAZEBO_RESOURCE_PATH\n"
     )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
+def test_gzserver_ends_with_0_after_ctrl_c(master: str, start: Start) -> None:
+    process = start_world(start)
+
+    async def body(node: Node) -> None:
+        assert (await call(node, "get_world_properties", GetWorldProperties)).success
+        process.send_signal(signal.SIGINT)
+        assert await asyncio.to_thread(process.wait, SECONDS) == 0
+
+    run(body)
+
+
+def test_gzserver_ends_after_a_number_of_steps(master: str, start: Start) -> None:
+    assert start_world(start, "--iters", "300").wait(SECONDS) == 0
+
+
+def test_gzserver_names_itself(start: Start) -> None:
+    process = start("gazebo_ros", "gzserver", "--version")
+    assert process.communicate(timeout=SECONDS)[0] == "minirospy's simulation (MuJoCo) under Gazebo's names\n"
+
+
+def test_gzclient_prints_the_address_of_the_world(master: str, start: Start) -> None:
+    pytest.importorskip("websockets")
+    process = start("gazebo_ros", "gzclient", "--no-browser")
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert line.startswith("Open in a browser: http://127.0.0.1:")
+    assert "/#/3d?file=1&frame=world" in line
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="BROWSER names a program of POSIX")
+def test_gazebo_opens_the_window_too(master: str, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("websockets")
+    monkeypatch.setenv("BROWSER", "true")
+    process = start("gazebo_ros", "gazebo", "-u")
+    assert process.stdout is not None
+    while not process.stdout.readline().startswith("The browser opens http://127.0.0.1:"):
+        assert process.poll() is None
+
+    async def body(node: Node) -> None:
+        assert (await call(node, "get_world_properties", GetWorldProperties)).success
+
+    run(body)

@@ -261,6 +261,19 @@ def test_joint_friction_stops_a_joint() -> None:
     assert handle.velocity == pytest.approx(0.0, abs=1e-4)
 
 
+def test_a_motor_without_force_leaves_the_friction() -> None:
+    rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
+    joint = Joint("joint", "continuous", "world", "rotor", axis=Axis(friction=0.1))
+    simulation = Simulation(World(models=(Model("fan", {"rotor": rotor}, {"joint": joint}),)))
+    handle = simulation.model("fan").joints["joint"]
+    handle.set_velocity(5.0, max_force=0.0)
+    simulation.step(100)
+    assert handle.velocity == 0.0
+    handle.set_position(5.0, max_force=0.0)
+    simulation.step(100)
+    assert handle.velocity == 0.0
+
+
 def test_a_joint_force_lasts_for_its_duration() -> None:
     rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
     joint = Joint("joint", "continuous", "world", "rotor")

@@ -16,6 +16,7 @@ from minirospy.core.sdf.model import (
     Box,
     Collision,
     Cylinder,
+    Heightmap,
     Inertial,
     Joint,
     Link,
@@ -485,3 +486,52 @@ def test_a_polyline_is_a_prism() -> None:
     simulation.step(2000)
     assert ball.pose.position[2] == pytest.approx(0.1, abs=0.002)
     assert other.pose.position[2] == pytest.approx(0.55, abs=0.002)
+
+
+def test_a_heightmap_is_a_terrain(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="heightmaps need Pillow")
+    columns = np.arange(65)
+    heights = np.tile(100 + 2 * columns, (65, 1)).astype(np.uint8)  # rises with x from 100 to 228
+    image.fromarray(heights).save(tmp_path / "slope.png")
+    shape = Heightmap(str(tmp_path / "slope.png"), (8.0, 8.0, 2.0), (0.0, 0.0, 1.0))
+    simulation = Simulation(World(models=(still("terrain", shape),)))
+    assert simulation.warnings == []
+
+    down = np.array([[0.0, 0.0, -1.0]])
+    for x in (-3.0, 0.5, 3.0):
+        hit = simulation.cast_rays(at(x, 1.0, 10.0), down, 20.0)
+        expected = 1.0 + 2.0 * (100 + 128 * (x + 4) / 8) / 228
+        assert 10.0 - hit.distances[0] == pytest.approx(expected, abs=0.001)
+
+    ball = simulation.add_model(single("ball", Sphere(0.1)), at(2.0, 0.0, 4.0))
+    simulation.step(3000)
+    assert ball.pose.position[0] < 1.0  # it rolls down
+
+
+def test_an_unreadable_heightmap_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "no.png").write_bytes(b"no picture")
+    with pytest.raises(SimulationError, match="the heightmap cannot be read"):
+        Simulation().add_model(still("terrain", Heightmap(str(tmp_path / "no.png"))))
+
+
+def test_mass_and_joint_can_be_changed() -> None:
+    simulation = Simulation(World(models=(pendulum(start=0.0), diff_drive())))
+    simulation.step(100)
+    pendulum_model, robot = simulation.model("pendulum"), simulation.model("robot")
+    joint = pendulum_model.joints["joint0"]
+    joint.set_state(0.2, 1.0)
+    before = robot.pose
+
+    joint.set_axis(Axis(damping=3.0, effort=2.0))
+    heavy = joint.model.links["rod0"].record.inertial._replace(mass=5.0)
+    joint.model.links["rod0"].set_inertial(heavy)
+
+    assert (joint.position, joint.velocity) == (0.2, 1.0)
+    assert robot.pose == before
+    inertia = 0.5**2 / 12 + 5.0 * 0.25**2
+    simulation.step()
+    assert joint.velocity == pytest.approx(
+        1.0 - 0.001 * (3.0 * 1.0 + 5.0 * G * 0.25 * math.sin(0.2)) / inertia, abs=2e-4
+    )
+    with pytest.raises(SimulationError, match="a mass must be positive"):
+        joint.model.links["rod0"].set_inertial(heavy._replace(mass=0.0))

@@ -11,6 +11,7 @@ from minirospy.core.sdf.model import (
     Axis,
     Collision,
     Cylinder,
+    Inertial,
     Joint,
     Link,
     Model,
@@ -26,7 +27,7 @@ from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoc
 from minirospy.ros.gazebo_ros.physics.shapes import Shapes
 from minirospy.ros.gazebo_ros.physics.tree import WORLD, LinkTree, plan_tree
 
-__all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits"]
+__all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits", "set_inertial"]
 
 FIXED_KINDS = ("fixed",)
 MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
@@ -167,10 +168,8 @@ class Builder:
         body.pos, body.quat = local.position, _wxyz(local.orientation)
 
         if not model.is_static:
-            inertia = principal_inertia(link.inertial)
             body.explicitinertial = True
-            body.mass, body.inertia = inertia.mass, inertia.moments
-            body.ipos, body.iquat = inertia.pose.position, _wxyz(inertia.pose.orientation)
+            set_inertial(body, link.inertial)
             body.gravcomp = 0.0 if link.has_gravity else 1.0
             if joint is None:
                 body.add_freejoint(name=scoped)
@@ -184,7 +183,7 @@ class Builder:
                 body,
                 f"{scoped}::{collision.name}",
                 collision,
-                is_static=model.is_static or joint_is_rigid(tree, link.name),
+                is_static=model.is_static,
                 is_wheel=joint is not None and _is_wheel(joint, collision),
             )
 
@@ -202,20 +201,25 @@ class Builder:
             row = body.add_joint(name=axis_name, type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE)
             row.pos = joint.pose.position
             row.axis = _direction(joint, axis)
-            _set_first(row, "damping", _number(axis.damping))
-            _set_first(row, "stiffness", _number(axis.spring_stiffness))
-            row.springref = axis.spring_reference
-            row.frictionloss = max(axis.friction, 0.0)
             row.solref_friction = [-1 / self._step, -1 / self._step]
             row.solimp_friction = [MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0]
             row.solref_limit = [0.005, 1.0]
             row.solimp_limit = [0.95, 0.99, 0.001, 0.5, 2.0]
-            if joint.kind != "continuous" and has_limits(axis):
-                lower, upper = sorted((axis.lower, axis.upper))
-                if upper - lower < 2 * MIN_RANGE:
-                    lower, upper = lower - MIN_RANGE, upper + MIN_RANGE
-                row.limited = True
-                row.range = [max(lower, -MAX_LIMIT), min(upper, MAX_LIMIT)]
+            self.set_axis(axis_name, joint.kind, axis)
+
+    def set_axis(self, name: str, kind: str, axis: Axis) -> None:
+        """Set the limits and the passive forces of one of MuJoCo's joints."""
+        row = self.spec.joint(name)
+        _set_first(row, "damping", _number(axis.damping))
+        _set_first(row, "stiffness", _number(axis.spring_stiffness))
+        row.springref = axis.spring_reference
+        row.frictionloss = _number(axis.friction)
+        row.limited = kind != "continuous" and has_limits(axis)
+        if row.limited:
+            lower, upper = sorted((axis.lower, axis.upper))
+            if upper - lower < 2 * MIN_RANGE:
+                lower, upper = lower - MIN_RANGE, upper + MIN_RANGE
+            row.range = [max(lower, -MAX_LIMIT), min(upper, MAX_LIMIT)]
 
     def _add_excludes(self, built: BuiltModel, model: Model, name: str) -> None:
         """Exclude contacts within the model, or those of links that a joint connects if the model collides with itself."""
@@ -283,6 +287,13 @@ class Builder:
             built.others.append(row)
 
 
+def set_inertial(body: Any, inertial: Inertial) -> None:
+    """Set the mass and the inertia of one of MuJoCo's bodies."""
+    inertia = principal_inertia(inertial)
+    body.mass, body.inertia = inertia.mass, inertia.moments
+    body.ipos, body.iquat = inertia.pose.position, _wxyz(inertia.pose.orientation)
+
+
 def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
     """Return the names of MuJoCo's joints for a joint: one for each axis, none for a fixed joint."""
     if joint.kind in FIXED_KINDS:
@@ -293,13 +304,6 @@ def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
 def has_limits(axis: Axis) -> bool:
     """Return whether at least one limit is finite."""
     return max(axis.lower, axis.upper) < MAX_LIMIT or min(axis.lower, axis.upper) > -MAX_LIMIT
-
-
-def joint_is_rigid(tree: LinkTree, link: str) -> bool:
-    """Return whether fixed joints connect a link to the world."""
-    while (joint := tree.joint_of.get(link)) is not None and joint.kind in FIXED_KINDS:
-        link = joint.parent
-    return link == WORLD
 
 
 def _is_wheel(joint: Joint, collision: Collision) -> bool:

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from minirospy.core.sdf.model import Axis, Joint, Link, Model, Pose, Vector
+from minirospy.core.sdf.model import Axis, Inertial, Joint, Link, Model, Pose, Vector
 from minirospy.core.sdf.pose_math import compose, inverse, normalized, rotate, transform
-from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names
+from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names, set_inertial
 from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, Engine
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
 from minirospy.ros.gazebo_ros.physics.states import ZERO, State, Wrench
@@ -33,6 +33,9 @@ class Owner(Protocol):
 
     def recompile(self) -> None:
         """Compile the world again."""
+
+    def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
+        """Change one of MuJoCo's joints."""
 
 
 @dataclass
@@ -117,6 +120,16 @@ class SimLink:
             self._engine.model.body_gravcomp[self.id] = 0.0 if value else 1.0
             self._engine.is_stale = True
         else:
+            self.model.recompile()
+
+    def set_inertial(self, inertial: Inertial) -> None:
+        """Change the mass and the inertia; the world is compiled again. A static model has none."""
+        _check(inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
+        if inertial.mass <= 0:
+            raise SimulationError("a mass must be positive")
+        self.record = replace(self.record, inertial=inertial)
+        if not self.model.is_static:
+            set_inertial(self.model.built.bodies[self.name], inertial)
             self.model.recompile()
 
     def add_wrench(
@@ -228,6 +241,12 @@ class SimJoint:
             self._engine.data.qvel[self.dof] = velocity
             self._engine.is_stale = True
 
+    def set_axis(self, axis: Axis) -> None:
+        """Change limits, damping, friction and spring, but not the direction; the world is compiled again."""
+        self.axis = axis._replace(xyz=self.axis.xyz, initial_position=self.axis.initial_position)
+        if self.dof >= 0:
+            self.model.set_axis(self.scoped, self.record.kind, self.axis)
+
     def set_velocity_now(self, velocity: float) -> None:
         """Set the velocity at once."""
         if self.dof >= 0:
@@ -277,7 +296,7 @@ class SimJoint:
         if math.isnan(max_force):
             raise SimulationError("a motor's maximum force is not finite")
         force = min(max(max_force, 0.0), MAX_FORCE)
-        same = force == self._max_force and self.dof >= 0
+        same = force == self._max_force > 0 and self.dof >= 0
         self._max_force = force
         if same and self._target is None and not self._engine.follows_position[self.dof]:
             self._engine.set_target(self.dof, self._velocity)
@@ -293,8 +312,9 @@ class SimJoint:
         engine, dof = self._engine, self.dof
         friction = max(self.axis.friction, 0.0)
         engine.model.dof_frictionloss[dof] = self._max_force or friction
-        engine.target_velocity[dof] = self._velocity
-        engine.follows_position[dof] = self._target is not None
+        # Without a motor the row is the joint's friction, whose target is to stand still.
+        engine.target_velocity[dof] = self._velocity if self._max_force else 0.0
+        engine.follows_position[dof] = self._target is not None and self._max_force > 0
         if self._target is not None:
             engine.target_position[dof] = self._target
         engine.max_velocity[dof] = self._max_velocity
@@ -504,6 +524,10 @@ class SimModel:
     def recompile(self) -> None:
         """Compile the world again."""
         self._owner.recompile()
+
+    def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
+        """Change one of MuJoCo's joints."""
+        self._owner.set_axis(scoped, kind, axis)
 
     def forces_changed(self) -> None:
         """Tell the simulation that a force acts on this model."""

@@ -187,7 +187,13 @@ class Shapes:
         return name
 
     def _heightmap(self, shape: Heightmap) -> _Piece:
-        heights = terrain(shape.path)
+        try:
+            heights = terrain(shape.path)
+        except MeshError as error:
+            raise SimulationError(str(error)) from error
+        # MuJoCo scales the lowest point to 0 and the highest one to 1. In SDF, the highest one has the given height.
+        highest = max(float(heights.max()), MIN_SIZE)
+        lowest = float(heights.min()) / highest
         self._count += 1
         name = f"terrain{self._count}"
         x, y, z = shape.size
@@ -196,10 +202,11 @@ class Shapes:
             name=name,
             nrow=rows,
             ncol=columns,
-            size=[x / 2, y / 2, max(z, MIN_SIZE), max(z, 1.0) / 10],
+            size=[x / 2, y / 2, max(z * (1 - lowest), MIN_SIZE), max(z, 1.0) / 10],
             userdata=heights.astype(np.float32).ravel(),
         )
-        return _Piece("HFIELD", asset=name, pose=Pose(shape.position))
+        px, py, pz = shape.position
+        return _Piece("HFIELD", asset=name, pose=Pose((px, py, pz + z * lowest)))
 
 
 def _primitive(geometry: Geometry) -> _Piece | None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from minirospy.core.sdf.model import Model, Physics, Pose, Vector, World
+from minirospy.core.sdf.model import Axis, Model, Physics, Pose, Vector, World
 from minirospy.core.sdf.pose_math import rotate
 from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
@@ -181,6 +181,11 @@ class Simulation:
         """Compile the world again after a change of the spec."""
         self._engine.recompile()
         self._bind()
+
+    def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
+        """Change the limits and passive forces of one of MuJoCo's joints."""
+        self._builder.set_axis(scoped, kind, axis)
+        self.recompile()
 
     def _add_all(self, models: Iterable[Model]) -> None:
         """Add the world's models with one compilation; if that fails, one by one."""
