@@ -60,11 +60,14 @@ LIBRARIES = {
     "gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
     "roboticsgroup_gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
     "roboticsgroup_upatras_gazebo_mimic_joint_plugin": f"{_PLUGINS}.mimic:MimicJoint",
-    # Cameras.
     "gazebo_ros_camera": f"{_PLUGINS}.camera:Camera",
     "gazebo_ros_multicamera": f"{_PLUGINS}.camera:MultiCamera",
     "gazebo_ros_depth_camera": f"{_PLUGINS}.depth_camera:DepthCamera",
     "gazebo_ros_openni_kinect": f"{_PLUGINS}.depth_camera:OpenniKinect",
+    "gazebo_ros_block_laser": f"{_PLUGINS}.block_laser:BlockLaser",
+    "gazebo_ros_joint_pose_trajectory": f"{_PLUGINS}.joint_pose_trajectory:JointPoseTrajectory",
+    "gazebo_ros_f3d": f"{_PLUGINS}.f3d:F3D",
+    "gazebo_ros_vacuum_gripper": f"{_PLUGINS}.vacuum_gripper:VacuumGripper",
 }
 """Dict from library, without ``lib`` and ``.so``, to module and class."""
 
