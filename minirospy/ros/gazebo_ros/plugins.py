@@ -68,6 +68,9 @@ LIBRARIES = {
     "gazebo_ros_joint_pose_trajectory": f"{_PLUGINS}.joint_pose_trajectory:JointPoseTrajectory",
     "gazebo_ros_f3d": f"{_PLUGINS}.f3d:F3D",
     "gazebo_ros_vacuum_gripper": f"{_PLUGINS}.vacuum_gripper:VacuumGripper",
+    "hector_gazebo_ros_imu": f"{_PLUGINS}.hector:HectorImu",
+    "hector_gazebo_ros_gps": f"{_PLUGINS}.hector:HectorGps",
+    "hector_gazebo_ros_sonar": f"{_PLUGINS}.hector:HectorSonar",
 }
 """Dict from library, without ``lib`` and ``.so``, to module and class."""
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.srv import Reconfigure
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from numpy.typing import NDArray
@@ -110,6 +112,15 @@ def test_pictures_come_at_the_lower_rate_of_sensor_and_plugin(master: str, start
         periods = np.diff(stamps) / 0.1
         assert periods == pytest.approx(np.round(periods), abs=0.05)
         assert periods.min() > 0.9
+
+        config = Config(doubles=[DoubleParameter("imager_rate", 4.0)])
+        response = await node.call("/cam/set_parameters", Reconfigure, config)
+        assert response.config.doubles[0].value == 4.0
+        last = 0.0
+        async for image in node.subscribe("/cam/image_raw", Image):
+            last, before = image.header.stamp.to_sec(), last
+            if before and last - before > 0.24:
+                break
 
     run(body)
 
