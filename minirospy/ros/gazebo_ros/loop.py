@@ -21,7 +21,7 @@ _T = TypeVar("_T")
 
 DEFAULT_TICK_HZ = 250.0  # /clock and the states of models; 1000 messages/s would keep every Python node busy
 MAX_LAG_SECONDS = 0.1  # a simulation that is later than this does not try to catch up
-MAX_STEPPING_SECONDS = 0.1  # of wall time, after which jobs run before the next tick: a step may be 1 ns, and ticks 4 ms apart
+MAX_STEPPING_SECONDS = 0.1  # of wall time, after which jobs run before the next tick: a step may be 1 ns
 
 
 class LoopClosed(MinirospyError):
