@@ -21,6 +21,7 @@ _T = TypeVar("_T")
 
 DEFAULT_TICK_HZ = 250.0  # /clock and the states of models; 1000 messages/s would keep every Python node busy
 MAX_LAG_SECONDS = 0.1  # a simulation that is later than this does not try to catch up
+MAX_STEPPING_SECONDS = 0.1  # of wall time, after which jobs run before the next tick: a step may be 1 ns
 
 
 class LoopClosed(MinirospyError):
@@ -131,11 +132,8 @@ class SimulationLoop:
 
     def step(self, count: int) -> None:
         """Advance by steps, while paused or not. Call it in the loop's thread."""
-        self._steps += count
         for _ in range(count):
-            self.before_step()
-            for lost in self.simulation.step():
-                self.on_lost(lost)
+            self._step_once()
         self.on_tick()
 
     def reset(self, *, with_time: bool) -> None:
@@ -164,14 +162,31 @@ class SimulationLoop:
             if self._must_wait():
                 continue
             period = self.simulation.physics.step
-            count = max(1, round(1 / (self._tick_rate * period)))
-            self.step(count)
+            count = self._advance(max(1, round(1 / (self._tick_rate * period))))
             self._deadline += count / self._rate if self._rate else 0.0
             self._measure()
             if self._end is not None and self._steps >= self._end[0]:
                 self._paused = True
                 self._end[1]()
                 self._end = None
+
+    def _advance(self, count: int) -> int:
+        """Advance by steps, and by fewer if they take too long; return their number."""
+        end = wall.monotonic() + MAX_STEPPING_SECONDS
+        done = 0
+        while done < count and not self._is_closed:
+            self._step_once()
+            done += 1
+            if wall.monotonic() > end:
+                break
+        self.on_tick()
+        return done
+
+    def _step_once(self) -> None:
+        self._steps += 1
+        self.before_step()
+        for lost in self.simulation.step():
+            self.on_lost(lost)
 
     def _run_jobs(self) -> None:
         while self._jobs:

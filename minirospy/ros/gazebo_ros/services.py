@@ -94,6 +94,7 @@ from minirospy.ros.gazebo_ros.frames import (
     relative_state,
     turned_back,
 )
+from minirospy.ros.gazebo_ros.loop import LoopClosed
 from minirospy.ros.gazebo_ros.messages import (
     duration_seconds,
     pose_of,
@@ -159,16 +160,44 @@ class Services:
             ("step_physics", Empty, self._step_physics),
         )
         for name, kind, handler in in_loop:
-            rospy.Service(f"~{name}", kind, functools.partial(self._in_loop, handler))
-        rospy.Service("~spawn_sdf_model", SpawnModel, self._spawn_sdf_model)
-        rospy.Service("~spawn_urdf_model", SpawnModel, self._spawn_urdf_model)
-        rospy.Service("~pause_physics", Empty, self._pause_physics)
-        rospy.Service("~unpause_physics", Empty, self._unpause_physics)
+            rospy.Service(f"~{name}", kind, functools.partial(self._in_loop, kind._response_class, handler))
+        for name, kind, handler in (
+            ("spawn_sdf_model", SpawnModel, self._spawn_sdf_model),
+            ("spawn_urdf_model", SpawnModel, self._spawn_urdf_model),
+            ("pause_physics", Empty, self._pause_physics),
+            ("unpause_physics", Empty, self._unpause_physics),
+        ):
+            rospy.Service(f"~{name}", kind, functools.partial(self._until_closed, handler))
         rospy.Subscriber("~set_model_state", ModelState, self._on_model_state, queue_size=10)
         rospy.Subscriber("~set_link_state", LinkState, self._on_link_state, queue_size=10)
 
-    def _in_loop(self, handler: Callable[[Any], Any], request: object) -> object:
-        return self._loop.call(lambda: handler(request))
+    def _in_loop(self, response_class: type[Any], handler: Callable[[Any], Any], request: object) -> object:
+        try:
+            return self._until_closed(lambda each: self._loop.call(lambda: handler(each)), request)
+        except SimulationError as error:  # such as a force that is NaN
+            rospy.logerr("%s", error)
+            response = response_class()
+            if not hasattr(response, "success"):
+                raise rospy.ServiceException(str(error)) from None
+            response.success, response.status_message = False, str(error)
+            return response
+
+    @staticmethod
+    def _until_closed(handler: Callable[[Any], Any], request: object) -> object:
+        """Call a handler; refuse the request in one line if the simulation ends meanwhile."""
+        try:
+            return handler(request)
+        except LoopClosed as error:
+            raise rospy.ServiceException(str(error)) from None
+
+    def _apply(self, handler: Callable[[Any], object], request: object) -> None:
+        """Do what a message asks for."""
+        try:
+            self._loop.call(lambda: handler(request))
+        except LoopClosed:
+            pass
+        except SimulationError as error:
+            rospy.logerr("%s", error)
 
     # ---- models
 
@@ -284,7 +313,7 @@ class Services:
         return state if frame_name in WORLD_FRAMES else None
 
     def _on_model_state(self, message: ModelState) -> None:
-        self._loop.call(lambda: self._set_model_state(SetModelStateRequest(message)))
+        self._apply(self._set_model_state, SetModelStateRequest(message))
 
     def _set_model_state(self, request: SetModelStateRequest) -> SetModelStateResponse:
         wanted = request.model_state
@@ -399,7 +428,7 @@ class Services:
         return response
 
     def _on_link_state(self, message: LinkState) -> None:
-        self._loop.call(lambda: self._set_link_state(SetLinkStateRequest(message)))
+        self._apply(self._set_link_state, SetLinkStateRequest(message))
 
     def _set_link_state(self, request: SetLinkStateRequest) -> SetLinkStateResponse:
         wanted = request.link_state

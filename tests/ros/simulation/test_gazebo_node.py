@@ -317,6 +317,22 @@ def test_a_world_that_does_not_exist(master: str, start: Start) -> None:
     )
 
 
+def test_values_that_are_not_finite_are_refused(master: str, start: Start) -> None:
+    process = start_world(start, "-u")
+
+    async def body(node: Node) -> None:
+        assert (await spawn(node, BOX, "box", at(z=5)))[0]
+        refused = (False, "a force, position or velocity is not finite")
+        state = ModelState(model_name="box", pose=at(x=math.nan))
+        response = await call(node, "set_model_state", SetModelState, state)
+        assert (response.success, response.status_message) == refused
+        state.pose.position.x = 1.0
+        assert (await call(node, "set_model_state", SetModelState, state)).success
+
+    run(body)
+    end(process)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for a single process")
 def test_gzserver_ends_with_0_after_ctrl_c(master: str, start: Start) -> None:
     process = start_world(start)

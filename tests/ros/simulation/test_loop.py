@@ -63,6 +63,17 @@ def test_ticks_follow_the_rate_of_simulated_time() -> None:
     assert ticks[:4] == [0, 10, 20, 30]
 
 
+def test_jobs_run_between_two_ticks_if_a_step_is_tiny() -> None:
+    counter = Counter()
+    counter.physics = Physics(step=1e-12, update_rate=0.0)
+    loop = loop_of(counter)
+    loop.start()
+    ended = threading.Event()
+    threading.Thread(target=lambda: loop.call(ended.set), daemon=True).start()
+    assert ended.wait(20)
+    loop.close()
+
+
 def test_nothing_moves_while_the_simulation_is_held() -> None:
     counter = Counter()
     loop = loop_of(counter)
