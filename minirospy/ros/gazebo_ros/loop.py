@@ -5,9 +5,8 @@ from __future__ import annotations
 import threading
 import time as wall
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.base.errors import MinirospyError
@@ -33,7 +32,7 @@ class SimulationLoop:
 
     simulation: only this loop's thread uses it; other threads use :meth:`call`.
     before_step: is called before each step. on_tick: is called at the tick rate of simulated time, and after each reset.
-    on_lost: is called for each model that the simulation removed. reported: problems that were logged once.
+    on_lost: is called for each model that the simulation removed.
     on_failure: is called if the thread ends by an error, which ``failure`` is then.
     """
 
@@ -44,7 +43,6 @@ class SimulationLoop:
         self.on_lost: Callable[[LostModel], None] = lambda lost: None
         self.on_failure: Callable[[Exception], object] = lambda error: None
         self.failure: Exception | None = None
-        self.reported: set[str] = set()
         self.real_time_factor = 0.0  # of the last second of wall time
         self._paused = paused
         self._rate = simulation.physics.update_rate
@@ -75,28 +73,6 @@ class SimulationLoop:
         if threading.current_thread() is self._thread:
             return function()
         return self._submit(function).result()
-
-    @contextmanager
-    def held(self) -> Iterator[Simulation]:
-        """Keep the simulation between two steps while the calling thread uses it. Raise LoopClosed after the end.
-
-        Do not use it in the loop's thread.
-        """
-        entered, left = threading.Event(), threading.Event()
-
-        def hold() -> None:
-            entered.set()
-            left.wait()
-
-        future = self._submit(hold)
-        future.add_done_callback(lambda _: entered.set())
-        entered.wait()
-        try:
-            if future.done():
-                future.result()
-            yield self.simulation
-        finally:
-            left.set()
 
     def _submit(self, function: Callable[[], _T]) -> Future[_T]:
         future: Future[_T] = Future()
