@@ -74,17 +74,12 @@ def test_jobs_run_between_two_ticks_if_a_step_is_tiny() -> None:
     loop.close()
 
 
-def test_nothing_moves_while_the_simulation_is_held() -> None:
-    counter = Counter()
-    loop = loop_of(counter)
+def test_a_call_after_the_end_is_refused() -> None:
+    loop = loop_of(Counter())
     loop.start()
-    with loop.held():
-        before = counter.steps
-        assert not threading.Event().wait(0.05)
-        assert counter.steps == before
     loop.close()
-    with pytest.raises(LoopClosed), loop.held():
-        pass
+    with pytest.raises(LoopClosed):
+        loop.call(lambda: None)
 
 
 def test_a_failure_ends_the_loop_and_its_jobs() -> None:
