@@ -7,7 +7,7 @@ import math
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, body_velocity, to_odometry
+from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, body_velocity, is_usable, to_odometry
 from minirospy.ros.gazebo_ros.messages import yaw_of
 from minirospy.ros.gazebo_ros.plugins import ModelPlugin, Timer
 
@@ -40,6 +40,8 @@ class PlanarMove(ModelPlugin):
         self._timer = Timer(self._rate)
 
     def _on_command(self, message: Twist) -> None:
+        if not is_usable(message):
+            return
         self._command = (message.linear.x, message.linear.y, message.angular.z)
         self._commanded_ns = self.simulation.time_ns
 

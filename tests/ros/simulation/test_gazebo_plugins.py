@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from gazebo_msgs.msg import ContactsState
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Imu, JointState, LaserScan, Range
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
@@ -78,6 +80,25 @@ def test_the_robot_drives_a_circle(master: str, start: Start) -> None:
     assert (
         text.count("libgazebo_ros_hand_of_god.so of model 'rover' is not part of minirospy's simulation") == 1
     )
+
+
+def test_a_command_that_is_not_finite_does_not_end_the_drive(master: str, start: Start) -> None:
+    process = start_world(start)
+
+    async def body(node: Node) -> None:
+        await spawn_rover(node)
+        commands = await node.advertise("/cmd_vel", Twist, latch=True)
+        await commands.wait_for_subscribers(1, 30)
+        is_told = asyncio.create_task(until(node, "/rosout", Log, lambda each: "not finite" in each.msg))
+        while not is_told.done():
+            await commands.publish(Twist(Vector3(math.nan, 0.0, 0.0), Vector3()))
+            await asyncio.wait([is_told], timeout=0.1)
+        await commands.publish(Twist(Vector3(0.2, 0.0, 0.0), Vector3()))
+        await until(node, "/odom", Odometry, lambda each: each.twist.twist.linear.x > 0.15)
+
+    run(body)
+    output, errors = end(process)
+    assert "a velocity command that is not finite is ignored: x nan" in output + errors
 
 
 def test_sensors_measure_the_geometry(master: str, start: Start) -> None:
