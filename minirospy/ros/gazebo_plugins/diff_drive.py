@@ -11,6 +11,7 @@ from minirospy.ros.gazebo_plugins.odometry import (
     PlanarOdometry,
     TransformPublisher,
     body_velocity,
+    is_usable,
     to_odometry,
 )
 from minirospy.ros.gazebo_ros.physics import SimJoint
@@ -71,6 +72,8 @@ class DiffDrive(ModelPlugin):
         self._start()
 
     def _on_command(self, message: Twist) -> None:
+        if not is_usable(message):
+            return
         # Two floats: the simulation's thread reads both between two steps.
         self._speed, self._turn = message.linear.x, message.angular.z
 

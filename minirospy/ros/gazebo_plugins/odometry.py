@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
@@ -15,7 +15,14 @@ from minirospy.core.sdf.model import Pose, Quaternion
 from minirospy.ros.gazebo_ros.messages import to_pose, yaw_of
 from minirospy.ros.gazebo_ros.physics import State
 
-__all__ = ["PlanarOdometry", "TransformPublisher", "body_velocity", "rotation_of_yaw", "to_odometry"]
+__all__ = [
+    "PlanarOdometry",
+    "TransformPublisher",
+    "body_velocity",
+    "is_usable",
+    "rotation_of_yaw",
+    "to_odometry",
+]
 
 
 class TransformPublisher:
@@ -89,3 +96,14 @@ def to_odometry(
     covariance[::7] = variances
     message.pose.covariance = covariance
     return message
+
+
+def is_usable(command: Twist) -> bool:
+    """Return whether a command is finite; log an error if not."""
+    linear, angular = command.linear, command.angular
+    if all(map(math.isfinite, (linear.x, linear.y, angular.z))):
+        return True
+    rospy.logerr(
+        "a velocity command that is not finite is ignored: x %s, y %s, turn %s", linear.x, linear.y, angular.z
+    )
+    return False

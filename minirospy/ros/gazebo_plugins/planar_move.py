@@ -8,7 +8,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
 from minirospy.core.sdf.model import Pose
-from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, to_odometry
+from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, is_usable, to_odometry
 from minirospy.ros.gazebo_ros.messages import yaw_of
 from minirospy.ros.gazebo_ros.plugins import ModelPlugin, Timer
 
@@ -42,6 +42,8 @@ class PlanarMove(ModelPlugin):
         self._last: tuple[int, Pose, float] | None = None  # time in ns, pose and yaw of the last message
 
     def _on_command(self, message: Twist) -> None:
+        if not is_usable(message):
+            return
         self._command = (message.linear.x, message.linear.y, message.angular.z)
         self._commanded_ns = self.simulation.time_ns
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, body_velocity, to_odometry
+from minirospy.ros.gazebo_plugins.odometry import TransformPublisher, body_velocity, is_usable, to_odometry
 from minirospy.ros.gazebo_ros.plugins import ModelPlugin, Timer
 
 __all__ = ["SkidSteerDrive"]
@@ -49,6 +49,8 @@ class SkidSteerDrive(ModelPlugin):
             joint.set_velocity(0.0, self._torque)
 
     def _on_command(self, message: Twist) -> None:
+        if not is_usable(message):
+            return
         # Two floats: the simulation's thread reads both between two steps.
         self._speed, self._turn = message.linear.x, message.angular.z
 

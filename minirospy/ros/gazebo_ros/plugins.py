@@ -167,8 +167,16 @@ class PluginBase:
         return subscriber
 
     def serve(self, name: str, kind: type, handler: Callable[..., object]) -> None:
-        """Offer a service in the plugin's namespace."""
-        self._closing.append(rospy.Service(self.resolve(name), kind, handler).shutdown)
+        """Offer a service in the plugin's namespace. If this node offers it already, log an error, as in ROS."""
+        try:
+            service: rospy.Service[Any] = rospy.Service(self.resolve(name), kind, handler)
+        except rospy.ServiceException:  # the same robot was spawned before, in the same namespace
+            rospy.logerr(
+                "Tried to advertise a service that is already advertised in this node [%s]",
+                self.resolve(name),
+            )
+            return
+        self._closing.append(service.shutdown)
 
 
 class WorldPlugin(PluginBase):
@@ -324,6 +332,9 @@ class PluginHost:
         where = f"plugin '{plugin.name}' ({plugin.library})"
         if not issubclass(kind, base):
             rospy.logerr("%s is ignored: it must be a %s", where, base.__name__)
+            return
+        if issubclass(kind, SensorPlugin) and base is not SensorPlugin:
+            rospy.logerr("%s of '%s' is ignored: it must be inside a <sensor>", where, owner)
             return
         created: PluginBase | None = None
         try:
