@@ -333,9 +333,6 @@ class PluginHost:
         if not issubclass(kind, base):
             rospy.logerr("%s is ignored: it must be a %s", where, base.__name__)
             return
-        if issubclass(kind, SensorPlugin) and base is not SensorPlugin:
-            rospy.logerr("%s of '%s' is ignored: it must be inside a <sensor>", where, owner)
-            return
         created: PluginBase | None = None
         try:
             created = kind(self._loop, plugin, *context)

@@ -101,29 +101,6 @@ def test_a_command_that_is_not_finite_does_not_end_the_drive(master: str, start:
     assert "a velocity command that is not finite is ignored: x nan" in output + errors
 
 
-IMU_TWICE = """<sdf version="1.6"><model name="m"><static>true</static><link name="base"/>
-  <plugin name="imu" filename="libgazebo_ros_imu.so"><bodyName>base</bodyName><topicName>imu</topicName></plugin>
-  <plugin name="scan" filename="libgazebo_ros_laser.so"/></model></sdf>"""
-
-
-def test_the_same_robot_twice_and_a_sensor_outside_a_sensor(master: str, start: Start) -> None:
-    process = start_world(start)
-
-    async def body(node: Node) -> None:
-        for name in ("first", "second"):
-            arguments = (name, IMU_TWICE, f"/{name}_ns", Pose(Point(), UP), "")
-            assert (await call(node, "spawn_sdf_model", SpawnModel, *arguments)).success
-        assert (await call(node, "delete_model", DeleteModel, "first")).success
-        await until(node, "/second_ns/imu", Imu, lambda _: True)
-
-    run(body)
-    text = "".join(end(process))
-    assert (
-        text.count("Tried to advertise a service that is already advertised in this node [/default_imu]") == 1
-    )
-    assert "plugin 'scan' (gazebo_ros_laser) of 'first' is ignored: it must be inside a <sensor>" in text
-
-
 def test_sensors_measure_the_geometry(master: str, start: Start) -> None:
     start_world(start)
 
@@ -143,7 +120,7 @@ def test_sensors_measure_the_geometry(master: str, start: Start) -> None:
         def is_at_rest(imu: Imu) -> bool:
             return math.isclose(imu.linear_acceleration.z, 9.8, abs_tol=0.01)
 
-        imu = await until(node, "/second_ns/imu", Imu, is_at_rest)
+        imu = await until(node, "/imu", Imu, is_at_rest)
         assert imu.header.frame_id == "scanner"
         await until(node, "/free_imu", Imu, lambda each: abs(each.linear_acceleration.z) < 0.01)
 
