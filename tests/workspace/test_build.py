@@ -476,7 +476,7 @@ def test_messages_may_name_their_own_package_as_a_dependency(scene: Scene) -> No
 
 
 def test_an_empty_list_of_programs_is_installed(scene: Scene) -> None:
-    """As for a pattern that matches no file: CMake and catkin accept the command."""
+    """CMake and catkin accept the command, as for a pattern that matches no file."""
     scene.package(
         "p",
         "find_package(catkin REQUIRED)\nfile(GLOB found ${PROJECT_SOURCE_DIR}/scripts/*.py)\n"
@@ -1049,7 +1049,7 @@ def test_download_that_ends_early(
 
 
 def test_service_without_a_response(scene: Scene) -> None:
-    """As in ROS, it is built; a warning points out the possible mistake."""
+    """The package is built, as in ROS; a warning points out the possible mistake."""
     folder = scene.messages("led_msgs", {"srv/Set.srv": "int8 number\n", "srv/Get.srv": "---\nint8 number\n"})
     report = scene.build()["led_msgs"]
     line = f"{folder / 'srv' / 'Set.srv'}:1: 0 lines of '---' instead of 1: write request --- response"
@@ -1119,7 +1119,7 @@ def test_install(scene: Scene) -> None:
 
 
 def test_missing_files_are_errors_of_install_only(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """As in CMake, a package can be built even if its install rules list missing files."""
+    """A package can be built even if its install rules list missing files, as in CMake."""
     folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
     assert catkin_make(["-C", str(scene.root)]) == 0
     assert catkin_make(["-C", str(scene.root), "install"]) == 1

@@ -174,7 +174,7 @@ def test_return_ends_the_file(tmp_path: Path) -> None:
 
 
 def test_return_in_a_macro_ends_its_caller(tmp_path: Path) -> None:
-    """As in CMake, where macros are text: it ends the function that called the macro, or else the file."""
+    """Macros are text, as in CMake: return() ends the function that called the macro, or else the file."""
     text = (
         "macro(leave)\n f(leaves)\n return()\nendmacro()\nfunction(g)\n leave()\n f(never)\nendfunction()\n"
         "g()\nf(goes on)\nforeach(I 1 2)\n leave()\nendforeach()\nf(never)"

@@ -39,7 +39,7 @@ def no_files(uri: str) -> str | None:
 
 @dataclass
 class Shared:
-    """What all files of one reading share: documents and found paths by name, and the number of parts so far."""
+    """The data that all files of one reading share: documents and found paths by name, the number of parts so far."""
 
     documents: dict[str, Element] = field(default_factory=dict)
     found: dict[str, str | None] = field(default_factory=dict)

@@ -41,7 +41,7 @@ MOTOR_DAMPING = (
 
 @dataclass
 class BuiltModel:
-    """What a model added to the spec.
+    """The parts that a model added to the spec.
 
     ``roots``: the bodies below the world by the links' names; ``free``: those with six degrees of freedom; ``joints``: those
     in the tree of bodies; ``others``: excluded contacts and equalities.

@@ -23,7 +23,7 @@ __all__ = ["Owner", "SimJoint", "SimLink", "SimModel"]
 
 
 class Owner(Protocol):
-    """What a model needs from the simulation."""
+    """The part of the simulation that a model uses."""
 
     forced: dict[str, None]
 
