@@ -8,6 +8,7 @@ counts come from /proc, so other load on the machine hardly changes them. Linux 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import socket
 import statistics
@@ -71,7 +72,9 @@ CASES = [
     Case("a node that spins", ("-c", NODE)),
     Case("a talker and a listener, 10 Hz", (), 10.0),
     Case("a talker and a listener, 1 kHz", (), 1000.0),
-    Case("the dashboard, no page open", ("minirospy", "dashboard", "--no-browser", "--port", "0"), in_ros=False),
+    Case(
+        "the dashboard, no page open", ("minirospy", "dashboard", "--no-browser", "--port", "0"), in_ros=False
+    ),
     Case("rosbridge, no client", ("minirospy", "bridge", "--port", "0"), in_ros=False),
 ]
 
@@ -145,7 +148,7 @@ def measure(stack: Stack, case: Case, seconds: float) -> dict[str, float]:
         return {
             "wake-ups/s": (after.wake_ups - before.wake_ups) / passed,
             "CPU s/hour": 3600 * cpu,
-            "CPU us/message": 1e6 * cpu / case.hz if case.hz else float("nan"),
+            "CPU us/message": 1e6 * cpu / case.hz if case.hz else math.nan,
             "PSS, MB": sum(each.memory_full_info().pss for each in everything) / 1e6,
         }
 
@@ -167,7 +170,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--cases", default="", help="only cases whose name contains this text")
     options = parser.parse_args()
-    has_ros = not subprocess.run(["/usr/bin/python3", "-c", "import rospy"], capture_output=True).returncode
+    probe = subprocess.run(["/usr/bin/python3", "-c", "import rospy"], check=False, capture_output=True)
 
     print(f"{'':32}{'':12}" + "".join(f"{column:>16}" for column in COLUMNS))
     for case in CASES:
@@ -176,11 +179,11 @@ def main() -> int:
         found: dict[str, list[dict[str, float]]] = defaultdict(list)
         for _ in range(options.rounds):
             for name, stack in STACKS.items():
-                if name == "minirospy" or (has_ros and case.in_ros):
+                if name == "minirospy" or (case.in_ros and not probe.returncode):
                     found[name].append(measure(stack, case, options.seconds))
         for name, rounds in found.items():
             values = [statistics.median(each[column] for each in rounds) for column in COLUMNS]
-            row = "".join(f"{'' if value != value else f'{value:,.1f}':>16}" for value in values)
+            row = "".join(f"{'' if math.isnan(value) else f'{value:,.1f}':>16}" for value in values)
             print(f"{case.name:32}{name:12}{row}", flush=True)
     return 0
 
