@@ -23,31 +23,8 @@ from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 
-TRANSLATED = (
-    "layout",
-    "topics",
-    "console",
-    "image",
-    "board",
-    "turtlesim",
-    "teleop",
-    "diagnostics",
-    "panels",
-    "publish",
-    "services",
-    "parameters",
-    "bag",
-    "launch",
-    "joints",
-    "reconfigure",
-    "nodes",
-    "actions",
-    "tf",
-    "smach",
-    "plot",
-    "graph",
-)
-"""The views that have German texts; add new ones here."""
+RVIZ_NAMES = {"3d"}
+"""The views that mostly have the names of RViz's displays and tools, which are not translated."""
 
 PAGE = Path(minirospy.web.dashboard.__file__).parent / "page"
 
@@ -111,7 +88,7 @@ def test_views_have_no_text_without_its_german_one(
     page.wait_text("#state", "connected")
     speak_german(page)
     page.evaluate("import('/js/texts.js').then(module => { window.missing = module.watchMissing(); })")
-    for view in TRANSLATED:
+    for view in sorted({*VIEWS} - RVIZ_NAMES):
         page.evaluate(f"location.hash = '#/{view}{SETTINGS.get(view, '')}'")
         page.wait(f"return document.getElementById('view').dataset.view === '{view}'")
         page.wait("return document.getElementById('view').children.length > 0")

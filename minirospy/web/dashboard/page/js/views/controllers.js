@@ -141,7 +141,7 @@ export class Controllers {
         h(
           "tr",
           {},
-          COLUMNS.map((each) => h("th", { scope: "col" }, t(each))),
+          COLUMNS.map((each) => h("th", { scope: "col" }, each && t(each))),
         ),
       ),
       this.body,
