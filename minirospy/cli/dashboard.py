@@ -99,6 +99,11 @@ def dashboard_parser() -> Parser:
         help=f"the layout to open, several views side by side: {', '.join(LAYOUTS)}",
         completer="dashboard_layouts",
     )
+    parser.add_argument(
+        "--embed",
+        action="store_true",
+        help="for a notebook on this machine, whose cells may show the page; ends when the standard input ends",
+    )
     return parser
 
 
@@ -207,6 +212,7 @@ def _dashboard(
     listen: bool,
     address: str,
     read_only: bool,
+    embed: bool,
     arguments: Sequence[str] = (),
 ) -> int:
     from minirospy.base.suggestions import did_you_mean
@@ -224,7 +230,7 @@ def _dashboard(
         raise Misuse(f"there is no view '{view}'{did_you_mean(view, names)}: there are {', '.join(names)}")
     fields = {"preset": [layout]} if layout else {}
     shown = "layout" if layout else view or "topics"
-    return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments)
+    return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments, embeds=embed)
 
 
 def _plugin(standalone: str) -> tuple[str, Fields]:
@@ -289,10 +295,13 @@ def _serve(
     arguments: Sequence[str],
     rviz_file: Path | None = None,
     node_name: str = "",
+    *,
+    embeds: bool = False,
 ) -> int:
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
 
     ``node_name`` is set by joint_state_publisher_gui, which publishes joints; the default is the dashboard's usual name.
+    ``embeds``: notebooks may embed the page, and the end of the standard input ends the dashboard.
     """
     from minirospy.web.serve import require_libraries
 
@@ -316,7 +325,7 @@ def _serve(
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
     if not is_loopback(address) and not listen:
         raise Misuse(f"--address {address} lets other machines connect: add --listen")
-    tokens = _tokens(Environment.read().home, must_be_kept=listen)
+    tokens = _tokens(Environment.read().home, must_be_kept=listen, must_be_new=embeds)
     access = Access(
         hosts=tuple(host_names()),
         read_token=tokens.read if listen or read_only else "",
@@ -344,7 +353,12 @@ def _serve(
                     name="minirospy dashboard",
                 )
                 self.dashboard = Dashboard(
-                    self._node, options, rviz_file, bags, publishes_joints=bool(node_name)
+                    self._node,
+                    options,
+                    rviz_file,
+                    bags,
+                    publishes_joints=bool(node_name),
+                    embeds=embeds,
                 )
                 self._opened.append(self.dashboard)
                 try:
@@ -375,11 +389,27 @@ def _serve(
             read_only=read_only,
         )
 
+    if embeds:
+        import threading
+
+        threading.Thread(target=_end_with_input, name="minirospy-stdin", daemon=True).start()
     return run(node_name or anonymous_name("minirospy_dashboard"), arguments, start, announce)
 
 
-def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
+def _end_with_input() -> None:
+    """End this process, as by SIGTERM, when its standard input ends."""
+    import os
+    import signal
+
+    while os.read(0, 4096):
+        pass
+    signal.raise_signal(signal.SIGTERM)
+
+
+def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
     """Return this user's tokens. Unless ``must_be_kept`` is set, return new ones if they cannot be stored in ROS_HOME.
+
+    ``must_be_new``: return tokens for this process only, because a notebook that is saved contains the token.
 
     Even on loopback, the page needs the token to start programs and open files, because other users of the machine can
     connect.
@@ -388,6 +418,8 @@ def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
     from minirospy.web.access import new_token
     from minirospy.web.tokens import Tokens, kept_tokens
 
+    if must_be_new and not must_be_kept:
+        return Tokens(new_token(), new_token())
     try:
         return kept_tokens(home)
     except BridgeError:

@@ -31,6 +31,8 @@ import { Topics } from "./views/topics.js";
 import { Trajectory } from "./views/trajectory.js";
 import { Turtlesim } from "./views/turtlesim.js";
 
+if (window.parent !== window) document.documentElement.classList.add("embedded");
+
 const VIEWS = {
   topics: ["Topics", Topics],
   console: ["Console", Console],
