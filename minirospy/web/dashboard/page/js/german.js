@@ -229,6 +229,11 @@ export const GERMAN = {
   "there is no service {name}, or it may not be called":
     "es gibt keinen Service {name}, oder er darf nicht aufgerufen werden",
   "the connection is lost": "die Verbindung ist verloren",
+  "a token is required: the bridge prints it when it starts": "ein Token ist nötig: die Bridge gibt es beim Start aus",
+  "this token is wrong: the bridge prints the right one when it starts":
+    "dieses Token ist falsch: die Bridge gibt das richtige beim Start aus",
+  "Open the link that the command has printed: it contains the token. `minirospy bridge --show-tokens` prints it, too.":
+    "Öffne den Link, den der Befehl ausgegeben hat: er enthält das Token. Auch `minirospy bridge --show-tokens` gibt es aus.",
   "publishing is not allowed: this token is read-only": "Senden ist nicht erlaubt: dieses Token darf nur lesen",
   "{name}: write an array, as {example}": "{name}: eine Liste schreiben, wie {example}",
   "An array, as {example}": "Eine Liste, wie {example}",

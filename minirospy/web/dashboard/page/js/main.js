@@ -67,6 +67,9 @@ const STATES = {
   refused: "no connection, trying again …",
 };
 
+const TOKEN_ADVICE =
+  "Open the link that the command has printed: it contains the token. `minirospy bridge --show-tokens` prints it, too.";
+
 const token = await takeToken();
 const link = new Link(token);
 const tabs = document.getElementById("tabs");
@@ -149,6 +152,15 @@ function showState() {
   element.dataset.state = link.state;
 }
 
+/** Show why the server refuses the page, as long as it does. */
+async function showRefusal() {
+  const isRefused = link.state === "refused" || link.state === "lost";
+  const found = isRefused ? await link.refusal() : null;
+  if (!found) return link.emit("withdrawn", ["refusal"]);
+  const advice = found.status === 401 ? ` ${t(TOKEN_ADVICE)}` : "";
+  showNotice({ message: `${t(found.text)}.${advice}`, level: 2, id: "refusal" });
+}
+
 function showNotice({ message, level = 1, id = null }) {
   const key = id ?? message;
   const known = [...notices.children].find((each) => keyOf(each) === key);
@@ -226,6 +238,7 @@ for (const [name, [title]] of Object.entries(VIEWS)) {
 }
 showLanguage();
 link.watch(["state"], showState);
+link.watch(["state"], showRefusal);
 link.addEventListener("notice", (/** @type {any} */ { detail }) => showNotice(detail));
 link.addEventListener("withdrawn", (/** @type {any} */ { detail }) => {
   for (const notice of [...notices.children]) if (detail.includes(keyOf(notice))) notice.remove();
