@@ -228,6 +228,18 @@ export const GERMAN = {
   "the message is longer than its definition": "die Nachricht ist länger als ihre Definition",
   "there is no service {name}, or it may not be called":
     "es gibt keinen Service {name}, oder er darf nicht aufgerufen werden",
+  "Look": "Ansehen",
+  "Drive": "Steuern",
+  "System": "System",
+  "Files": "Dateien",
+  "view": "Ansicht",
+  "layout": "Layout",
+  "service": "Service",
+  "Matches": "Treffer",
+  "Find a view, topic, service or node": "Eine Ansicht, ein Topic, einen Service oder Node suchen",
+  "Find a view, topic, service or node (Ctrl-K)": "Eine Ansicht, ein Topic, einen Service oder Node suchen (Strg-K)",
+  "View, topic, service or node": "Ansicht, Topic, Service oder Node",
+  "Nothing has this name.": "Nichts hat diesen Namen.",
   "the connection is lost": "die Verbindung ist verloren",
   "a token is required: the bridge prints it when it starts": "ein Token ist nötig: die Bridge gibt es beim Start aus",
   "this token is wrong: the bridge prints the right one when it starts":
