@@ -18,6 +18,7 @@ PACKAGE = Path(__file__).parents[1] / "minirospy"
 
 LAYERS = [
     {"cli"},
+    {"notebook"},
     {"web", "fleet", "ros2"},
     {"zenoh"},
     {"ros"},
@@ -61,7 +62,7 @@ SIMULATION_PACKAGES = [
 ]
 """The packages of the simulation, which depend on each other."""
 LEAVES = {
-    **{room: [room] for room in ("web", "fleet", "ros2")},
+    **{room: [room] for room in ("web", "fleet", "ros2", "notebook")},
     "ROS packages": [f"ros/{package}" for package in OPTIONAL_PACKAGES],
     "ros_control": ["core/control", *(f"ros/{package}" for package in CONTROL_PACKAGES)],
     "gazebo_ros_control": ["ros/gazebo_ros_control"],
@@ -70,7 +71,7 @@ LEAVES = {
     "bags of version 1.2": ["core/bag/reader12.py"],
 }
 """Parts that can be deleted, with their paths. Nothing outside a part imports it, except for functions in `cli/` that run it."""
-LEAVES_OF_LEAVES = {"gazebo_ros_control": {"ros_control", "simulation"}}
+LEAVES_OF_LEAVES = {"gazebo_ros_control": {"ros_control", "simulation"}, "notebook": {"web"}}
 """Leaves that import other leaves, and are deleted together with them."""
 LEAF_PATHS = sorted(path for paths in LEAVES.values() for path in paths)
 SYSTEM_PACKAGES = {"catkin", "catkin_pkg", "python_orocos_kdl", "rospkg"}

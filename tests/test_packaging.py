@@ -82,11 +82,11 @@ def test_every_extra_that_is_named_exists() -> None:
         for name in names.split(",")
     }
     assert named <= extras
-    # All extras except those for development and the site, the GPIO that hides the virtual board, and those that lack
-    # a wheel on some system.
+    # All extras except those for development and the site, the GPIO that hides the virtual board, the large one for
+    # notebooks, and those that lack a wheel on some system.
     assert set(
         re.findall(r'^all = \["minirospy\[(.*)\]"\]', table, flags=re.MULTILINE)[0].split(",")
-    ) == extras - {"all", "dev", "docs", "fleet", "pi", "sim"}
+    ) == extras - {"all", "dev", "docs", "fleet", "notebook", "pi", "sim"}
 
 
 @pytest.mark.timeout(180)

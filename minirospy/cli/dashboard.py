@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.cli.windows import WINDOWS, view_of_plugin
 from minirospy.command.parser import Misuse, Parser
@@ -20,6 +20,25 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
 
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
+
+
+class Serving(NamedTuple):
+    """The options of all commands that open the page: where it is served, and for whom."""
+
+    port: int | None
+    no_browser: bool
+    listen: bool
+    address: str
+    read_only: bool
+    cert: str
+    key: str
+    host_name: Sequence[str]
+    origin: Sequence[str]
+
+    @property
+    def bound(self) -> str:
+        """Return the address to listen at."""
+        return self.address or ("0.0.0.0" if self.listen else "127.0.0.1")
 
 
 def dashboard(argv: Sequence[str] | None = None) -> int:
@@ -68,6 +87,30 @@ def _parser(name: str, what: str) -> Parser:
     parser.add_argument(
         "--read-only", action="store_true", help="let nobody publish, call services or set parameters"
     )
+    parser.add_argument(
+        "--cert",
+        default="",
+        metavar="FILE",
+        help="serve https with this certificate (PEM)",
+        completer="files",
+    )
+    parser.add_argument("--key", default="", metavar="FILE", help="its key (PEM)", completer="files")
+    parser.add_argument(
+        "--host-name",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a name by which browsers reach the page, as that of a proxy in front of it",
+        completer="nothing",
+    )
+    parser.add_argument(
+        "--origin",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="other pages that may connect, as https://*.example.org",
+        completer="nothing",
+    )
     return parser
 
 
@@ -98,6 +141,11 @@ def dashboard_parser() -> Parser:
         default="",
         help=f"the layout to open, several views side by side: {', '.join(LAYOUTS)}",
         completer="dashboard_layouts",
+    )
+    parser.add_argument(
+        "--embed",
+        action="store_true",
+        help="for a notebook on this machine, whose cells may show the page; ends when the standard input ends",
     )
     return parser
 
@@ -158,19 +206,10 @@ def _window(
             add_arguments(parser)
         return parser
 
-    def body(
-        *,
-        port: int | None,
-        no_browser: bool,
-        listen: bool,
-        address: str,
-        read_only: bool,
-        arguments: Sequence[str] = (),
-        ignored: object = None,
-        **own: object,
-    ) -> int:
-        shown, fields = chosen(**own) if chosen else (view, {})
-        return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments)
+    def body(*, arguments: Sequence[str] = (), ignored: object = None, **given: Any) -> int:
+        serving = Serving(*(given.pop(field) for field in Serving._fields))
+        shown, fields = chosen(**given) if chosen else (view, {})
+        return _serve(shown, fields, serving, arguments)
 
     return Command(name, make_parser, body)
 
@@ -199,16 +238,7 @@ def _rviz_parser() -> Parser:
     return parser
 
 
-def _dashboard(
-    view: str,
-    layout: str,
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    arguments: Sequence[str] = (),
-) -> int:
+def _dashboard(view: str, layout: str, embed: bool, arguments: Sequence[str] = (), **serving: Any) -> int:
     from minirospy.base.suggestions import did_you_mean
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
@@ -224,7 +254,7 @@ def _dashboard(
         raise Misuse(f"there is no view '{view}'{did_you_mean(view, names)}: there are {', '.join(names)}")
     fields = {"preset": [layout]} if layout else {}
     shown = "layout" if layout else view or "topics"
-    return _serve(shown, fields, port, no_browser, listen, address, read_only, arguments)
+    return _serve(shown, fields, Serving(**serving), arguments, embeds=embed)
 
 
 def _plugin(standalone: str) -> tuple[str, Fields]:
@@ -258,13 +288,9 @@ def _nodes(node_name: Sequence[str]) -> tuple[str, Fields]:
 def _rviz(
     display_config: str,
     fixed_frame: str,
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
     arguments: Sequence[str] = (),
     ignored: object = None,
+    **serving: Any,
 ) -> int:
     from minirospy.web.dashboard.rviz_endpoint import read_file
 
@@ -272,7 +298,7 @@ def _rviz(
     if file and read_file(file) is None:
         print(f"rviz: {file} does not exist: it is made when it is saved", file=sys.stderr)
     fields = {"file": ["1"] if file else [], "frame": [fixed_frame] if fixed_frame else []}
-    return _serve("3d", fields, port, no_browser, listen, address, read_only, arguments, file)
+    return _serve("3d", fields, Serving(**serving), arguments, file)
 
 
 # --- page
@@ -280,22 +306,22 @@ def _rviz(
 
 def _serve(
     view: str,
-    fields: Mapping[str, Sequence[str]],
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
+    fields: Fields,
+    serving: Serving,
     arguments: Sequence[str],
     rviz_file: Path | None = None,
     node_name: str = "",
+    *,
+    embeds: bool = False,
 ) -> int:
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
 
     ``node_name`` is set by joint_state_publisher_gui, which publishes joints; the default is the dashboard's usual name.
+    ``embeds``: notebooks may embed the page, and the end of the standard input ends the dashboard.
     """
     from minirospy.web.serve import require_libraries
 
+    port, listen, read_only = serving.port, serving.listen, serving.read_only
     if port is not None and not 0 <= port <= 65535:
         raise Misuse(f"--port {port} is not between 0 and 65535")
     require_libraries()
@@ -313,12 +339,12 @@ def _serve(
     # Bags named on the command line may be in any folder, not only below the working folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
-    address = address or ("0.0.0.0" if listen else "127.0.0.1")
-    if not is_loopback(address) and not listen:
-        raise Misuse(f"--address {address} lets other machines connect: add --listen")
-    tokens = _tokens(Environment.read().home, must_be_kept=listen)
+    if not is_loopback(serving.bound) and not listen:
+        raise Misuse(f"--address {serving.address} lets other machines connect: add --listen")
+    tokens = _tokens(Environment.read().home, must_be_kept=listen, must_be_new=embeds)
     access = Access(
-        hosts=tuple(host_names()),
+        hosts=(*host_names(), *serving.host_name),
+        origins=tuple(serving.origin),
         read_token=tokens.read if listen or read_only else "",
         write_token="" if read_only else tokens.write,
         requires_token=listen,
@@ -337,14 +363,21 @@ def _serve(
         async def start(self) -> None:
             for each in (PORT, 0) if port is None else (port,):
                 options = BridgeOptions(
-                    address=address,
+                    address=serving.bound,
                     foxglove_port=each,
                     access=access,
+                    certificate=serving.cert,
+                    key=serving.key,
                     diagnostics=False,
                     name="minirospy dashboard",
                 )
                 self.dashboard = Dashboard(
-                    self._node, options, rviz_file, bags, publishes_joints=bool(node_name)
+                    self._node,
+                    options,
+                    rviz_file,
+                    bags,
+                    publishes_joints=bool(node_name),
+                    embeds=embeds,
                 )
                 self._opened.append(self.dashboard)
                 try:
@@ -363,23 +396,29 @@ def _serve(
         return Started(node)
 
     def announce(started: Started) -> None:
-        _announce(
-            address,
-            started.dashboard.port,
-            view,
-            fields,
-            tokens,
-            started.dashboard.codes,
-            no_browser=no_browser,
-            listen=listen,
-            read_only=read_only,
-        )
+        _announce(serving, started.dashboard.port, view, fields, tokens, started.dashboard.codes)
 
+    if embeds:
+        import threading
+
+        threading.Thread(target=_end_with_input, name="minirospy-stdin", daemon=True).start()
     return run(node_name or anonymous_name("minirospy_dashboard"), arguments, start, announce)
 
 
-def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
+def _end_with_input() -> None:
+    """End this process, as by SIGTERM, when its standard input ends."""
+    import os
+    import signal
+
+    while os.read(0, 4096):
+        pass
+    signal.raise_signal(signal.SIGTERM)
+
+
+def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
     """Return this user's tokens. Unless ``must_be_kept`` is set, return new ones if they cannot be stored in ROS_HOME.
+
+    ``must_be_new``: return tokens for this process only, because a notebook that is saved contains the token.
 
     Even on loopback, the page needs the token to start programs and open files, because other users of the machine can
     connect.
@@ -388,6 +427,8 @@ def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
     from minirospy.web.access import new_token
     from minirospy.web.tokens import Tokens, kept_tokens
 
+    if must_be_new and not must_be_kept:
+        return Tokens(new_token(), new_token())
     try:
         return kept_tokens(home)
     except BridgeError:
@@ -396,37 +437,33 @@ def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
         return Tokens(new_token(), new_token())
 
 
-def _announce(
-    address: str,
-    port: int,
-    view: str,
-    fields: Mapping[str, Sequence[str]],
-    tokens: Tokens,
-    codes: Codes,
-    *,
-    no_browser: bool,
-    listen: bool,
-    read_only: bool,
-) -> None:
+def _announce(serving: Serving, port: int, view: str, fields: Fields, tokens: Tokens, codes: Codes) -> None:
     from minirospy.web.addresses import own_addresses, qr_code
     from minirospy.web.dashboard.views import link
 
+    address = serving.bound
     is_any = address in ("0.0.0.0", "::")
+    encrypted = bool(serving.cert)
     # Do not use localhost: a browser may try ::1 first, and another user's program may listen on this port there.
     host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
     # A local user's link has the same rights as the user's own programs.
-    own = tokens.read if read_only else tokens.write
-    here = link(host, port, view, fields, token=own)
-    is_opened = not no_browser and _open_browser(partial(link, host, port, view, fields), own, codes)
+    own = tokens.read if serving.read_only else tokens.write
+    address_of = partial(link, host, port, view, fields, encrypted=encrypted)
+    here = address_of(token=own)
+    is_opened = not serving.no_browser and _open_browser(address_of, own, codes)
     print(f"{'The browser opens' if is_opened else 'Open in a browser:'} {here}", flush=True)
-    if not listen:
+    if not serving.listen:
         return
     reached = own_addresses() if is_any else [address]
-    for rights, token in (("read-only", tokens.read), ("read-write", "" if read_only else tokens.write)):
+    for rights, token in (
+        ("read-only", tokens.read),
+        ("read-write", "" if serving.read_only else tokens.write),
+    ):
         for each in reached if token else ():
-            print(f"from other machines, {rights}: {link(each, port, view, fields, token=token)}")
+            there = link(each, port, view, fields, token=token, encrypted=encrypted)
+            print(f"from other machines, {rights}: {there}")
     if reached and sys.stdout.isatty():
-        print(qr_code(link(reached[0], port, view, fields, token=tokens.read)), end="")
+        print(qr_code(link(reached[0], port, view, fields, token=tokens.read, encrypted=encrypted)), end="")
     sys.stdout.flush()
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from functools import partial
+from typing import Any
 
-from minirospy.cli.dashboard import _main, _parser, _serve
+from minirospy.cli.dashboard import Serving, _main, _parser, _serve
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Command
 
@@ -57,19 +57,8 @@ def _joint_parser() -> Parser:
     return parser
 
 
-def _joint_body(
-    *,
-    port: int | None,
-    no_browser: bool,
-    listen: bool,
-    address: str,
-    read_only: bool,
-    page: bool,
-    terminal: bool,
-    arguments: Sequence[str] = (),
-) -> int:
-    serve = partial(_serve, "joints", {}, port, no_browser, listen, address, read_only, arguments)
-    return serve(node_name=_NAME)
+def _joint_body(*, page: bool, terminal: bool, arguments: Sequence[str] = (), **serving: Any) -> int:
+    return _serve("joints", {}, Serving(**serving), arguments, node_name=_NAME)
 
 
 JOINT_STATE_PUBLISHER_GUI = Command(_NAME, _joint_parser, _joint_body)

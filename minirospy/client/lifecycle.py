@@ -78,6 +78,7 @@ class Lifecycle:
         self.interrupts: list[Callable[[], object]] = []
         """called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls"""
 
+        self.spin_shuts_down = True  # False in a notebook: an interrupt ends spin(), not the node
         self.has_waited = False  # True after a thread has waited or slept in a rospy call
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
@@ -140,10 +141,12 @@ class Lifecycle:
         return _Interrupting(self, interrupt)
 
     def spin(self) -> None:
-        """Wait until the node shuts down."""
+        """Wait until the node shuts down. An interrupt shuts it down; in a notebook, it is raised and the node continues."""
         try:
             wait_for_event(self.shutting_down, None)
         except KeyboardInterrupt:
+            if not self.spin_shuts_down:
+                raise
             self.signal_shutdown("keyboard interrupt")
         self.poll_shutdown()
 

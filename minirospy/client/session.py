@@ -52,6 +52,8 @@ class Session:
         self._reported: set[str] = set()  # names of handles that :meth:`report_fork` has already reported
         self.identity: Identity = Identity(previous.identity if previous else None)
         self.lifecycle = Lifecycle(self._leave)
+        if previous:
+            self.lifecycle.spin_shuts_down = previous.lifecycle.spin_shuts_down
         self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
 
         self.callback_errors = CallbackErrors()

@@ -145,6 +145,10 @@ def test_codec_of_the_page_decodes_values_and_refuses_invalid_bytes() -> None:
 # --- the page
 
 
+CONNECTION_ERRORS = ("WebSocket connection", "status of 401", "net::ERR_CONNECTION_REFUSED")
+"""What the browser logs while a server is gone or refuses the page."""
+
+
 @pytest.fixture
 def browse() -> Iterator[Callable[..., Page]]:
     """Return a function that opens a page; assert at teardown that no page logged an error."""
@@ -158,7 +162,7 @@ def browse() -> Iterator[Callable[..., Page]]:
     errors = []
     for page in opened:
         page.evaluate("1")  # after this call, errors logged before it have arrived
-        errors += [each for each in page.errors if "WebSocket connection" not in each]
+        errors += [each for each in page.errors if not any(text in each for text in CONNECTION_ERRORS)]
         page.close()
     assert errors == []
 

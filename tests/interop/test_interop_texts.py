@@ -169,13 +169,21 @@ def test_tab_goes_through_the_page_in_the_order_that_is_seen(
     page.wait_text("#state", "connected")
     page.evaluate("document.activeElement.blur()")
     seen = []
-    for _ in range(len(VIEWS) + 9):
+    groups = ["Look", "Drive", "System · Parameters", "Files"]
+    for _ in range(len(VIEWS) + len(groups) + 10):
         press_key(page, "Tab", 9)
         name, is_visible, outline = page.evaluate(FOCUSED)
         assert is_visible, name
         assert outline != "none", name
         seen.append(name)
-    shell = ["skip", "minirospy", *VIEWS, "language", "help", "theme"]
+    # A group's menu opens when its button has the focus.
+    menus = page.evaluate(
+        "[...document.querySelectorAll('.views')].flatMap(group =>"
+        " [group.firstChild.textContent, ...[...group.querySelectorAll('a')].map(each => each.dataset.view)])"
+    )
+    assert [each for each in menus if each not in VIEWS] == groups
+    assert sorted(each for each in menus if each in VIEWS) == sorted(VIEWS)
+    shell = ["skip", "minirospy", *menus, "find", "language", "help", "theme"]
     assert seen[: len(shell)] == shell
     assert seen[len(shell) :][0] == "Filter"
     assert seen[-1] in ("Set", "Its value", "Name of a new parameter")
@@ -244,3 +252,35 @@ def test_quoted_text_does_not_change_the_direction_around_it() -> None:
     (found,) = page_functions(("dom", "quoted", [text]))
     assert found == '"a\\"\\u202eb\\u2067\\u200f\u05d0"'
     assert json.loads(found) == text
+
+
+@needs_chromium
+def test_views_are_in_groups_and_found_by_typing(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    served.run(publisher(served, "/button_state", Bool, latch=True).publish(True))
+    page = browse(address(served, "topics"))
+    page.wait_text("#state", "connected")
+    page.wait_text("nav .current", "Look · Topics")
+    page.wait_text(".topic", "/button_state")
+
+    page.click("nav .views:has(a[data-view='bag']) > button", "Files")
+    page.click("nav a[data-view='bag']", "Bags")
+    page.wait_text("nav .current", "Files · Bags")
+    page.wait(
+        "return getComputedStyle(document.querySelector('a[data-view=bag]').parentElement).display === 'none'"
+    )
+
+    for kind in ("rawKeyDown", "keyUp"):
+        page.call("Input.dispatchKeyEvent", type=kind, key="k", windowsVirtualKeyCode=75, modifiers=2)
+    page.type("dialog.palette input", "butt")
+    page.wait_text(".palette li[aria-selected=true]", "/button_state")
+    press_key(page, "Enter", 13, "\r")
+    page.wait_text("nav .current", "Look · Topics")
+    assert page.evaluate("location.hash") == "#/topics?open=%2Fbutton_state"
+    page.click("#find")
+    page.type("dialog.palette input", "nothing like this")
+    page.wait_text(".palette .none", "Nothing has this name.")
+    press_key(page, "Escape", 27)
+    page.wait("return !document.querySelector('dialog.palette')")

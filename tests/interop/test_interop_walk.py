@@ -166,6 +166,7 @@ def walk(page: Page, check: str = "[]") -> list[str]:
     wrong = []
     for _ in range(2):
         for view in VIEWS:
+            page.click(f"nav .views:has(a[data-view='{view}']) > button")
             page.click(f"nav a[data-view='{view}']")
             page.wait(f"return document.getElementById('view').dataset.view === '{view}'")
             use(page, view)

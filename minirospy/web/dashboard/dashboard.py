@@ -34,12 +34,13 @@ class Dashboard:
         bags: BagFolder | None = None,
         *,
         publishes_joints: bool = False,
+        embeds: bool = False,
     ) -> None:
         """Create the dashboard.
 
         ``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``. ``bags``: the
         bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish joints like
-        joint_state_publisher_gui, even if no page is open.
+        joint_state_publisher_gui, even if no page is open. ``embeds``: notebooks on this machine may embed the page.
         """
         master_uri = node.master_uri
         self.codes = Codes()
@@ -52,7 +53,7 @@ class Dashboard:
         driving = DriveEndpoint(lambda: self.bridge.graph)
         own = (self.rviz, self.bags, self.launches, self._joints)
         endpoints = (self._board, self._tools, driving, *own)
-        pages = {**handlers(read_folder()), "/token": self.codes.serve}
+        pages = {**handlers(read_folder(), embeds=embeds), "/token": self.codes.serve}
         self.bridge = Bridge(node, options, extras=Extras(endpoints, pages))
 
     @property

@@ -41,6 +41,10 @@ SECURITY = {
 """The page's security headers: no inline scripts, no content from other sites, no embedding in other pages."""
 
 
+_NOTEBOOKS = "http://localhost:* http://127.0.0.1:* https://localhost:* https://127.0.0.1:* vscode-webview: vscode-file:"
+"""The origins of notebooks on this machine: JupyterLab and Jupyter Notebook, and VS Code's."""
+
+
 @dataclass(frozen=True)
 class PageFile:
     """A file: its bytes, its gzip-compressed bytes, its media type and its ETag."""
@@ -66,14 +70,20 @@ def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
     return found
 
 
-def handlers(files: Mapping[str, PageFile]) -> dict[str, HttpHandler]:
-    """Return the request handler for each file."""
-    return {path: partial(_serve, file) for path, file in files.items()}
+def handlers(files: Mapping[str, PageFile], *, embeds: bool = False) -> dict[str, HttpHandler]:
+    """Return the request handler for each file. ``embeds``: notebooks on this machine may embed the page."""
+    security = dict(SECURITY)
+    if embeds:
+        policy = security["Content-Security-Policy"]
+        security["Content-Security-Policy"] = policy.replace(
+            "frame-ancestors 'none'", f"frame-ancestors {_NOTEBOOKS}"
+        )
+    headers = {name.replace("-", "_"): value for name, value in security.items()}
+    return {path: partial(_serve, file, headers) for path, file in files.items()}
 
 
-def _serve(file: PageFile, exchange: Exchange) -> None:
-    headers = {name.replace("-", "_"): value for name, value in SECURITY.items()}
-    headers |= {"ETag": file.tag, "Vary": "Accept-Encoding"}
+def _serve(file: PageFile, security: Mapping[str, str], exchange: Exchange) -> None:
+    headers = {**security, "ETag": file.tag, "Vary": "Accept-Encoding"}
     if file.tag in exchange.request.headers.get("if-none-match", ""):
         exchange.respond(304, b"", file.content_type, **headers)
     elif "gzip" in exchange.request.headers.get("accept-encoding", ""):

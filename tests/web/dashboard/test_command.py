@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import re
 import signal
+import ssl
 import stat
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from collections.abc import Iterator
 from http.client import HTTPConnection
 from pathlib import Path
 from urllib.parse import urlsplit
-from urllib.request import url2pathname
+from urllib.request import url2pathname, urlopen
 
 import pytest
 
@@ -20,6 +21,7 @@ from minirospy.cli import dashboard as command
 from minirospy.web.dashboard import browser
 from minirospy.web.dashboard.browser import has_screen, open_link
 from minirospy.workspace.packages import Packages
+from tests.web.test_web import make_certificate
 
 
 @pytest.fixture
@@ -96,6 +98,34 @@ def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.P
         "127.0.0.1",
     )
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#/topics\?token=[\w-]{22}", link)
+
+
+def test_certificate_makes_the_link_https(started: list[subprocess.Popen[str]], tmp_path: Path) -> None:
+    certificate, key = make_certificate(tmp_path)
+    link = link_of(
+        started,
+        *("-m", "minirospy", "dashboard", "--no-browser", "--port", "0"),
+        *("--cert", str(certificate), "--key", str(key)),
+    )
+    assert link.startswith("https://127.0.0.1:")
+    context = ssl.create_default_context(cafile=str(certificate))
+    with urlopen(link.partition("#")[0], timeout=60, context=context) as answer:
+        assert answer.status == 200
+
+
+def test_host_name_of_a_proxy_is_accepted(started: list[subprocess.Popen[str]]) -> None:
+    link = link_of(
+        started,
+        *("-m", "minirospy", "dashboard", "--no-browser", "--port", "0", "--host-name", "robots.example"),
+    )
+    port = urlsplit(link).port
+    statuses = []
+    for host in ("robots.example", "others.example"):
+        connection = HTTPConnection("127.0.0.1", port, timeout=60)
+        connection.request("GET", "/", headers={"Host": host})
+        statuses.append(connection.getresponse().status)
+        connection.close()
+    assert statuses == [200, 403]
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import inspect
 import re
 
 from minirospy.ros.robot_state_publisher import joint_parameters
+from minirospy.web import access
 from minirospy.web.dashboard.files import FOLDER
 
 JS = FOLDER / "js"
@@ -48,6 +49,7 @@ def test_every_translation_is_used_and_has_the_same_values() -> None:
     known |= literals(
         inspect.getsource(joint_parameters)
     )  # the view Joints shows the reason if there are no joints
+    known |= literals(inspect.getsource(access))  # the page shows why the server refuses it
     for text, translation in german().items():
         assert text in known, text
         assert sorted(re.findall(r"\{\w+\}", text)) == sorted(re.findall(r"\{\w+\}", translation)), text

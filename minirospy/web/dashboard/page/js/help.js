@@ -7,6 +7,7 @@ const KEYS = [
   ["?", "This list"],
   [", .", "The view before and after this one"],
   ["/", "To the filter of the view"],
+  ["Ctrl K", "Find a view, topic, service or node"],
   ["Tab, Enter, Space", "To the next button or field, and press it"],
   ["← ↑ ↓ →  W A S D", "Teleop: drive while they are held"],
   ["1 2", "Board: press its buttons while they are held"],
@@ -47,8 +48,8 @@ export function openHelp() {
   dialog.showModal();
 }
 
-/** Listen for the keys of the whole page; step(1 or -1) shows another view. */
-export function listenForKeys(step) {
+/** Listen for the keys of the whole page; step(1 or -1) shows another view, find() opens the palette. */
+export function listenForKeys(step, find) {
   const react = {
     "?": openHelp,
     ",": () => step(-1),
@@ -61,6 +62,11 @@ export function listenForKeys(step) {
     },
   };
   addEventListener("keydown", (event) => {
+    if ((event.ctrlKey || event.metaKey) && !event.altKey && event.key.toLowerCase() === "k") {
+      event.preventDefault();
+      find();
+      return;
+    }
     if (
       !Object.hasOwn(react, event.key) ||
       event.ctrlKey ||

@@ -28,9 +28,17 @@ export class Link extends EventTarget {
     this.worker.postMessage({ command: "connect", url: this.address(), protocols: this.protocols("foxglove.sdk.v1") });
   }
 
-  /** Return the address of the WebSocket: the page's own server. */
+  /** Return the address of the WebSocket: the page's own server, also below a path of a proxy. */
   address(query = "") {
-    return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/${query}`;
+    const folder = location.pathname.slice(0, location.pathname.lastIndexOf("/") + 1);
+    return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${folder}${query}`;
+  }
+
+  /** Return the status and the reason if the server refuses this page, else null. A WebSocket does not tell. */
+  async refusal() {
+    const headers = this.token ? { authorization: `Bearer ${this.token}` } : {};
+    const answer = await fetch("status", { headers }).catch(() => null);
+    return answer && !answer.ok ? { status: answer.status, text: (await answer.text()).trim() } : null;
   }
 
   protocols(name) {

@@ -2,6 +2,8 @@
 
 import { addressOf, fragmentOf } from "./address.js";
 import { listenForKeys, openHelp } from "./help.js";
+import { entriesOf, openPalette } from "./palette.js";
+import { PRESETS } from "./presets.js";
 import { LANGUAGES, chooseLanguage, language, t } from "./texts.js";
 import { Link } from "./link.js";
 import { fill, h, setText, watchPresses } from "./dom.js";
@@ -31,33 +33,36 @@ import { Topics } from "./views/topics.js";
 import { Trajectory } from "./views/trajectory.js";
 import { Turtlesim } from "./views/turtlesim.js";
 
+if (window.parent !== window) document.documentElement.classList.add("embedded");
+
 const VIEWS = {
-  topics: ["Topics", Topics],
-  console: ["Console", Console],
-  plot: ["Plot", Plot],
-  graph: ["Graph", Graph],
-  image: ["Image", Image],
-  "3d": ["3D", Scene],
-  tf: ["Frames", Tf],
-  board: ["Board", Board],
-  turtlesim: ["Turtlesim", Turtlesim],
-  teleop: ["Teleop", Teleop],
-  publish: ["Publish", Publish],
-  services: ["Services", Services],
-  actions: ["Actions", Actions],
-  parameters: ["Parameters", Parameters],
-  reconfigure: ["Reconfigure", Reconfigure],
-  nodes: ["Nodes", Nodes],
-  launch: ["Launch", Launch],
-  bag: ["Bags", Bag],
-  joints: ["Joints", Joints],
-  controllers: ["Controllers", Controllers],
-  trajectory: ["Trajectory", Trajectory],
-  smach: ["State machines", Smach],
-  diagnostics: ["Diagnostics", Diagnostics],
-  panels: ["Panels", Panels],
-  layout: ["Layouts", Layouts],
+  topics: ["Topics", Topics, "Look"],
+  console: ["Console", Console, "Look"],
+  plot: ["Plot", Plot, "Look"],
+  graph: ["Graph", Graph, "Look"],
+  image: ["Image", Image, "Look"],
+  "3d": ["3D", Scene, "Look"],
+  tf: ["Frames", Tf, "Look"],
+  board: ["Board", Board, "System"],
+  turtlesim: ["Turtlesim", Turtlesim, "Drive"],
+  teleop: ["Teleop", Teleop, "Drive"],
+  publish: ["Publish", Publish, "Drive"],
+  services: ["Services", Services, "Drive"],
+  actions: ["Actions", Actions, "Drive"],
+  parameters: ["Parameters", Parameters, "System"],
+  reconfigure: ["Reconfigure", Reconfigure, "System"],
+  nodes: ["Nodes", Nodes, "System"],
+  launch: ["Launch", Launch, "Files"],
+  bag: ["Bags", Bag, "Files"],
+  joints: ["Joints", Joints, "Drive"],
+  controllers: ["Controllers", Controllers, "Drive"],
+  trajectory: ["Trajectory", Trajectory, "Drive"],
+  smach: ["State machines", Smach, "System"],
+  diagnostics: ["Diagnostics", Diagnostics, "Look"],
+  panels: ["Panels", Panels, "Look"],
+  layout: ["Layouts", Layouts, "Look"],
 };
+const GROUPS = ["Look", "Drive", "System", "Files"];
 const STATES = {
   connecting: "connecting …",
   open: "connected",
@@ -65,12 +70,16 @@ const STATES = {
   refused: "no connection, trying again …",
 };
 
+const TOKEN_ADVICE =
+  "Open the link that the command has printed: it contains the token. `minirospy bridge --show-tokens` prints it, too.";
+
 const token = await takeToken();
 const link = new Link(token);
 const tabs = document.getElementById("tabs");
 const main = document.getElementById("view");
 const notices = document.getElementById("notices");
 const viewOf = (/** @type {any} */ tab) => tab.dataset.view;
+const groupOf = (/** @type {any} */ group) => group.dataset.group;
 const keyOf = (/** @type {any} */ notice) => notice.dataset.key;
 let current = null;
 let shown = null; // the place of the current view
@@ -133,18 +142,78 @@ function route() {
   current = new View(link, words, main, shown);
   document.title = `${t(title)} · minirospy`;
   setText(document.getElementById("title"), t(title));
-  for (const tab of tabs.children) {
-    if (viewOf(tab) === chosen) {
-      tab.setAttribute("aria-current", "page");
-      tab.scrollIntoView({ block: "nearest", inline: "center" });
-    } else tab.removeAttribute("aria-current");
+  showTabs();
+}
+
+/** Name the groups of views and the views; the current view's group has its name, too. */
+function showTabs() {
+  for (const group of tabs.children) {
+    const [button, menu] = group.children;
+    let name = t(groupOf(group));
+    for (const tab of menu.children) {
+      const title = t(VIEWS[viewOf(tab)][0]);
+      setText(tab, title);
+      if (viewOf(tab) === main.dataset.view) {
+        tab.setAttribute("aria-current", "page");
+        name += ` · ${title}`;
+      } else tab.removeAttribute("aria-current");
+    }
+    setText(button, name);
+    button.classList.toggle("current", Boolean(menu.querySelector("[aria-current]")));
   }
+}
+
+/** Return a group of views: a button, and the menu that opens while the pointer or the focus is on it. */
+function makeGroup(name) {
+  const views = Object.entries(VIEWS).filter(([, [, , group]]) => group === name);
+  const group = h(
+    "div",
+    { class: "views", onmouseleave: () => group.classList.remove("closed") },
+    h("button", { type: "button", "aria-haspopup": "true", onclick: () => group.classList.remove("closed") }, name),
+    h(
+      "div",
+      { class: "menu" },
+      views.map(([view, [title]]) => h("a", { href: `#/${view}`, "data-view": view }, title)),
+    ),
+  );
+  group.dataset.group = name;
+  group.addEventListener("click", ({ target }) => {
+    if (target instanceof HTMLAnchorElement) close();
+  });
+  group.addEventListener("keydown", ({ key }) => {
+    if (key === "Escape") close();
+  });
+  const close = () => {
+    group.classList.add("closed");
+    if (group.contains(document.activeElement)) /** @type {HTMLElement} */ (document.activeElement).blur();
+  };
+  return group;
+}
+
+/** Open the palette, or close it. */
+function find() {
+  const layouts = Object.keys(PRESETS);
+  openPalette(
+    () => entriesOf(VIEWS, layouts, link),
+    (fragment) => {
+      location.hash = fragment;
+    },
+  );
 }
 
 function showState() {
   const element = document.getElementById("state");
   setText(element, t(STATES[link.state]) + (link.state === "open" && !link.mayWrite ? t(", read-only") : ""));
   element.dataset.state = link.state;
+}
+
+/** Show why the server refuses the page, as long as it does. */
+async function showRefusal() {
+  const isRefused = link.state === "refused" || link.state === "lost";
+  const found = isRefused ? await link.refusal() : null;
+  if (!found) return link.emit("withdrawn", ["refusal"]);
+  const advice = found.status === 401 ? ` ${t(TOKEN_ADVICE)}` : "";
+  showNotice({ message: `${t(found.text)}.${advice}`, level: 2, id: "refusal" });
 }
 
 function showNotice({ message, level = 1, id = null }) {
@@ -182,6 +251,7 @@ function showLanguage() {
   button.title = LANGUAGES[others[0]];
   button.setAttribute("aria-label", LANGUAGES[others[0]]);
   for (const [id, title] of [
+    ["find", "Find a view, topic, service or node (Ctrl-K)"],
     ["theme", "Dark or light"],
     ["help", "Keys"],
   ]) {
@@ -191,7 +261,7 @@ function showLanguage() {
   }
   setText(document.getElementById("skip"), t("To the view"));
   tabs.setAttribute("aria-label", t("Views"));
-  for (const tab of tabs.children) setText(tab, t(VIEWS[viewOf(tab)][0]));
+  showTabs();
 }
 
 function switchLanguage() {
@@ -215,15 +285,13 @@ watchPresses(window);
 document.getElementById("theme").addEventListener("click", switchTheme);
 document.getElementById("language").addEventListener("click", switchLanguage);
 document.getElementById("help").addEventListener("click", openHelp);
+document.getElementById("find").addEventListener("click", find);
 document.getElementById("skip").addEventListener("click", () => main.focus());
-listenForKeys(step);
-for (const [name, [title]] of Object.entries(VIEWS)) {
-  const tab = h("a", { href: `#/${name}` }, title);
-  tab.dataset.view = name;
-  tabs.append(tab);
-}
+listenForKeys(step, find);
+tabs.append(...GROUPS.map(makeGroup));
 showLanguage();
 link.watch(["state"], showState);
+link.watch(["state"], showRefusal);
 link.addEventListener("notice", (/** @type {any} */ { detail }) => showNotice(detail));
 link.addEventListener("withdrawn", (/** @type {any} */ { detail }) => {
   for (const notice of [...notices.children]) if (detail.includes(keyOf(notice))) notice.remove();

@@ -1,0 +1,111 @@
+"""Arrange the fields of messages of one type as columns. Pure.
+
+A field's column has the path of the field as its name, such as ``pose.pose.position.x``. Arrays whose values belong to the
+names in a field ``name``, as in sensor_msgs/JointState, have one column for each name: ``position[elbow]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from enum import Enum
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+__all__ = ["Column", "Kind", "columns", "leaves"]
+
+_NUMBERS = {
+    *("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"),
+    *("float32", "float64", "bool", "char", "byte"),
+}
+_NO_BYTES = {"uint8", "char"}  # arrays of these types are bytes in Python, not lists of numbers
+
+
+class Kind(Enum):
+    """The kind of a column's values."""
+
+    PLAIN = "plain"  # numbers, strings, bytes, lists, as they are in the message
+    TIME = "time"  # nanoseconds since 1970
+    DURATION = "duration"  # nanoseconds
+
+
+class Column(NamedTuple):
+    """A column: its name, the kind of its values, and one value for each message (None if it has none)."""
+
+    name: str
+    kind: Kind
+    values: list[Any]
+
+
+class _Leaf(NamedTuple):
+    path: str
+    type: str
+
+
+def leaves(message_class: Any, prefix: str = "") -> Iterator[_Leaf]:
+    """Yield the path and type of each field that is not a message itself; arrays of messages count as fields."""
+    for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
+        path = f"{prefix}{name}"
+        nested = None if type_.endswith("]") else _class_of(message_class, name, type_)
+        if nested is None:
+            yield _Leaf(path, type_)
+        else:
+            yield from leaves(nested, f"{path}.")
+
+
+def _class_of(message_class: Any, name: str, type_: str) -> Any:
+    """Return the class of a field that is a message, or None if it is a primitive."""
+    if type_ in ("time", "duration", "string") or type_ in _NUMBERS:
+        return None
+    return type(getattr(message_class(), name))
+
+
+def columns(messages: Sequence[Any]) -> list[Column]:
+    """Return the columns of messages, which must all be of the same type. No messages have no columns."""
+    if not messages:
+        return []
+    fields = list(leaves(type(messages[0])))
+    if not fields:
+        return []
+    get = attrgetter(*(field.path for field in fields))
+    rows = map(get, messages) if len(fields) > 1 else ((get(message),) for message in messages)
+    by_path = dict(zip((field.path for field in fields), map(list, zip(*rows, strict=True)), strict=True))
+
+    found: list[Column] = []
+    for field in fields:
+        values = by_path[field.path]
+        names = by_path.get(_names_of(field), [])
+        if field.type in ("time", "duration"):
+            kind = Kind.TIME if field.type == "time" else Kind.DURATION
+            found.append(Column(field.path, kind, [value.to_nsec() for value in values]))
+        elif names and _belong(names, values):
+            found += _named(field.path, names, values)
+        else:
+            found.append(Column(field.path, Kind.PLAIN, values))
+    return found
+
+
+def _names_of(field: _Leaf) -> str:
+    """Return the path of the field ``name`` beside an array of numbers, or "" for another field."""
+    element, bracket, _ = field.type.partition("[")
+    if not bracket or element not in _NUMBERS - _NO_BYTES:
+        return ""
+    base, dot, _ = field.path.rpartition(".")
+    return f"{base}{dot}name"
+
+
+def _belong(names: Sequence[Any], values: Sequence[Any]) -> bool:
+    """Return whether each array has as many values as there are names, or none."""
+    return all(
+        not isinstance(own, str) and len(array) in (0, len(own))
+        for own, array in zip(names, values, strict=True)
+    ) and any(map(len, values))
+
+
+def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[Any]]) -> Iterator[Column]:
+    known = list(dict.fromkeys(name for own in names for name in own))
+    found: dict[str, list[Any]] = {name: [None] * len(values) for name in known}
+    for row, (own, array) in enumerate(zip(names, values, strict=True)):
+        for name, value in zip(own, array, strict=False):
+            found[name][row] = value
+    for name, each in found.items():
+        yield Column(f"{path}[{name}]", Kind.PLAIN, each)

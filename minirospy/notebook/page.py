@@ -1,0 +1,98 @@
+"""Show a view of the dashboard in a cell.
+
+The dashboard is a process of the kernel's user that listens on loopback only, and ends when its standard input ends: with the
+kernel, even if that is killed. A notebook's page may embed it (``minirospy dashboard --embed``).
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterable
+from html import escape
+from urllib.parse import parse_qs, urlsplit
+
+from minirospy.base.errors import MinirospyError
+from minirospy.base.suggestions import did_you_mean
+from minirospy.web.dashboard.views import VIEWS, link
+
+__all__ = ["Frame", "view"]
+
+_HEIGHT = 420  # pixels
+
+
+class Frame:
+    """A view in a cell: IPython shows it by its HTML."""
+
+    def __init__(self, url: str, height: int) -> None:
+        self.url = url
+        self.height = height
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe src="{escape(self.url)}" width="100%" height="{self.height}" style="border:0" '
+            'allow="fullscreen; clipboard-write"></iframe>'
+        )
+
+    def __repr__(self) -> str:
+        return f"Frame({self.url.partition('?')[0]})"
+
+
+class _Dashboard:
+    """The dashboard's process, and the host, port and token of its page."""
+
+    def __init__(self, process: subprocess.Popen[str], url: str) -> None:
+        self.process = process
+        parts = urlsplit(url)
+        self.host, self.port = parts.hostname or "", parts.port or 0
+        self.token = parse_qs(parts.fragment.partition("?")[2]).get("token", [""])[0]
+
+
+class _Dashboards:
+    """The dashboards of this process, by the master's URI."""
+
+    lock = threading.Lock()
+    by_master: dict[str, _Dashboard] = {}
+
+
+def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterable[str]) -> Frame:
+    """Return a view of the dashboard, for the last line of a cell, or for ``display``.
+
+    ``name``: plot, 3d, graph, image, console or another view; ``height``: pixels; ``fields``: the view's settings in its
+    link, as ``path="/odom/twist/twist/linear/x"`` of a plot or ``topic="/camera/image_raw"`` of an image. The first call
+    starts the dashboard. Raise MinirospyError if there is no such view, or the dashboard does not start.
+    """
+    if name not in VIEWS:
+        known = ", ".join(VIEWS)
+        raise MinirospyError(f"there is no view '{name}'{did_you_mean(name, VIEWS)}: there are {known}")
+    with _Dashboards.lock:
+        master = os.environ.get("ROS_MASTER_URI", "")
+        dashboard = _Dashboards.by_master.get(master)
+        if dashboard is None or dashboard.process.poll() is not None:
+            dashboard = _Dashboards.by_master[master] = _start()
+    settings = {key: (value,) if isinstance(value, str) else tuple(value) for key, value in fields.items()}
+    return Frame(link(dashboard.host, dashboard.port, name, settings, token=dashboard.token), height)
+
+
+def _start() -> _Dashboard:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "minirospy", "dashboard", "--embed", "--no-browser", "--port", "0"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+    )
+    assert process.stdout
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        url = next((word for word in line.split() if word.startswith("http") and "token=" in word), "")
+        if url:
+            # Discard the rest, so that the process never waits for a reader.
+            threading.Thread(target=process.stdout.read, daemon=True).start()
+            return _Dashboard(process, url)
+    process.wait()
+    raise MinirospyError(f"the dashboard did not start: {''.join(said).strip()}")
