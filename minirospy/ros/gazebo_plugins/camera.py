@@ -13,7 +13,7 @@ from sensor_msgs.srv import SetCameraInfo, SetCameraInfoRequest, SetCameraInfoRe
 
 from minirospy import client as rospy
 from minirospy.base.times import Time
-from minirospy.core.sdf.poses import multiply
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.dynamic_reconfigure.definition import Definition
 from minirospy.ros.gazebo_plugins.optics import (
     Optics,
@@ -183,7 +183,7 @@ class Lens:
     def take(self, draw: Callable[[Renderer], None]) -> None:
         """Copy the scene, and draw it later."""
         optics = self.optics
-        pose = multiply(self.plugin.sensor_pose, optics.pose)
+        pose = compose(self.plugin.sensor_pose, optics.pose)
         self.photographer.take(pose, optics.horizontal_fov, (optics.near, optics.far), draw)
 
     def publish_info(self, stamp: Time, publisher: rospy.Publisher[Any]) -> None:

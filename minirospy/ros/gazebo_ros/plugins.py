@@ -21,7 +21,7 @@ from minirospy.base.errors import ManifestError, MinirospyError
 from minirospy.base.times import Time
 from minirospy.base.xml_text import XmlElement
 from minirospy.core.sdf.model import IDENTITY, Plugin, Pose, Sensor
-from minirospy.core.sdf.poses import multiply
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.gazebo_ros.messages import time_of
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
@@ -243,7 +243,7 @@ class SensorPlugin(ModelPlugin):
     @property
     def sensor_pose(self) -> Pose:
         """Return the sensor's pose in the world."""
-        return multiply(self.sensor_link.pose, self.sensor.pose)
+        return compose(self.sensor_link.pose, self.sensor.pose)
 
     def is_needed(self) -> bool:
         """Return whether anything uses the sensor's data, such as a subscriber."""

@@ -84,7 +84,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 from minirospy import client as rospy
 from minirospy.base.errors import SdfError
 from minirospy.core.sdf.model import Inertial, Light, Model, Pose, Vector
-from minirospy.core.sdf.poses import multiply, rotate
+from minirospy.core.sdf.poses import compose, rotate, rotate_back
 from minirospy.ros.gazebo_ros.frames import (
     WORLD_FRAMES,
     difference,
@@ -92,7 +92,6 @@ from minirospy.ros.gazebo_ros.frames import (
     find_joint,
     find_link,
     relative_state,
-    turned_back,
 )
 from minirospy.ros.gazebo_ros.loop import LoopClosed
 from minirospy.ros.gazebo_ros.messages import (
@@ -241,7 +240,7 @@ class Services:
             pose = pose_of(request.initial_pose)
             frame = find_entity(self._simulation, request.reference_frame)
             if frame is not None:
-                pose = multiply(frame.pose, pose)
+                pose = compose(frame.pose, pose)
             elif request.reference_frame not in WORLD_FRAMES:
                 return SpawnModelResponse(
                     False,
@@ -326,7 +325,7 @@ class Services:
         frame = find_entity(self._simulation, wanted.reference_frame)
         if frame is not None:
             base = frame.pose
-            pose = multiply(base, pose)
+            pose = compose(base, pose)
             linear, angular = rotate(base.orientation, linear), rotate(base.orientation, angular)
         elif wanted.reference_frame not in WORLD_FRAMES:
             rospy.logerr(
@@ -441,7 +440,7 @@ class Services:
         frame = find_link(self._simulation, wanted.reference_frame) if wanted.reference_frame else None
         if frame is not None:
             base = frame.state
-            pose = multiply(base.pose, pose)
+            pose = compose(base.pose, pose)
             linear, angular = difference(linear, base.linear), difference(angular, base.angular)
         elif wanted.reference_frame not in WORLD_FRAMES:
             rospy.logerr("Updating LinkState: reference_frame is not a valid entity name")
@@ -500,11 +499,11 @@ class Services:
         if frame is not None:
             base = frame.pose
             force, torque = rotate(base.orientation, force), rotate(base.orientation, torque)
-            x, y, z = difference(multiply(base, _at(point)).position, pose.position)
-            point = turned_back(pose, (x, y, z))
+            x, y, z = difference(compose(base, _at(point)).position, pose.position)
+            point = rotate_back(pose.orientation, (x, y, z))
         elif request.reference_frame in WORLD_FRAMES:
             # In ROS, too, the point counts from the body's origin, in world axes, although the frame is the world.
-            point = turned_back(pose, point)
+            point = rotate_back(pose.orientation, point)
         else:
             rospy.logerr("ApplyBodyWrench: reference_frame is not a valid entity name")
             return ApplyBodyWrenchResponse(False, "ApplyBodyWrench: reference_frame not found")

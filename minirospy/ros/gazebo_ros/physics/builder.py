@@ -21,7 +21,7 @@ from minirospy.core.sdf.model import (
     Vector,
     World,
 )
-from minirospy.core.sdf.pose_math import compose, inverse, relative, rotate, transform
+from minirospy.core.sdf.poses import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 from minirospy.ros.gazebo_ros.physics.shapes import Shapes

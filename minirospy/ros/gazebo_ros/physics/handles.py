@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from minirospy.core.sdf.model import Axis, Inertial, Joint, Link, Model, Pose, Vector
-from minirospy.core.sdf.pose_math import compose, inverse, normalized, rotate, transform
+from minirospy.core.sdf.poses import compose, inverse, normalized, rotate, rotate_back, transform
 from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names, set_inertial
 from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, Engine
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
@@ -370,9 +370,8 @@ class SimJoint:
         anchor = transform(pose, self.record.pose.position)
         arm = _difference((reference[0], reference[1], reference[2]), anchor)
         torque = _sum((torque_x, torque_y, torque_z), _cross(arm, force))
-        back = inverse(pose).orientation
-        fx, fy, fz = rotate(back, force)
-        tx, ty, tz = rotate(back, torque)
+        fx, fy, fz = rotate_back(pose.orientation, force)
+        tx, ty, tz = rotate_back(pose.orientation, torque)
         return Wrench((-fx, -fy, -fz), (-tx, -ty, -tz))
 
 
@@ -480,7 +479,7 @@ class SimModel:
         dof = int(engine.model.body_dofadr[link.id])
         moved = _sum(linear, _cross(angular, _difference(pose.position, origin)))
         engine.data.qvel[dof : dof + 3] = moved
-        engine.data.qvel[dof + 3 : dof + 6] = rotate(inverse(pose).orientation, angular)
+        engine.data.qvel[dof + 3 : dof + 6] = rotate_back(pose.orientation, angular)
 
     def all_joints(self) -> Iterator[SimJoint]:
         """Yield each axis."""

@@ -30,7 +30,7 @@ from minirospy.core.sdf.model import (
     Surface,
     Visual,
 )
-from minirospy.core.sdf.pose_math import compose
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 
 __all__ = [

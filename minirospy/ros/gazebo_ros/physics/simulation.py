@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from minirospy.core.sdf.model import Axis, Model, Physics, Pose, Vector, World
-from minirospy.core.sdf.pose_math import rotate
+from minirospy.core.sdf.poses import rotate
 from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
