@@ -15,7 +15,7 @@ import numpy as np
 from minirospy.core.sdf.model import Axis, Inertial, Joint, Link, Model, Pose, Vector
 from minirospy.core.sdf.poses import compose, inverse, normalized, rotate, rotate_back, transform
 from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names, set_inertial
-from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, Engine
+from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, MAX_MOTOR_SPEED, Engine
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
 from minirospy.ros.gazebo_ros.physics.states import ZERO, State, Wrench
 
@@ -208,7 +208,7 @@ class SimJoint:
         self._max_force = 0.0  # of the motor; 0: no motor
         self._velocity = 0.0
         self._target: float | None = None
-        self._max_velocity = math.inf
+        self._max_velocity = MAX_MOTOR_SPEED
 
     @property
     def has_axis(self) -> bool:
@@ -276,7 +276,7 @@ class SimJoint:
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
         """Start or change a motor that holds a velocity with at most a force."""
         _check(velocity)
-        self._velocity, self._target = velocity, None
+        self._velocity, self._target = min(max(velocity, -MAX_MOTOR_SPEED), MAX_MOTOR_SPEED), None
         self._start_motor(max_force)
 
     def set_position(
@@ -284,7 +284,8 @@ class SimJoint:
     ) -> None:
         """Start or change a motor that moves to a position, with at most a force and a velocity."""
         _check(position)
-        self._velocity, self._target, self._max_velocity = 0.0, position, max_velocity
+        self._velocity, self._target = 0.0, position
+        self._max_velocity = min(max_velocity, MAX_MOTOR_SPEED)
         self._start_motor(max_force)
 
     def stop_motor(self) -> None:
