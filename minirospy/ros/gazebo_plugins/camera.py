@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Camera", "CameraPlugin", "Lens", "MultiCamera"]
 
+MAX_PIXELS = 16384  # per row and column; OpenGL has no larger pictures
 RATES = (2.0, 1.0, 50.0)  # Hz; default, least and greatest of dynamic reconfigure
 
 
@@ -65,7 +66,8 @@ class CameraPlugin(SensorPlugin):
 
     def add_lens(self, optics: Optics, suffix: str = "", baseline: float | None = None) -> Lens:
         """Add a camera whose topics are below the camera's name and a suffix. Raise PluginError if its size is impossible."""
-        if min(optics.width, optics.height) < 1 or not 0 < optics.horizontal_fov < math.pi:
+        sizes = (optics.width, optics.height)
+        if not (min(sizes) >= 1 and max(sizes) <= MAX_PIXELS and 0 < optics.horizontal_fov < math.pi):
             raise PluginError(
                 f"a camera of {optics.width}x{optics.height} pixels and {optics.horizontal_fov} rad is not possible"
             )

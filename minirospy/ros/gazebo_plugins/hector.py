@@ -17,8 +17,9 @@ from minirospy.core.sdf.model import Pose, Vector
 from minirospy.core.sdf.poses import compose, pose_from_rpy, rotate, rotate_back
 from minirospy.ros.gazebo_plugins.rays import read_rays
 from minirospy.ros.gazebo_ros.messages import to_pose, to_vector
+from minirospy.ros.gazebo_ros.parameters import numbers_of
 from minirospy.ros.gazebo_ros.physics import SimLink
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, PluginError, SensorPlugin, Timer
+from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, SensorPlugin, Timer
 
 __all__ = ["ErrorModel", "HectorGps", "HectorImu", "HectorSonar"]
 
@@ -40,13 +41,7 @@ class ErrorModel:
 
         def read(name: str, default: float) -> Values:
             tag = f"{prefix}{name}" if prefix else name[0].lower() + name[1:]
-            text = plugin.text(tag)
-            try:
-                numbers = [float(each) for each in text.split()] or [default]
-            except ValueError:
-                raise PluginError(f"<{tag}> is '{text}', not {axes} numbers") from None
-            if len(numbers) not in (1, axes):
-                raise PluginError(f"<{tag}> is '{text}', not {axes} numbers")
+            numbers = numbers_of(plugin.element, tag, (1, axes)) or (default,)
             values: Values = np.broadcast_to(np.array(numbers), axes).copy()
             return values
 
@@ -166,7 +161,7 @@ class HectorImu(_HectorPlugin):
         super().load()
         topic = self.text("topicName", "imu")
         self._frame = self.frame("frameId", self.text("bodyName", self.body.name))
-        roll, pitch, yaw = self._three("rpyOffset")
+        roll, pitch, yaw = self.numbers("rpyOffset", (0.0, 0.0, 0.0))
         self._offset = pose_from_rpy((0.0, 0.0, 0.0), (roll, pitch, yaw))
         self._accel, self._turn = ErrorModel(self, "accel", 3), ErrorModel(self, "rate", 3)
         self._yaw = ErrorModel(self, "yaw", 1)
@@ -225,12 +220,6 @@ class HectorImu(_HectorPlugin):
         bias.angular_velocity = to_vector((rx, ry, rz))
         bias.linear_acceleration = to_vector((bx, by, bz))
         self._biases.publish(bias)
-
-    def _three(self, tag: str) -> list[float]:
-        values = [float(each) for each in self.text(tag, "0 0 0").split()]
-        if len(values) != 3:
-            raise PluginError(f"<{tag}> has {len(values)} numbers instead of 3")
-        return values
 
     def _calibrate(self, _request: EmptyRequest) -> EmptyResponse:
         def clear() -> EmptyResponse:

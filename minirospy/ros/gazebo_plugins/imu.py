@@ -46,13 +46,9 @@ class _Accelerometer:
 
 def offset_of(plugin: PluginBase) -> Pose:
     """Return the pose of xyzOffset and rpyOffset."""
-    vectors = []
-    for tag in ("xyzOffset", "rpyOffset"):
-        values = [float(word) for word in plugin.text(tag, "0 0 0").split()]
-        if len(values) != 3:
-            raise PluginError(f"<{tag}> has {len(values)} numbers, not three")
-        vectors.append((values[0], values[1], values[2]))
-    return pose_from_rpy(*vectors)
+    x, y, z = plugin.numbers("xyzOffset", (0.0, 0.0, 0.0))
+    roll, pitch, yaw = plugin.numbers("rpyOffset", (0.0, 0.0, 0.0))
+    return pose_from_rpy((x, y, z), (roll, pitch, yaw))
 
 
 def _message(plugin: PluginBase, frame: str, noise: float, values: tuple[Pose, Vector, Vector]) -> ImuMsg:
