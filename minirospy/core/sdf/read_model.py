@@ -264,8 +264,8 @@ class _Reader:
             source.flag(element, "gravity", True),
             source.flag(element, "kinematic", False),
             source.flag(element, "self_collide", self_collide),
-            source.number(decay, "linear", 0.0),
-            source.number(decay, "angular", 0.0),
+            source.amount(decay, "linear", 0.0),
+            source.amount(decay, "angular", 0.0),
         )
 
     def _collisions(self, link: str, element: Element) -> Iterator[Collision]:

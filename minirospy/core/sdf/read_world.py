@@ -61,7 +61,7 @@ def read_physics(element: Element | None, source: Source) -> Physics:
     return Physics(
         step,
         source.number(element, "real_time_factor", _PHYSICS.real_time_factor),
-        max(source.number(element, "real_time_update_rate", _PHYSICS.update_rate), 0.0),
+        source.amount(element, "real_time_update_rate", _PHYSICS.update_rate),
         source.vector(element, "gravity", _PHYSICS.gravity),
         int(source.number(solver, "iters", _PHYSICS.iterations)),
         source.number(solver, "sor", _PHYSICS.sor),

@@ -180,8 +180,8 @@ class SimLink:
             _, linear, angular = self.state
             mass = float(self.engine.model.body_mass[self.id])
             moments = self.engine.model.body_inertia[self.id].tolist()
-            loss = self.record.linear_damping * mass / step
-            slow = self.record.angular_damping * min(moments) / step
+            loss = min(self.record.linear_damping, 1.0) * mass / step
+            slow = min(self.record.angular_damping, 1.0) * min(moments) / step
             row[:3] -= [loss * value for value in linear]
             row[3:] -= [slow * value for value in angular]
         return bool(self.wrenches) or self.has_damping
