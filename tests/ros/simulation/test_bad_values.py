@@ -9,9 +9,10 @@ import pytest
 
 pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
 
-from gazebo_msgs.srv import GetWorldProperties, SpawnModel
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from nav_msgs.msg import Odometry
+from std_srvs.srv import Empty
 
 from minirospy import Node
 from minirospy.base.xml_text import parse_xml
@@ -135,3 +136,19 @@ def test_numbers_are_read_within_the_range_of_their_tag() -> None:
     assert numbers_of(element, "empty", (3,)) == ()
     with pytest.raises(PluginError, match="<height> is '-0': it must be positive"):
         number_of(element, "height", 1.0)
+
+
+def test_a_second_robot_leaves_the_services_of_the_first(master: str, start: Start) -> None:
+    process = start_world(start)
+    robot = MODEL.format("", IMU.format(""))
+
+    async def body(node: Node) -> None:
+        for name in ("first", "second"):
+            assert (await call(node, "spawn_sdf_model", SpawnModel, name, robot, "/", HERE, "")).success
+        assert (await call(node, "delete_model", DeleteModel, "second")).success
+        await node.call("/default_imu", Empty)
+
+    run(body)
+    output, errors = end(process)
+    line = "Tried to advertise a service that is already advertised in this node [/default_imu]"
+    assert (output + errors).count(line) == 1
