@@ -323,7 +323,7 @@ def test_values_that_are_not_finite_are_refused(master: str, start: Start) -> No
 
     async def body(node: Node) -> None:
         assert (await spawn(node, BOX, "box", at(z=5)))[0]
-        refused = (False, "a force, position or velocity is not finite")
+        refused = (False, "box: a force, position or velocity is not finite")
         state = ModelState(model_name="box", pose=at(x=math.nan))
         response = await call(node, "set_model_state", SetModelState, state)
         assert (response.success, response.status_message) == refused

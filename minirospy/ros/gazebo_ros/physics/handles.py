@@ -97,7 +97,7 @@ class SimLink:
 
     def set_state(self, state: State) -> None:
         """Move the whole model so that this link has the state, with joint angles kept and joint velocities zero."""
-        _check(*state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
+        _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         change = compose(state.pose, inverse(self.pose))
         self.model.move(change, state.linear, state.angular, state.pose.position)
 
@@ -124,9 +124,9 @@ class SimLink:
 
     def set_inertial(self, inertial: Inertial) -> None:
         """Change the mass and the inertia; the world is compiled again. A static model has none."""
-        _check(inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
+        _check(self, inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
         if inertial.mass <= 0:
-            raise SimulationError("a mass must be positive")
+            raise SimulationError(f"{self.scoped_name}: a mass must be positive")
         self.record = replace(self.record, inertial=inertial)
         if not self.model.is_static:
             set_inertial(self.model.built.bodies[self.name], inertial)
@@ -145,7 +145,7 @@ class SimLink:
 
         ``start``: time of the simulation in seconds; a time in the past means now. A negative duration means for ever.
         """
-        _check(*force, *torque, *point)
+        _check(self, *force, *torque, *point)
         start = max(start, self.model.time())
         end = start + duration if duration >= 0 else math.inf
         self.wrenches.append(TimedWrench(force, torque, point, start, end))
@@ -153,7 +153,7 @@ class SimLink:
 
     def push(self, force: Vector = ZERO, torque: Vector = ZERO, *, point: Vector = ZERO) -> None:
         """Apply a force and a torque in world axes at a point of the link's frame for the next step."""
-        _check(*force, *torque, *point)
+        _check(self, *force, *torque, *point)
         now = self.model.time()
         self.wrenches.append(TimedWrench(force, torque, point, now, now))
         self.model.forces_changed()
@@ -235,7 +235,7 @@ class SimJoint:
 
     def set_state(self, position: float, velocity: float = 0.0) -> None:
         """Set position and velocity at once."""
-        _check(position, velocity)
+        _check(self, position, velocity)
         if self.dof >= 0:
             self.engine.data.qpos[self._address] = position
             self.engine.data.qvel[self.dof] = velocity
@@ -255,13 +255,13 @@ class SimJoint:
 
     def set_force(self, force: float) -> None:
         """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
-        _check(force)
+        _check(self, force)
         self._force = force
         self.model.forces_changed()
 
     def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
         """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: for ever)."""
-        _check(force)
+        _check(self, force)
         start = max(start, self.model.time())
         end = start + duration if duration >= 0 else math.inf
         self._timed.append(TimedForce(force, start, end))
@@ -275,7 +275,7 @@ class SimJoint:
 
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
         """Start or change a motor that holds a velocity with at most a force."""
-        _check(velocity)
+        _check(self, velocity)
         self._velocity, self._target = min(max(velocity, -MAX_MOTOR_SPEED), MAX_MOTOR_SPEED), None
         self._start_motor(max_force)
 
@@ -283,7 +283,7 @@ class SimJoint:
         self, position: float, max_force: float = math.inf, max_velocity: float = math.inf
     ) -> None:
         """Start or change a motor that moves to a position, with at most a force and a velocity."""
-        _check(position)
+        _check(self, position)
         self._velocity, self._target = 0.0, position
         self._max_velocity = min(max_velocity, MAX_MOTOR_SPEED)
         self._start_motor(max_force)
@@ -295,7 +295,7 @@ class SimJoint:
 
     def _start_motor(self, max_force: float) -> None:
         if math.isnan(max_force):
-            raise SimulationError("a motor's maximum force is not finite")
+            raise SimulationError(f"{self.model.name}::{self.name}: the motor's maximum force is not finite")
         force = min(max(max_force, 0.0), MAX_FORCE)
         same = force == self._max_force > 0 and self.dof >= 0
         self._max_force = force
@@ -427,13 +427,13 @@ class SimModel:
 
     def set_state(self, state: State) -> None:
         """Move the model; joint angles are kept, joint velocities become zero."""
-        _check(*state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
+        _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         change = compose(state.pose, inverse(self.pose))
         self.move(change, state.linear, state.angular, state.pose.position)
 
     def set_velocity(self, linear: Vector, angular: Vector) -> None:
         """Set the velocity of the model's origin in world axes; the pose and the joints stay as they are."""
-        _check(*linear, *angular)
+        _check(self, *linear, *angular)
         origin = self.pose.position
         for name in self.built.free:
             self._set_free_velocity(self.links[name], linear, angular, origin)
@@ -534,10 +534,11 @@ class SimModel:
         self._owner.forced[self.name] = None
 
 
-def _check(*values: float) -> None:
-    """Raise SimulationError if a value is infinite or NaN."""
+def _check(owner: SimLink | SimJoint | SimModel, *values: float) -> None:
+    """Raise SimulationError if a value for the owner is infinite or NaN."""
     if not all(map(math.isfinite, values)):
-        raise SimulationError("a force, position or velocity is not finite")
+        name = owner.name if isinstance(owner, SimModel) else f"{owner.model.name}::{owner.name}"
+        raise SimulationError(f"{name}: a force, position or velocity is not finite")
 
 
 def _sum(left: Vector, right: Vector) -> Vector:
