@@ -38,7 +38,7 @@ def new_parser(program: str) -> argparse.ArgumentParser:
     parser.add_argument("world", nargs="?", default=DEFAULT_WORLD, help="file of the world")
     parser.add_argument("-v", "--version", action="version", version=ABOUT)
     parser.add_argument(
-        "--verbose", action="store_true", help="no effect: parts that are left out are always named"
+        "--verbose", action="store_true", help="log what is left out of models"
     )
     parser.add_argument("-u", "--pause", action="store_true", help="start paused")
     parser.add_argument("-e", "--physics", default="ode", metavar="ENGINE", help="no effect: MuJoCo is used")
@@ -90,9 +90,6 @@ def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
         _start_node()
         for line in (*world.warnings, *simulation.warnings):
             rospy.logwarn("%s", line)
-        for model in world.models:
-            for line in model.warnings:
-                rospy.logwarn("model '%s': %s", model.name, line)
         loop = _run(simulation, world, resources, paused=arguments.pause, steps=arguments.iters)
         return 1 if loop.failure is not None else 0
     except rospy.ROSInterruptException:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +16,7 @@ from std_srvs.srv import Empty
 from minirospy import Node
 from minirospy.base.xml_text import parse_xml
 from minirospy.ros.gazebo_ros.parameters import PluginError, number_of, numbers_of
-from tests.ros.simulation.processes import Start, call, end, run, start_world, until, written
+from tests.ros.simulation.processes import Start, call, end, run, start_world, until
 
 HERE = Pose(Point(0.0, 0.0, 1.0), Quaternion(0.0, 0.0, 0.0, 1.0))
 MODEL = '<sdf version="1.6"><model name="m"><static>true</static><link name="body">{}</link>{}</model></sdf>'
@@ -103,21 +102,6 @@ def test_each_value_that_cannot_be_used_is_named_in_one_line(master: str, start:
     assert slow == [
         "plugin 'drive' (gazebo_ros_diff_drive) of model 'slow': <updateRate> is '-1': each step is used"
     ]
-
-
-WORLD = """<sdf version="1.6"><world name="w"><model name="tool"><static>true</static><link name="body">
-  <velocity_decay><linear>-2</linear></velocity_decay></link></model></world></sdf>"""
-
-
-def test_parts_of_a_world_files_models_are_named(master: str, start: Start, tmp_path: Path) -> None:
-    process = start_world(start, written(tmp_path, "a.world", WORLD))
-
-    async def body(node: Node) -> None:
-        await call(node, "get_world_properties", GetWorldProperties)
-
-    run(body)
-    output, errors = end(process)
-    assert errors.count("model 'tool': ") == (output + errors).count("<linear> is -2: it is 0 instead") == 1
 
 
 def test_numbers_are_read_within_the_range_of_their_tag() -> None:

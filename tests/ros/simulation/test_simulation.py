@@ -230,7 +230,7 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
         lambda: link.set_state(State(bad)),
         lambda: model.set_velocity((0.0, math.nan, 0.0), (0.0, 0.0, 0.0)),
     ):
-        with pytest.raises(SimulationError, match="^pendulum(::joint0|::rod0)?: .* is not finite$"):
+        with pytest.raises(SimulationError, match=r"^pendulum(::joint0|::rod0)?: .* is not finite$"):
             call()
     assert simulation.step(10) == []
 
