@@ -37,9 +37,7 @@ def new_parser(program: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog=program, description=ABOUT)
     parser.add_argument("world", nargs="?", default=DEFAULT_WORLD, help="file of the world")
     parser.add_argument("-v", "--version", action="version", version=ABOUT)
-    parser.add_argument(
-        "--verbose", action="store_true", help="log what is left out of models"
-    )
+    parser.add_argument("--verbose", action="store_true", help="log what is left out of models")
     parser.add_argument("-u", "--pause", action="store_true", help="start paused")
     parser.add_argument("-e", "--physics", default="ode", metavar="ENGINE", help="no effect: MuJoCo is used")
     parser.add_argument("-r", "--record", action="store_true", help="no effect: use rosbag record")
