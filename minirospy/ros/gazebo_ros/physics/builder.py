@@ -141,6 +141,7 @@ class Builder:
                     self.shapes.add_visual(built.bodies[link.name], scoped, visual)
                 except (SimulationError, ValueError, TypeError) as error:
                     warnings.append(f"model '{name}': visual '{visual.name}': {_first_line(error)}")
+        warnings += [f"model '{name}': {line}" for line in self.shapes.textures.take_warnings()]
         return warnings
 
     def delete(self, built: BuiltModel) -> None:
