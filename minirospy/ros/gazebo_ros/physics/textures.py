@@ -9,6 +9,7 @@ from minirospy.ros.gazebo_ros.physics.library import load_mujoco
 __all__ = ["Textures"]
 
 MAX_PIXELS = 1024  # on a side; larger pictures are reduced, because cameras show less of them
+SIDES = (90, 270, 180, 0, 0, 180)  # degrees, for upright pictures at x, -x, y, -y, z and -z
 MAX_AREA = 60_000_000  # pixels of a file; reading a larger one takes seconds
 
 
@@ -61,9 +62,9 @@ class Textures:
         name = f"picture{len(self._names)}"
         kind = mujoco.mjtTexture.mjTEXTURE_2D if is_flat else mujoco.mjtTexture.mjTEXTURE_CUBE
         texture = self._spec.add_texture(name=name, type=kind)
-        sides = 1 if is_flat else 6
-        texture.width, texture.height, texture.nchannel = pixels.width, pixels.height * sides, 3
-        texture.data = pixels.tobytes() * sides
+        turns = (0,) if is_flat else SIDES
+        texture.width, texture.height, texture.nchannel = pixels.width, pixels.height * len(turns), 3
+        texture.data = b"".join(pixels.rotate(turn).tobytes() for turn in turns)
         material = self._spec.add_material(name=name)
         roles = material.textures
         roles[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
