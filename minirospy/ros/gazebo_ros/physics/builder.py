@@ -141,8 +141,13 @@ class Builder:
                     self.shapes.add_visual(built.bodies[link.name], scoped, visual)
                 except (SimulationError, ValueError, TypeError) as error:
                     warnings.append(f"model '{name}': visual '{visual.name}': {_first_line(error)}")
-        warnings += [f"model '{name}': {line}" for line in self.shapes.textures.take_warnings()]
-        return warnings
+        return warnings + self.take_warnings(name)
+
+    def take_warnings(self, name: str) -> list[str]:
+        """Return the lines about shapes of a model that was just added."""
+        lines = [f"model '{name}': {line}" for line in self.shapes.warnings]
+        self.shapes.warnings.clear()
+        return lines
 
     def delete(self, built: BuiltModel) -> None:
         """Delete a model from the spec."""

@@ -31,6 +31,7 @@ from minirospy.core.sdf.model import (
     Visual,
 )
 from minirospy.core.sdf.poses import compose
+from minirospy.ros.gazebo_ros.physics.decomposition import Decomposition
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 from minirospy.ros.gazebo_ros.physics.textures import Textures
 
@@ -92,7 +93,9 @@ class Shapes:
     def __init__(self, spec: Any) -> None:
         self._mujoco = load_mujoco()
         self._spec = spec
-        self.textures = Textures(spec)
+        self.warnings: list[str] = []  # about textures and moving meshes
+        self._textures = Textures(spec, self.warnings)
+        self._decomposition = Decomposition(self.warnings)
         self._assets: dict[tuple[object, ...], list[_Piece]] = {}
         self._count = 0
 
@@ -123,7 +126,7 @@ class Shapes:
             geom.group = GROUP_VISUAL
             geom.contype = geom.conaffinity = 0
             picture = visual.material.texture or ("" if visual.material.color else piece.texture)
-            material = self.textures.material(picture, is_flat=piece.kind in ("PLANE", "MESH"))
+            material = self._textures.material(picture, is_flat=piece.kind in ("PLANE", "MESH"))
             if material and (piece.kind != "MESH" or piece.has_texcoords):
                 geom.material = material
                 red, green, blue, alpha = visual.material.color or _WHITE
@@ -158,7 +161,10 @@ class Shapes:
             return
 
         mesh = _joined(_meshes(geometry))
-        parts = collision_parts(mesh, is_static=is_static)
+        name = geometry.path if isinstance(geometry, MeshShape) else "of a polyline"
+        parts = collision_parts(
+            mesh, is_static=is_static, split=lambda part: self._decomposition.split(part, name)
+        )
         is_whole = parts.are_exact
         for part in parts.meshes:
             name = self._add_mesh(part.vertices, part.triangles if is_whole else None)

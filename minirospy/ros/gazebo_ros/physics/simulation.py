@@ -228,6 +228,7 @@ class Simulation:
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise SimulationError(f"model '{name}': the pose is not finite")
         built = self._builder.add(model, name, pose)
+        self.warnings += self._builder.take_warnings(name)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
         added = SimModel(self.engine, name, model, pose, built, self)

@@ -16,15 +16,10 @@ MAX_AREA = 60_000_000  # pixels of a file; reading a larger one takes seconds
 class Textures:
     """Adds pictures to an MjSpec, each once. A picture that cannot be read is in the warnings once, and its shapes are plain."""
 
-    def __init__(self, spec: Any) -> None:
+    def __init__(self, spec: Any, warnings: list[str]) -> None:
         self._spec = spec
         self._names: dict[tuple[str, bool], str] = {}
-        self._warnings: list[str] = []
-
-    def take_warnings(self) -> list[str]:
-        """Return the warnings since the last call."""
-        taken, self._warnings = self._warnings, []
-        return taken
+        self._warnings = warnings
 
     def material(self, path: str, *, is_flat: bool) -> str:
         """Return the name of the material with a picture, or an empty string if there is none.
