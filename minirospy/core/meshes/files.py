@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
@@ -78,7 +79,7 @@ def _picture(name: str, folder: Path) -> str:
         return ""
     for place in (folder, folder.parent / "materials" / "textures"):
         for path in (place / name, place / name.rpartition("/")[2]):
-            if path.is_file():
+            if os.path.isfile(path):
                 return str(path)
     return ""
 

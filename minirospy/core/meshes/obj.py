@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -36,7 +37,7 @@ def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> lis
             if keyword == "v":
                 vertices.append((float(values[0]), float(values[1]), float(values[2])))
             elif keyword == "vt":
-                places.append((float(values[0]), float(values[1]) if len(values) > 1 else 0.0))
+                places.append(_place(values))
             elif keyword == "f":
                 corners = [_index(word.partition("/")[0], len(vertices)) for word in values]
                 if len(corners) < 3:
@@ -91,9 +92,18 @@ class _Faces:
 
 
 def _places(words: list[str], known: list[_Place]) -> list[_Place] | None:
-    """Return the places of a polygon's corners in the texture, or None if it has none."""
-    indices = [word.split("/")[1] if "/" in word else "" for word in words]
-    return [known[_index(index, len(known))] for index in indices] if all(indices) else None
+    """Return the places of a polygon's corners in the texture, or None if it has none that can be used."""
+    try:
+        return [known[_index(word.split("/")[1], len(known))] for word in words]
+    except (ValueError, IndexError):
+        return None
+
+
+def _place(values: list[str]) -> _Place:
+    try:
+        return float(values[0]), float(values[1]) if len(values) > 1 else 0.0
+    except (ValueError, IndexError):
+        return math.nan, math.nan  # then the object has no texture coordinates
 
 
 def _index(word: str, count: int) -> int:

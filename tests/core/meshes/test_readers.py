@@ -320,6 +320,15 @@ def test_texture_coordinates_that_cannot_be_used_are_left_out(change: tuple[byte
     assert mesh.texcoords is None
 
 
+@pytest.mark.parametrize(
+    "change", [("3/3", "3/9"), ("3/3", "3/x"), ("3/3", "3//1"), ("vt 1 0", "vt one 0"), ("vt 1 0", "vt")]
+)
+def test_an_object_without_usable_texture_coordinates_is_read(change: tuple[str, str]) -> None:
+    (mesh,) = parse_obj(OBJ_WITH_TEXTURE.replace(*change))
+    assert len(mesh.triangles) == 3
+    assert mesh.texcoords is None
+
+
 def test_textures_are_found_beside_the_mesh(tmp_path: Path) -> None:
     (tmp_path / "meshes").mkdir()
     file = tmp_path / "meshes" / "board.dae"
