@@ -24,6 +24,7 @@ from minirospy.ros.gazebo_plugins.optics import (
     to_camera_info,
 )
 from minirospy.ros.gazebo_plugins.pictures import Photographer
+from minirospy.ros.gazebo_ros.physics.rendering import MAX_PIXELS
 from minirospy.ros.gazebo_ros.plugins import PluginError, SensorPlugin
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Camera", "CameraPlugin", "Lens", "MultiCamera"]
 
-MAX_PIXELS = 16384  # per row and column; OpenGL has no larger pictures
 RATES = (2.0, 1.0, 50.0)  # Hz; default, least and greatest of dynamic reconfigure
 
 
