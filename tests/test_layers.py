@@ -57,6 +57,7 @@ SIMULATION_PACKAGES = [
     "diff_drive_robot",
     "gazebo_plugins",
     "gazebo_ros",
+    "rpi_feros_gazebo",
     "six_joint_arm",
     "two_link_arm_gazebo",
 ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ MAX_NODES = 20_000  # instances of nodes; nodes that refer to each other can mul
 MAX_DEPTH = 100  # of nodes within nodes
 PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 Matrix = NDArray[np.float64]
+Texcoords = NDArray[np.float32]
 
 
 def parse_dae(data: bytes) -> list[Mesh]:
@@ -43,6 +45,15 @@ def parse_dae(data: bytes) -> list[Mesh]:
         raise MeshError(f"this Collada file is broken: {error}") from error
 
 
+class _Part(NamedTuple):
+    """The triangles of one material, by its symbol. texcoords (n, 3, 2): the corners' places in the texture, or None."""
+
+    symbol: str
+    vertices: Matrix
+    triangles: NDArray[np.int32]
+    texcoords: Texcoords | None
+
+
 class _Reader:
     def __init__(self, root: XmlElement) -> None:
         self._root = root
@@ -53,7 +64,7 @@ class _Reader:
             if "id" in element.attributes:
                 self._by_id.setdefault(element.attributes["id"], element)
             waiting.extend(element.children)
-        self._geometries: dict[str, list[tuple[str, Matrix, NDArray[np.int32]]]] = {}
+        self._geometries: dict[str, list[_Part]] = {}
         self._nodes = 0
         self._triangles = 0
 
@@ -131,29 +142,32 @@ class _Reader:
         parts = self._geometries[key]
         if not parts:
             return
-        self._triangles += sum(len(triangles) for _, _, triangles in parts)
+        self._triangles += sum(len(part.triangles) for part in parts)
         if self._triangles > MAX_TRIANGLES:
             raise MeshError(f"there are more than {MAX_TRIANGLES} triangles")
 
         materials: dict[str, int] = {}
         starts, start = [], 0
         rows: list[NDArray[np.int32]] = []
-        for symbol, vertices, triangles in parts:
+        places: list[Texcoords] = []
+        for symbol, vertices, triangles, texcoords in parts:
             index = materials.setdefault(symbol, len(materials))
             rows.append(np.full(len(triangles), index, np.int32))
             starts.append(triangles + start)
             start += len(vertices)
+            places.append(np.zeros((len(triangles), 3, 2), np.float32) if texcoords is None else texcoords)
         mesh = Mesh.checked(
-            np.concatenate([vertices for _, vertices, _ in parts]),
+            np.concatenate([part.vertices for part in parts]),
             np.concatenate(starts).astype(np.int32),
             name,
             tuple(bindings.get(symbol) or self._material(symbol) for symbol in materials),
             np.concatenate(rows),
+            None if all(part.texcoords is None for part in parts) else np.concatenate(places),
         )
         result.append(mesh.transformed(matrix[:3, :3], matrix[:3, 3]))
 
-    def _read_geometry(self, geometry: XmlElement) -> Iterator[tuple[str, Matrix, NDArray[np.int32]]]:
-        """Yield the material's symbol, the vertices and the triangles of each set of primitives."""
+    def _read_geometry(self, geometry: XmlElement) -> Iterator[_Part]:
+        """Yield each set of primitives."""
         mesh = _child(geometry, "mesh")
         for element in mesh.children if mesh else ():
             if _tag(element) not in PRIMITIVES:
@@ -165,13 +179,32 @@ class _Reader:
                 raise MeshError("primitives of this Collada file have no vertices")
             offset = int(vertex.attributes.get("offset", "0"))
             vertices = self._positions(vertex.attributes.get("source", ""))
-            lists = [_integers(each.text) for each in _children(element, "p")]
-            corners = [_corners(each, width, offset) for each in lists]
-            triangles = _triangulate(_tag(element), corners, element)
-            if len(triangles):
+            rows = [_rows(_integers(each.text), width) for each in _children(element, "p")]
+            ends = np.cumsum([len(each) for each in rows])
+            numbers = [
+                np.arange(end - len(each), end, dtype=np.int32) for each, end in zip(rows, ends, strict=True)
+            ]
+            corners = _triangulate(_tag(element), numbers, element)
+            if len(corners):
+                indices = np.concatenate(rows)
+                triangles = indices[:, offset][corners]
                 if triangles.min() < 0 or triangles.max() >= len(vertices):
                     raise MeshError("a triangle uses a vertex that does not exist")
-                yield element.attributes.get("material", ""), vertices, triangles
+                texcoords = self._texcoords(inputs, indices, corners)
+                yield _Part(element.attributes.get("material", ""), vertices, triangles, texcoords)
+
+    def _texcoords(
+        self, inputs: list[XmlElement], indices: NDArray[np.int32], corners: NDArray[np.int32]
+    ) -> Texcoords | None:
+        """Return the places of triangles' corners in the texture, or None if the file has none that can be used."""
+        found = next((each for each in inputs if each.attributes.get("semantic") == "TEXCOORD"), None)
+        if found is None:
+            return None
+        values = self._values(found.attributes.get("source", ""), 2)
+        chosen = indices[:, int(found.attributes.get("offset", "0"))][corners]
+        if values is None or chosen.min() < 0 or chosen.max() >= len(values):
+            return None
+        return values.astype(np.float32)[chosen]
 
     def _positions(self, url: str) -> Matrix:
         source = self._by_id.get(_reference(url))
@@ -180,16 +213,24 @@ class _Reader:
                 each for each in _children(source, "input") if each.attributes.get("semantic") == "POSITION"
             ]
             source = self._by_id.get(_reference(rows[0].attributes.get("source", ""))) if rows else None
+        values = self._values(source.attributes.get("id", ""), 3) if source is not None else None
+        if values is None:
+            raise MeshError(f"this Collada file has no positions '{url[:60]}' with three coordinates")
+        return values
+
+    def _values(self, url: str, count: int) -> Matrix | None:
+        """Return the first ``count`` numbers of each entry of a source, or None if there is no such source."""
+        source = self._by_id.get(_reference(url))
         array = _child(source, "float_array") if source is not None else None
         if source is None or array is None:
-            raise MeshError(f"this Collada file has no positions '{url[:60]}'")
+            return None
         values = np.array(array.text.split(), np.float64)
         technique = _child(source, "technique_common")
         accessor = _child(technique, "accessor") if technique else None
-        stride = int(accessor.attributes.get("stride", "3")) if accessor else 3
-        if stride < 3:
-            raise MeshError("positions of this Collada file have less than three coordinates")
-        return values[: len(values) // stride * stride].reshape(-1, stride)[:, :3]
+        stride = int(accessor.attributes.get("stride", str(count))) if accessor else count
+        if stride < count:
+            return None
+        return values[: len(values) // stride * stride].reshape(-1, stride)[:, :count]
 
     def _bindings(self, instance: XmlElement) -> dict[str, MeshMaterial]:
         """Return the materials of an instance by their symbols."""
@@ -293,8 +334,8 @@ def _fans(corners: NDArray[np.int32], sizes: NDArray[np.int32]) -> NDArray[np.in
     return np.stack([corners[first], corners[first + within + 1], corners[first + within + 2]], axis=1)
 
 
-def _corners(values: NDArray[np.int32], width: int, offset: int) -> NDArray[np.int32]:
-    return values[: len(values) // width * width].reshape(-1, width)[:, offset]
+def _rows(values: NDArray[np.int32], width: int) -> NDArray[np.int32]:
+    return values[: len(values) // width * width].reshape(-1, width)
 
 
 def _integers(text: str) -> NDArray[np.int32]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -56,7 +58,30 @@ def _read(path: str, changed: int) -> tuple[Mesh, ...]:
         raise MeshError(f"the format '{file.suffix}' is not supported: convert it to .stl, .obj or .dae")
     if file.stat().st_size > MAX_BYTES:
         raise MeshError(f"the file is larger than {MAX_BYTES // 1_000_000} MB")
-    return tuple(parse(file.read_bytes(), file))
+    return tuple(_with_textures(mesh, file.parent) for mesh in parse(file.read_bytes(), file))
+
+
+def _with_textures(mesh: Mesh, folder: Path) -> Mesh:
+    """Return the mesh with the paths of its textures, or without those that are missing."""
+    if not any(material.texture for material in mesh.materials):
+        return mesh
+    materials = tuple(replace(each, texture=_picture(each.texture, folder)) for each in mesh.materials)
+    return replace(mesh, materials=materials)
+
+
+def _picture(name: str, folder: Path) -> str:
+    """Return the path of a picture that a mesh file in ``folder`` names, or an empty string.
+
+    Gazebo's models have their pictures in ``materials/textures``.
+    """
+    name = unquote(name.removeprefix("file://")).replace("\\", "/")
+    if not name or "\0" in name:
+        return ""
+    for place in (folder, folder.parent / "materials" / "textures"):
+        for path in (place / name, place / name.rpartition("/")[2]):
+            if os.path.isfile(path):
+                return str(path)
+    return ""
 
 
 def _stl(data: bytes, _: Path) -> list[Mesh]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ MAX_TRIANGLES = 2_000_000  # per file; the arrays of a larger one, and what is m
 
 @dataclass(frozen=True)
 class MeshMaterial:
-    """A material: its name, diffuse colour, and the texture's path as the file names it."""
+    """A material: its name, diffuse colour, and the texture's path, or an empty string."""
 
     name: str = ""
     color: Color | None = None
@@ -29,7 +29,8 @@ class MeshMaterial:
 class Mesh:
     """Vertices (n, 3) in metres, triangles (m, 3) as indices of vertices, counter-clockwise seen from outside.
 
-    ``material_of`` (m,) has each triangle's index in ``materials``.
+    ``material_of`` (m,) has each triangle's index in ``materials``. ``texcoords`` (m, 3, 2) has the place of each corner in the
+    texture, from 0 to 1, from the lower left corner; None if the file has none.
     """
 
     vertices: NDArray[np.float64]
@@ -37,6 +38,7 @@ class Mesh:
     name: str = ""
     materials: tuple[MeshMaterial, ...] = (MeshMaterial(),)
     material_of: NDArray[np.int32] | None = None
+    texcoords: NDArray[np.float32] | None = None
 
     @classmethod
     def checked(
@@ -46,6 +48,7 @@ class Mesh:
         name: str = "",
         materials: tuple[MeshMaterial, ...] = (MeshMaterial(),),
         material_of: NDArray[np.int32] | None = None,
+        texcoords: NDArray[np.float32] | None = None,
     ) -> Mesh:
         """Return the mesh. Raise MeshError if an index or a coordinate is invalid, or if there is no triangle."""
         if not len(triangles):
@@ -56,7 +59,9 @@ class Mesh:
             raise MeshError("a triangle uses a vertex that does not exist")
         if not np.isfinite(vertices[np.unique(triangles)]).all() or abs(vertices[triangles]).max() > 1e30:
             raise MeshError("a coordinate is not a finite number")
-        return cls(vertices, triangles, name, materials, material_of)
+        if texcoords is not None and not np.isfinite(texcoords).all():
+            texcoords = None
+        return cls(vertices, triangles, name, materials, material_of, texcoords)
 
     @classmethod
     def join(cls, meshes: Sequence[Mesh]) -> Mesh:
@@ -69,11 +74,12 @@ class Mesh:
 
     def transformed(self, matrix: NDArray[np.float64], offset: NDArray[np.float64]) -> Mesh:
         """Return the mesh with ``matrix @ vertex + offset``; a mirroring matrix turns the triangles around."""
-        triangles = self.triangles
+        triangles, texcoords = self.triangles, self.texcoords
         if np.linalg.det(matrix) < 0:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
+            texcoords = None if texcoords is None else np.ascontiguousarray(texcoords[:, ::-1])
         vertices = self.vertices @ matrix.T + offset
-        return Mesh(vertices, triangles, self.name, self.materials, self.material_of)
+        return Mesh(vertices, triangles, self.name, self.materials, self.material_of, texcoords)
 
     def scaled(self, scale: Vector) -> Mesh:
         """Return the mesh, scaled along the axes."""
@@ -81,10 +87,16 @@ class Mesh:
 
     def by_material(self) -> Iterator[tuple[NDArray[np.int32], Color | None]]:
         """Yield the triangles of each material, with its colour."""
+        for mesh in self.sections():
+            yield mesh.triangles, mesh.materials[0].color
+
+    def sections(self) -> Iterator[Mesh]:
+        """Yield the triangles of each material as a mesh with the same vertices."""
         if self.material_of is None or len(self.materials) <= 1:
-            yield self.triangles, self.materials[0].color if self.materials else None
+            yield replace(self, materials=self.materials or (MeshMaterial(),))
             return
         for index, material in enumerate(self.materials):
-            triangles = self.triangles[self.material_of == index]
-            if len(triangles):
-                yield triangles, material.color
+            rows = np.flatnonzero(self.material_of == index)
+            if len(rows):
+                texcoords = None if self.texcoords is None else self.texcoords[rows]
+                yield Mesh(self.vertices, self.triangles[rows], self.name, (material,), None, texcoords)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +14,8 @@ from minirospy.core.meshes.mesh import MAX_TRIANGLES, Mesh, MeshMaterial
 
 __all__ = ["parse_mtl", "parse_obj"]
 
+_Place = tuple[float, float]
+
 
 def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> list[Mesh]:
     """Return the mesh of each object (``o``). ``library`` returns the text of an MTL file, or an empty string.
@@ -19,10 +23,11 @@ def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> lis
     Polygons become fans of triangles. Raise MeshError with the line if a vertex or face is invalid.
     """
     vertices: list[tuple[float, float, float]] = []
+    places: list[tuple[float, float]] = []  # in the texture
     known: dict[str, MeshMaterial] = {}
     used: dict[str, int] = {}
     material, name, count = "", "", 0
-    objects: dict[str, tuple[list[tuple[int, int, int]], list[int]]] = {}
+    objects: dict[str, _Faces] = {}
     for number, line in enumerate(text.replace("\\\n", " ").splitlines(), 1):
         words = line.partition("#")[0].split()
         if not words:
@@ -31,15 +36,14 @@ def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> lis
         try:
             if keyword == "v":
                 vertices.append((float(values[0]), float(values[1]), float(values[2])))
+            elif keyword == "vt":
+                places.append(_place(values))
             elif keyword == "f":
-                corners = [_index(word, len(vertices)) for word in values]
+                corners = [_index(word.partition("/")[0], len(vertices)) for word in values]
                 if len(corners) < 3:
                     raise ValueError
-                triangles, materials = objects.setdefault(name, ([], []))
-                index = used.setdefault(material, len(used))
-                for second, third in pairwise(corners[1:]):
-                    triangles.append((corners[0], second, third))
-                    materials.append(index)
+                faces = objects.setdefault(name, _Faces())
+                faces.add(corners, _places(values, places), used.setdefault(material, len(used)))
                 count += len(corners) - 2
             elif keyword == "o":
                 name = " ".join(values)
@@ -57,14 +61,54 @@ def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> lis
     materials_used = tuple(known.get(each, MeshMaterial(each)) for each in used)
     points = np.array(vertices, np.float64).reshape(-1, 3)
     return [
-        Mesh.checked(points, np.array(faces, np.int32), key, materials_used, np.array(materials, np.int32))
-        for key, (faces, materials) in objects.items()
+        Mesh.checked(
+            points,
+            np.array(faces.triangles, np.int32),
+            key,
+            materials_used,
+            np.array(faces.materials, np.int32),
+            np.array(faces.places, np.float32) if faces.has_places else None,
+        )
+        for key, faces in objects.items()
     ]
 
 
+@dataclass
+class _Faces:
+    """The triangles of one object, with the index of each one's material and the places of its corners in the texture."""
+
+    triangles: list[tuple[int, int, int]] = field(default_factory=list)
+    materials: list[int] = field(default_factory=list)
+    places: list[tuple[_Place, _Place, _Place]] = field(default_factory=list)
+    has_places: bool = False
+
+    def add(self, corners: list[int], places: list[_Place] | None, material: int) -> None:
+        """Add a polygon as a fan of triangles."""
+        self.has_places = self.has_places or places is not None
+        places = places or [(0.0, 0.0)] * len(corners)
+        self.triangles += [(corners[0], second, third) for second, third in pairwise(corners[1:])]
+        self.places += [(places[0], second, third) for second, third in pairwise(places[1:])]
+        self.materials += [material] * (len(corners) - 2)
+
+
+def _places(words: list[str], known: list[_Place]) -> list[_Place] | None:
+    """Return the places of a polygon's corners in the texture, or None if it has none that can be used."""
+    try:
+        return [known[_index(word.split("/")[1], len(known))] for word in words]
+    except (ValueError, IndexError):
+        return None
+
+
+def _place(values: list[str]) -> _Place:
+    try:
+        return float(values[0]), float(values[1]) if len(values) > 1 else 0.0
+    except (ValueError, IndexError):
+        return math.nan, math.nan  # then the object has no texture coordinates
+
+
 def _index(word: str, count: int) -> int:
-    """Return the index of a corner such as ``3/1/2`` or ``-1``, from 0. Raise ValueError if it does not exist."""
-    index = int(word.partition("/")[0])
+    """Return an index such as ``3`` or ``-1`` of a corner, from 0. Raise ValueError if it does not exist."""
+    index = int(word)
     index = index - 1 if index > 0 else count + index
     if not 0 <= index < count:
         raise ValueError

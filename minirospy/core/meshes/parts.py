@@ -2,11 +2,12 @@
 
 A physics engine collides convex bodies. A convex part of a mesh, closed and oriented outwards, is used as it is. If other
 parts belong to a body that never moves, each flat patch of their surface becomes a thin prism, so that a robot can stand in
-a room that is one mesh. If the body moves, the convex hull of each part is used.
+a room that is one mesh. If the body moves, the convex hull of each part is used, or of what a function splits hollow parts into.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,11 +15,14 @@ from numpy.typing import NDArray
 
 from minirospy.core.meshes.mesh import Mesh
 
-__all__ = ["Parts", "collision_parts", "connected_parts", "is_convex"]
+__all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
 MAX_HULLS = 32  # of a moving mesh; one with more parts collides as the hull of all
 MAX_PRISMS = 1500  # of a static mesh; a finer one is simplified until it has fewer flat patches
 MAX_CONVEX = 5000  # triangles; the test of a larger part would take seconds
+MAX_RAYS = 200  # from the largest triangles, to find out whether a mesh is hollow
+MAX_TESTS = 2_000_000  # of a ray and a triangle; these take 0.2 s
+HOLLOW = 0.1  # of the surface faces other parts of it, as in a cup
 THICKNESS = 0.02  # m, of a prism, below the surface
 FLAT = 1e-6  # of the mesh's size: what is thinner has no hull
 TOLERANCE = 1e-4  # of the part's size, for vertices in front of a face of a convex part
@@ -34,14 +38,19 @@ class Parts(NamedTuple):
     are_exact: bool
 
 
-def collision_parts(mesh: Mesh, *, is_static: bool) -> Parts:
-    """Return the convex parts."""
+def collision_parts(
+    mesh: Mesh, *, is_static: bool, split: Callable[[Mesh], list[Mesh] | None] = lambda part: None
+) -> Parts:
+    """Return the convex parts. ``split`` returns those of a hollow part that moves, or None if its hull must do."""
     mesh = _welded(mesh)
     parts = connected_parts(mesh)
     if not is_static:
         if len(parts) > MAX_HULLS:
             return Parts([_thickened(mesh)], False)
-        return Parts([_thickened(part) for part in parts], all(map(is_convex, parts)))
+        hulls: list[Mesh] = []
+        for part in parts:
+            hulls += (split(part) if is_hollow(part) else None) or [_thickened(part)]
+        return Parts(hulls, all(map(is_convex, parts)))
 
     convex: list[Mesh] = []
     others: list[Mesh] = []
@@ -89,6 +98,23 @@ def is_convex(part: Mesh) -> bool:
             return False
     # A flat part passes, too, but has no volume.
     return bool(np.linalg.matrix_rank(vertices - vertices[0], tol=FLAT * max(size, 1e-12)) == 3)
+
+
+def is_hollow(part: Mesh) -> bool:
+    """Return whether a mesh's hull is much larger: rays away from much of its surface hit the mesh again."""
+    if is_convex(part) or len(part.triangles) < 4:
+        return False
+    corners = part.vertices[part.triangles]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(crosses, axis=1)
+    count = max(1, min(MAX_RAYS, MAX_TESTS // len(areas)))
+    chosen = np.argsort(-areas, kind="stable")[:count]
+    hits = sum(
+        areas[row]
+        for row in chosen.tolist()
+        if len(_hits(corners, corners[row].mean(axis=0), crosses[row] / max(areas[row], 1e-300)))
+    )
+    return bool(hits > HOLLOW * areas[chosen].sum())
 
 
 def _welded(mesh: Mesh) -> Mesh:
@@ -265,19 +291,23 @@ def _depths(mesh: Mesh, patches: list[tuple[Points, Points]]) -> Points:
     if len(patches) * len(mesh.triangles) > 20_000_000:
         return depths
     corners = mesh.vertices[mesh.triangles]
-    origin, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     for index, (outline, normal) in enumerate(patches):
-        # Moeller and Trumbore's intersection of one ray with all triangles.
-        start = outline.mean(axis=0)
-        cross = np.cross(-normal, second)
-        determinant = np.einsum("ij,ij->i", first, cross)
-        inverse = np.divide(1.0, determinant, out=np.zeros_like(determinant), where=abs(determinant) > 1e-15)
-        offset = start - origin
-        u = np.einsum("ij,ij->i", offset, cross) * inverse
-        q = np.cross(offset, first)
-        v = (q @ -normal) * inverse
-        distance = np.einsum("ij,ij->i", second, q) * inverse
-        hits = distance[(inverse != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-4)]
+        hits = _hits(corners, outline.mean(axis=0), -normal)
         if len(hits):
             depths[index] = min(THICKNESS, max(float(hits.min()), 1e-3))
     return depths
+
+
+def _hits(corners: Points, start: Points, direction: Points) -> Points:
+    """Return the distances at which a ray hits triangles (n, 3, 3), by Moeller and Trumbore's method."""
+    origin, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    cross = np.cross(direction, second)
+    determinant = np.einsum("ij,ij->i", first, cross)
+    inverse = np.divide(1.0, determinant, out=np.zeros_like(determinant), where=abs(determinant) > 1e-15)
+    offset = start - origin
+    u = np.einsum("ij,ij->i", offset, cross) * inverse
+    q = np.cross(offset, first)
+    v = (q @ direction) * inverse
+    distance: Points = np.einsum("ij,ij->i", second, q) * inverse
+    hits: Points = distance[(inverse != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 1e-4)]
+    return hits

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from minirospy.core.sdf.model import IDENTITY, Pose
-from minirospy.core.sdf.poses import inverse, multiply
+from minirospy.core.sdf.poses import compose, relative
 
 __all__ = ["MODEL", "Frame", "FrameError", "Frames"]
 
@@ -48,11 +48,11 @@ class Frames:
 
         pose = self._known[name]
         for link in reversed(chain):
-            pose = self._known[link] = multiply(pose, self._frames[link].pose)
+            pose = self._known[link] = compose(pose, self._frames[link].pose)
         return pose
 
     def relative(self, pose: Pose, frame: str, target: str) -> Pose:
         """Return a pose that is given in ``frame`` in the frame ``target``. Raise FrameError as :meth:`in_model` does."""
         if frame == target:
             return pose
-        return multiply(multiply(inverse(self.in_model(target)), self.in_model(frame)), pose)
+        return compose(relative(self.in_model(target), self.in_model(frame)), pose)

@@ -15,6 +15,7 @@ from minirospy.core.urdf.elements import Element
 
 __all__ = [
     "IDENTITY",
+    "MIN_STEP",
     "Axis",
     "Box",
     "Collision",
@@ -57,6 +58,7 @@ class Pose(NamedTuple):
 
 
 IDENTITY = Pose()
+MIN_STEP = 1e-9  # s; the time is counted in nanoseconds
 
 
 class Box(NamedTuple):

@@ -66,7 +66,7 @@ def read_sensor(element: Element, pose: Pose, source: Source) -> Sensor | None:
         kind,
         element,
         pose,
-        max(source.number(element, "update_rate", 0.0), 0.0),
+        source.amount(element, "update_rate", 0.0, infinite=True),
         source.flag(element, "always_on", False),
         source.text(element, "topic"),
         read_plugins(element, source),
@@ -83,7 +83,7 @@ def read_light(element: Element, pose: Pose, source: Source) -> Light:
         diffuse=source.color(element, "diffuse", default.diffuse) or default.diffuse,
         specular=source.color(element, "specular", default.specular) or default.specular,
         direction=unit(source.vector(element, "direction", default.direction)) or default.direction,
-        range=source.number(attenuation, "range", default.range),
+        range=source.number(attenuation, "range", default.range, infinite=True),
         casts_shadows=source.flag(element, "cast_shadows", default.casts_shadows),
     )
 
@@ -94,7 +94,7 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
     if element is None:
         return Inertial()
     name = link.attributes.get("name", "")
-    mass = source.number(element, "mass", 1.0)
+    mass = source.number(element, "mass", 1.0, infinite=True)
     if not 0.0 < mass < float("inf"):
         if not is_static:
             source.warn(
@@ -127,8 +127,8 @@ def read_axis(element: Element | None, source: Source, turned: Callable[[Element
         source.warn(xyz, "the axis is 0 0 0: it is z instead")
         direction = (0.0, 0.0, 1.0)
     limit, dynamics = element.first("limit"), element.first("dynamics")
-    lower = source.limit(limit, "lower", float("-inf"))
-    upper = source.limit(limit, "upper", float("inf"))
+    lower = source.number(limit, "lower", float("-inf"), infinite=True)
+    upper = source.number(limit, "upper", float("inf"), infinite=True)
     if lower > upper:
         source.warn(limit, f"the lower limit {lower:g} is above the upper limit {upper:g}: they are switched")
         lower, upper = upper, lower
@@ -136,11 +136,11 @@ def read_axis(element: Element | None, source: Source, turned: Callable[[Element
         turned(element, direction),
         lower,
         upper,
-        _unlimited_if_negative(source.limit(limit, "effort", -1.0)),
-        _unlimited_if_negative(source.limit(limit, "velocity", -1.0)),
-        source.number(dynamics, "damping", 0.0),
-        source.number(dynamics, "friction", 0.0),
-        source.number(dynamics, "spring_stiffness", 0.0),
+        _unlimited_if_negative(source.number(limit, "effort", -1.0, infinite=True)),
+        _unlimited_if_negative(source.number(limit, "velocity", -1.0, infinite=True)),
+        source.amount(dynamics, "damping", 0.0),
+        source.amount(dynamics, "friction", 0.0),
+        source.amount(dynamics, "spring_stiffness", 0.0),
         source.number(dynamics, "spring_reference", 0.0),
         source.number(element, "initial_position", 0.0),
     )

@@ -1,25 +1,25 @@
-"""Arithmetic of poses and inertias with plain floats. Quaternions are (x, y, z, w) of length 1."""
+"""Arithmetic of poses, vectors and quaternions (x, y, z, w) of length 1, in plain floats."""
 
 from __future__ import annotations
 
 import math
 
-from minirospy.core.sdf.model import Inertial, Pose, Quaternion, Vector
-from minirospy.core.urdf.poses import matrix_from_quaternion, quaternion_from_rpy
+from minirospy.core.sdf.model import Pose, Quaternion, Vector
+from minirospy.core.tf2.rotation import multiply, rotate
+from minirospy.core.urdf.poses import quaternion_from_rpy
 
 __all__ = [
-    "Inertia",
-    "add_inertials",
+    "compose",
     "inverse",
-    "moved",
     "multiply",
+    "normalized",
     "pose_from_rpy",
+    "relative",
     "rotate",
-    "turned_inertia",
+    "rotate_back",
+    "transform",
     "unit",
 ]
-
-Inertia = tuple[float, float, float, float, float, float]
 
 
 def pose_from_rpy(xyz: Vector, rpy: Vector) -> Pose:
@@ -29,31 +29,19 @@ def pose_from_rpy(xyz: Vector, rpy: Vector) -> Pose:
     return Pose(xyz, quaternion_from_rpy(*rpy))
 
 
-def rotate(rotation: Quaternion, vector: Vector) -> Vector:
-    """Return a vector, turned."""
+def rotate_back(rotation: Quaternion, vector: Vector) -> Vector:
+    """Return the vector rotated by the inverse of a rotation."""
     x, y, z, w = rotation
-    vx, vy, vz = vector
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return (
-        vx + w * tx + y * tz - z * ty,
-        vy + w * ty + z * tx - x * tz,
-        vz + w * tz + x * ty - y * tx,
-    )
+    return rotate((-x, -y, -z, w), vector)
 
 
-def multiply(outer: Pose, inner: Pose) -> Pose:
-    """Return ``inner``, which is relative to ``outer``, in the frame of ``outer``'s parent."""
-    x, y, z = rotate(outer.orientation, inner.position)
-    px, py, pz = outer.position
-    return Pose((px + x, py + y, pz + z), _product(outer.orientation, inner.orientation))
-
-
-def inverse(pose: Pose) -> Pose:
-    """Return the pose of the parent's frame in the frame of ``pose``."""
-    x, y, z, w = pose.orientation
-    turned = (-x, -y, -z, w)
-    px, py, pz = rotate(turned, pose.position)
-    return Pose((-px, -py, -pz), turned)
+def normalized(rotation: Quaternion) -> Quaternion:
+    """Return the quaternion of length 1, or the identity if the length is zero or not finite."""
+    length = math.sqrt(sum(each * each for each in rotation))
+    if not 1e-12 < length < math.inf:
+        return 0.0, 0.0, 0.0, 1.0
+    x, y, z, w = rotation
+    return x / length, y / length, z / length, w / length
 
 
 def unit(vector: Vector) -> Vector | None:
@@ -65,56 +53,28 @@ def unit(vector: Vector) -> Vector | None:
     return x / length, y / length, z / length
 
 
-def moved(inertial: Inertial, pose: Pose) -> Inertial:
-    """Return a link's inertial in the frame in which the link has ``pose``."""
-    return inertial._replace(pose=multiply(pose, inertial.pose))
+def transform(pose: Pose, point: Vector) -> Vector:
+    """Return a point of the pose's frame in the parent's frame."""
+    x, y, z = rotate(pose.orientation, point)
+    px, py, pz = pose.position
+    return px + x, py + y, pz + z
 
 
-def add_inertials(first: Inertial, second: Inertial) -> Inertial:
-    """Return the inertial of two bodies that are one, in the axes of their common frame."""
-    mass = first.mass + second.mass
-    x1, y1, z1 = first.pose.position
-    x2, y2, z2 = second.pose.position
-    a, b = (first.mass / mass, second.mass / mass) if mass else (1.0, 0.0)
-    centre = (a * x1 + b * x2, a * y1 + b * y2, a * z1 + b * z2)
-    sums = [left + right for left, right in zip(_about(first, centre), _about(second, centre), strict=True)]
-    xx, xy, xz, yy, yz, zz = sums
-    return Inertial(mass, Pose(centre), (xx, xy, xz, yy, yz, zz))
-
-
-def _about(inertial: Inertial, centre: Vector) -> Inertia:
-    """Return an inertia about a point, in the axes of the link's frame."""
-    xx, xy, xz, yy, yz, zz = turned_inertia(inertial.inertia, inertial.pose.orientation)
-    x, y, z = (here - there for here, there in zip(inertial.pose.position, centre, strict=True))
-    mass = inertial.mass
-    return (
-        xx + mass * (y * y + z * z), xy - mass * x * y, xz - mass * x * z,
-        yy + mass * (x * x + z * z), yz - mass * y * z, zz + mass * (x * x + y * y),
-    )  # fmt: skip
-
-
-def turned_inertia(inertia: Inertia, rotation: Quaternion) -> Inertia:
-    """Return R I R^T."""
-    if rotation[3] == 1.0:
-        return inertia
-    xx, xy, xz, yy, yz, zz = inertia
-    rows = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-    flat = matrix_from_quaternion(rotation)
-    turn = (flat[0:3], flat[3:6], flat[6:9])
-    half = [[sum(turn[i][k] * rows[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
-
-    def entry(i: int, j: int) -> float:
-        return sum(half[i][k] * turn[j][k] for k in range(3))
-
-    return entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)
-
-
-def _product(left: Quaternion, right: Quaternion) -> Quaternion:
-    ax, ay, az, aw = left
-    bx, by, bz, bw = right
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
+def compose(parent: Pose, child: Pose) -> Pose:
+    """Return the pose of ``child``, which is relative to ``parent``, in the frame of ``parent``'s parent."""
+    return Pose(
+        transform(parent, child.position), normalized(multiply(parent.orientation, child.orientation))
     )
+
+
+def inverse(pose: Pose) -> Pose:
+    """Return the pose of the parent in the pose's frame."""
+    x, y, z, w = pose.orientation
+    turned = (-x, -y, -z, w)
+    px, py, pz = rotate(turned, pose.position)
+    return Pose((-px, -py, -pz), turned)
+
+
+def relative(base: Pose, pose: Pose) -> Pose:
+    """Return ``pose`` in the frame of ``base``; both have the same parent."""
+    return compose(inverse(base), pose)

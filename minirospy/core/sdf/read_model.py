@@ -29,7 +29,7 @@ from minirospy.core.sdf.parts import (
     read_plugins,
     read_sensor,
 )
-from minirospy.core.sdf.poses import inverse, multiply, rotate
+from minirospy.core.sdf.poses import compose, relative, rotate, rotate_back
 from minirospy.core.sdf.shapes import read_collision, read_visual
 from minirospy.core.sdf.source import Source
 from minirospy.core.sdf.text import Element
@@ -124,7 +124,7 @@ class _Reader:
             pose = self._in_model(nested.name, element)
             for link in nested.model.links.values():
                 name = f"{nested.name}::{link.name}"
-                links[name] = replace(link, name=name, pose=multiply(pose, link.pose))
+                links[name] = replace(link, name=name, pose=compose(pose, link.pose))
             joints.update(_prefixed_joints(nested))
             plugins += nested.model.plugins + nested.plugins
         for name, part in self.joints.items():
@@ -264,8 +264,8 @@ class _Reader:
             source.flag(element, "gravity", True),
             source.flag(element, "kinematic", False),
             source.flag(element, "self_collide", self_collide),
-            source.number(decay, "linear", 0.0),
-            source.number(decay, "angular", 0.0),
+            source.amount(decay, "linear", 0.0),
+            source.amount(decay, "angular", 0.0),
         )
 
     def _collisions(self, link: str, element: Element) -> Iterator[Collision]:
@@ -317,7 +317,7 @@ class _Reader:
             # MuJoCo and Gazebo move the child. The world is the parent, and the axis points the other way.
             parent, child = child, parent
             axis, axis2 = (each._replace(xyz=_negative(each.xyz)) for each in (axis, axis2))
-        pose = multiply(inverse(links[child].pose), here)
+        pose = relative(links[child].pose, here)
         sensors = tuple(self._sensors(name, element, self._in_joint))
         return Joint(name, kind, parent, child, pose, axis, axis2, read_mimic(axis_element, source), sensors)
 
@@ -353,7 +353,7 @@ class _Reader:
                 xyz = rotate(self._in_model(MODEL if frame == _WORLD else frame, element).orientation, xyz)
             elif not is_in_model:
                 return xyz
-            return rotate(inverse(joint).orientation, xyz)
+            return rotate_back(joint.orientation, xyz)
 
         return turned
 

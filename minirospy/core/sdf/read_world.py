@@ -10,6 +10,7 @@ from minirospy.base.errors import SdfError
 from minirospy.core.sdf.includes import open_include
 from minirospy.core.sdf.model import (
     IDENTITY,
+    MIN_STEP,
     Color,
     Light,
     Model,
@@ -54,13 +55,13 @@ def read_physics(element: Element | None, source: Source) -> Physics:
     ode = element.first("ode") if element is not None else None
     solver = ode.first("solver") if ode is not None else None
     step = source.number(element, "max_step_size", _PHYSICS.step)
-    if not 0.0 < step < 1.0:
+    if not MIN_STEP <= step < 1.0:
         source.warn(element, f"the step of {step:g} s is not possible: it is {_PHYSICS.step} s")
         step = _PHYSICS.step
     return Physics(
         step,
         source.number(element, "real_time_factor", _PHYSICS.real_time_factor),
-        max(source.number(element, "real_time_update_rate", _PHYSICS.update_rate), 0.0),
+        source.amount(element, "real_time_update_rate", _PHYSICS.update_rate),
         source.vector(element, "gravity", _PHYSICS.gravity),
         int(source.number(solver, "iters", _PHYSICS.iterations)),
         source.number(solver, "sor", _PHYSICS.sor),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from minirospy.base.errors import SdfError
 from minirospy.core.sdf.materials import read_material
 from minirospy.core.sdf.model import (
     Box,
@@ -57,15 +56,13 @@ def read_surface(element: Element | None, source: Source) -> Surface:
     if element is None:
         return _SURFACE
     friction, contact = _ode(element, "friction"), _ode(element, "contact")
-    mu = source.number(friction, "mu", _SURFACE.mu)
-    mu2 = source.number(friction, "mu2", _SURFACE.mu2)
     return Surface(
-        max(mu, 0.0),
-        max(mu2, 0.0),
-        source.number(contact, "kp", _SURFACE.kp),
-        source.number(contact, "kd", _SURFACE.kd),
-        source.number(contact, "min_depth", _SURFACE.min_depth),
-        source.number(contact, "max_vel", _SURFACE.max_velocity),
+        source.amount(friction, "mu", _SURFACE.mu, infinite=True),
+        source.amount(friction, "mu2", _SURFACE.mu2, infinite=True),
+        source.number(contact, "kp", _SURFACE.kp, infinite=True),
+        source.number(contact, "kd", _SURFACE.kd, infinite=True),
+        source.number(contact, "min_depth", _SURFACE.min_depth, infinite=True),
+        source.number(contact, "max_vel", _SURFACE.max_velocity, infinite=True),
         source.number(element.first("bounce"), "restitution_coefficient", _SURFACE.restitution),
         source.vector(friction, "fdir1", _SURFACE.fdir1),
     )
@@ -99,7 +96,7 @@ class _LeftOutError(ValueError):
 def _read_box(element: Element, source: Source) -> Box:
     x, y, z = source.vector(element, "size", (1.0, 1.0, 1.0))
     if sum(side > 0.0 for side in (x, y, z)) < 2:
-        raise _LeftOutError("the box has a size of 0 or less")
+        raise _LeftOutError(f"the box has a size of 0 or less: {x:g} {y:g} {z:g}")
     return Box((max(x, _MIN_SIDE), max(y, _MIN_SIDE), max(z, _MIN_SIDE)))
 
 
@@ -165,15 +162,13 @@ _SHAPES: dict[str, Callable[[Element, Source], Geometry]] = {
 
 def _length(element: Element, tag: str, default: float, source: Source) -> float:
     value = source.number(element, tag, default)
-    if value == float("inf"):
-        raise SdfError(source.file, element.line, f"<{tag}> is infinite")
     _require(value, f"the {element.tag}'s {tag} is 0 or less")
     return value
 
 
 def _require(value: float, why: str) -> None:
     if value <= 0.0:
-        raise _LeftOutError(why)
+        raise _LeftOutError(f"{why}: {value:g}")
 
 
 def _file(element: Element, tag: str, what: str, source: Source) -> str:

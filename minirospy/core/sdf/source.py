@@ -26,7 +26,7 @@ MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 1
 MAX_INCLUDES = 16  # files and models inside each other; deeper ones are a mistake or an attack
 MAX_WARNINGS = 200  # lines about one model or world; nobody reads more
 MAX_PARTS = 20_000  # links, joints and models that one world or spawn request may have
-_UNLIMITED = 1e16  # sdformat writes infinite limits as this number
+_INFINITE = 1e16  # sdformat writes infinite limits as this number; larger ones overflow in the simulation
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no", "")
 
@@ -150,17 +150,20 @@ class Source:
             return text in _TRUE
         raise self.error(child, f"<{tag}> is '{child.text.strip()}': write true or false")
 
-    def number(self, element: Element | None, tag: str, default: float) -> float:
-        """Return a child's number, which may be infinite. Raise SdfError if it is not a number."""
+    def number(self, element: Element | None, tag: str, default: float, *, infinite: bool = False) -> float:
+        """Return a child's number. Raise SdfError if it is not a number, or infinite and ``infinite`` is false."""
         child = element.first(tag) if element else None
         if child is None or not child.text.strip():
             return default
-        return self.numbers(child, (1,))[0]
+        return (self.numbers if infinite else self.finite)(child, (1,))[0]
 
-    def limit(self, element: Element | None, tag: str, default: float) -> float:
-        """Return a child's number; a huge one is infinite."""
-        value = self.number(element, tag, default)
-        return math.copysign(math.inf, value) if abs(value) >= _UNLIMITED else value
+    def amount(self, element: Element | None, tag: str, default: float, *, infinite: bool = False) -> float:
+        """Return a child's number; a negative one is 0, which adds a warning. Raise SdfError as :meth:`number` does."""
+        value = self.number(element, tag, default, infinite=infinite)
+        if value < 0.0:
+            self.warn(element, f"<{tag}> is {value:g}: it is 0 instead")
+            return 0.0
+        return value
 
     def vector(self, element: Element | None, tag: str, default: Vector) -> Vector:
         """Return a child's three numbers."""
@@ -203,7 +206,10 @@ class Source:
         return values
 
     def numbers(self, element: Element, counts: tuple[int, ...]) -> list[float]:
-        """Return an element's numbers. Raise SdfError if one is not a number (or NaN), or if there are too few or too many."""
+        """Return an element's numbers; huge ones are infinite.
+
+        Raise SdfError if one is not a number (or NaN), or if there are too few or too many.
+        """
         values = []
         for part in element.text.split():
             try:
@@ -214,7 +220,7 @@ class Source:
                 ) from None
             if math.isnan(value):
                 raise self.error(element, f"<{element.tag}> is '{_short(element.text)}': NaN is not allowed")
-            values.append(value)
+            values.append(math.copysign(math.inf, value) if abs(value) >= _INFINITE else value)
         if len(values) not in counts:
             expected = " or ".join(map(str, counts))
             raise self.error(

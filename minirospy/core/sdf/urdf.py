@@ -16,9 +16,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from minirospy.base.errors import SdfError, UrdfError
+from minirospy.core.sdf.inertias import add_inertials, moved
 from minirospy.core.sdf.materials import named_material
 from minirospy.core.sdf.model import IDENTITY, Inertial, Model, Pose
-from minirospy.core.sdf.poses import add_inertials, moved, multiply, pose_from_rpy
+from minirospy.core.sdf.poses import compose, pose_from_rpy
 from minirospy.core.sdf.read_model import read_model
 from minirospy.core.sdf.source import Source
 from minirospy.core.sdf.text import Element, copy_of, new_element
@@ -172,7 +173,7 @@ class _Converter:
         target, pose = name, IDENTITY
         if joint is not None and self._is_merged(joint):
             above, above_pose = self.lumped.get(joint.parent, (joint.parent, IDENTITY))
-            target, pose = above, multiply(above_pose, _pose(joint.origin))
+            target, pose = above, compose(above_pose, _pose(joint.origin))
             self.lumped[name] = target, pose
         else:
             self._bodies[name] = _Body(link, None)
@@ -247,7 +248,7 @@ class _Converter:
         if joint.parent == _WORLD:
             return "", _pose(joint.origin)
         parent, pose = self.lumped.get(joint.parent, (joint.parent, IDENTITY))
-        return parent, multiply(pose, _pose(joint.origin))
+        return parent, compose(pose, _pose(joint.origin))
 
     def _add_shapes(self, link: Element, body: _Body) -> None:
         for index, (owner, pose, visual) in enumerate(body.visuals):
@@ -347,7 +348,7 @@ class _Converter:
             return
         inner = self._source.pose(old) if old is not None else IDENTITY
         blob.children = [part for part in blob.children if part is not old]
-        blob.children.append(_pose_element(multiply(pose, inner)))
+        blob.children.append(_pose_element(compose(pose, inner)))
 
     def _rename_collisions(self, sensor: Element, owner: str) -> None:
         """Let a contact sensor of a merged link refer to its collisions by their new names."""
@@ -465,7 +466,7 @@ def _part_name(link: str, name: str, kind: str, index: int) -> str:
 def _shape(tag: str, name: str, pose: Pose, origin: Origin, geometry: Geometry, line: int) -> Element:
     element = new_element(tag, attributes={"name": name}, line=line)
     element.children += [
-        _pose_element(multiply(pose, _pose(origin))),
+        _pose_element(compose(pose, _pose(origin))),
         new_element("geometry", "", _geometry(geometry, line), line=line),
     ]
     return element

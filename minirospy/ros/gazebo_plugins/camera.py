@@ -13,7 +13,7 @@ from sensor_msgs.srv import SetCameraInfo, SetCameraInfoRequest, SetCameraInfoRe
 
 from minirospy import client as rospy
 from minirospy.base.times import Time
-from minirospy.core.sdf.poses import multiply
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.dynamic_reconfigure.definition import Definition
 from minirospy.ros.gazebo_plugins.optics import (
     Optics,
@@ -24,6 +24,7 @@ from minirospy.ros.gazebo_plugins.optics import (
     to_camera_info,
 )
 from minirospy.ros.gazebo_plugins.pictures import Photographer
+from minirospy.ros.gazebo_ros.physics.rendering import MAX_PIXELS
 from minirospy.ros.gazebo_ros.plugins import PluginError, SensorPlugin
 
 if TYPE_CHECKING:
@@ -65,7 +66,8 @@ class CameraPlugin(SensorPlugin):
 
     def add_lens(self, optics: Optics, suffix: str = "", baseline: float | None = None) -> Lens:
         """Add a camera whose topics are below the camera's name and a suffix. Raise PluginError if its size is impossible."""
-        if min(optics.width, optics.height) < 1 or not 0 < optics.horizontal_fov < math.pi:
+        sizes = (optics.width, optics.height)
+        if not (min(sizes) >= 1 and max(sizes) <= MAX_PIXELS and 0 < optics.horizontal_fov < math.pi):
             raise PluginError(
                 f"a camera of {optics.width}x{optics.height} pixels and {optics.horizontal_fov} rad is not possible"
             )
@@ -183,7 +185,7 @@ class Lens:
     def take(self, draw: Callable[[Renderer], None]) -> None:
         """Copy the scene, and draw it later."""
         optics = self.optics
-        pose = multiply(self.plugin.sensor_pose, optics.pose)
+        pose = compose(self.plugin.sensor_pose, optics.pose)
         self.photographer.take(pose, optics.horizontal_fov, (optics.near, optics.far), draw)
 
     def publish_info(self, stamp: Time, publisher: rospy.Publisher[Any]) -> None:

@@ -6,7 +6,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
-from minirospy.core.sdf.poses import inverse, multiply
+from minirospy.core.sdf.poses import relative
 from minirospy.ros.gazebo_plugins.odometry import (
     PlanarOdometry,
     TransformPublisher,
@@ -134,5 +134,5 @@ class DiffDrive(ModelPlugin):
     def _send_wheel(self, joint: SimJoint) -> None:
         parent, child = joint.record.parent, joint.record.child
         if parent in self.model.links:
-            pose = multiply(inverse(self.model.links[parent].pose), self.model.links[child].pose)
+            pose = relative(self.model.links[parent].pose, self.model.links[child].pose)
             self._transforms.send(self.now, parent, child, pose)

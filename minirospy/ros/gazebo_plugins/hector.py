@@ -14,11 +14,12 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, Range
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from minirospy.core.sdf.model import Pose, Vector
-from minirospy.core.sdf.poses import inverse, multiply, pose_from_rpy, rotate
+from minirospy.core.sdf.poses import compose, pose_from_rpy, rotate, rotate_back
 from minirospy.ros.gazebo_plugins.rays import read_rays
 from minirospy.ros.gazebo_ros.messages import to_pose, to_vector
+from minirospy.ros.gazebo_ros.parameters import numbers_of
 from minirospy.ros.gazebo_ros.physics import SimLink
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, PluginError, SensorPlugin, Timer
+from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, SensorPlugin, Timer
 
 __all__ = ["ErrorModel", "HectorGps", "HectorImu", "HectorSonar"]
 
@@ -40,13 +41,7 @@ class ErrorModel:
 
         def read(name: str, default: float) -> Values:
             tag = f"{prefix}{name}" if prefix else name[0].lower() + name[1:]
-            text = plugin.text(tag)
-            try:
-                numbers = [float(each) for each in text.split()] or [default]
-            except ValueError:
-                raise PluginError(f"<{tag}> is '{text}', not {axes} numbers") from None
-            if len(numbers) not in (1, axes):
-                raise PluginError(f"<{tag}> is '{text}', not {axes} numbers")
+            numbers = numbers_of(plugin.element, tag, (1, axes)) or (default,)
             values: Values = np.broadcast_to(np.array(numbers), axes).copy()
             return values
 
@@ -166,7 +161,7 @@ class HectorImu(_HectorPlugin):
         super().load()
         topic = self.text("topicName", "imu")
         self._frame = self.frame("frameId", self.text("bodyName", self.body.name))
-        roll, pitch, yaw = self._three("rpyOffset")
+        roll, pitch, yaw = self.numbers("rpyOffset", (0.0, 0.0, 0.0))
         self._offset = pose_from_rpy((0.0, 0.0, 0.0), (roll, pitch, yaw))
         self._accel, self._turn = ErrorModel(self, "accel", 3), ErrorModel(self, "rate", 3)
         self._yaw = ErrorModel(self, "yaw", 1)
@@ -190,14 +185,13 @@ class HectorImu(_HectorPlugin):
         last, self._velocity = self._velocity, state.linear
         if last is None or seconds <= 0:
             return
-        turned = multiply(Pose((0.0, 0.0, 0.0), state.pose.orientation), self._offset)
-        back = inverse(turned).orientation
+        turned = compose(Pose((0.0, 0.0, 0.0), state.pose.orientation), self._offset)
         gravity = self.simulation.physics.gravity
         ax, ay, az = (
             (new - old) / seconds - g for new, old, g in zip(state.linear, last, gravity, strict=True)
         )
-        acceleration = self._accel.measured(rotate(back, (ax, ay, az)), seconds).tolist()
-        rates = self._turn.measured(rotate(back, state.angular), seconds).tolist()
+        acceleration = self._accel.measured(rotate_back(turned.orientation, (ax, ay, az)), seconds).tolist()
+        rates = self._turn.measured(rotate_back(turned.orientation, state.angular), seconds).tolist()
         self._yaw.measured(np.zeros(1), seconds)
 
         # The error of the orientation is that of the accelerometer and of the compass, as in an attitude filter.
@@ -207,11 +201,11 @@ class HectorImu(_HectorPlugin):
         tilt = (0.5 * dy / strength, -0.5 * dx / strength) if strength else (0.0, 0.0)
         length = math.sqrt(1 + tilt[0] ** 2 + tilt[1] ** 2)
         tilted = Pose((0.0, 0.0, 0.0), (tilt[0] / length, tilt[1] / length, 0.0, 1 / length))
-        error = multiply(pose_from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, float(self._yaw.bias[0]))), tilted)
+        error = compose(pose_from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, float(self._yaw.bias[0]))), tilted)
 
         message = Imu()
         message.header.stamp, message.header.frame_id = self.now, self._frame
-        message.orientation = to_pose(multiply(error, turned)).orientation
+        message.orientation = to_pose(compose(error, turned)).orientation
         message.angular_velocity = to_vector((rates[0], rates[1], rates[2]))
         message.linear_acceleration = to_vector((acceleration[0], acceleration[1], acceleration[2]))
         message.angular_velocity_covariance = np.diag(self._turn.noise**2).ravel().tolist()
@@ -226,12 +220,6 @@ class HectorImu(_HectorPlugin):
         bias.angular_velocity = to_vector((rx, ry, rz))
         bias.linear_acceleration = to_vector((bx, by, bz))
         self._biases.publish(bias)
-
-    def _three(self, tag: str) -> list[float]:
-        values = [float(each) for each in self.text(tag, "0 0 0").split()]
-        if len(values) != 3:
-            raise PluginError(f"<{tag}> has {len(values)} numbers instead of 3")
-        return values
 
     def _calibrate(self, _request: EmptyRequest) -> EmptyResponse:
         def clear() -> EmptyResponse:

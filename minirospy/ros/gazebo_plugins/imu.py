@@ -9,7 +9,7 @@ from sensor_msgs.msg import Imu as ImuMsg
 from std_srvs.srv import Empty, EmptyResponse
 
 from minirospy.core.sdf.model import IDENTITY, Pose, Vector
-from minirospy.core.sdf.poses import inverse, multiply, pose_from_rpy, rotate
+from minirospy.core.sdf.poses import compose, inverse, pose_from_rpy, rotate_back
 from minirospy.ros.gazebo_ros.messages import to_vector
 from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, PluginError, SensorPlugin, Timer
 
@@ -30,7 +30,7 @@ class _Accelerometer:
     def measure(self, time_ns: int) -> tuple[Pose, Vector, Vector]:
         """Return the pose in the world, and the angular velocity and the acceleration in the sensor's axes."""
         state = self._link.state
-        pose = multiply(state.pose, self._place)
+        pose = compose(state.pose, self._place)
         ax, ay, az = (a - b for a, b in zip(pose.position, state.pose.position, strict=True))
         wx, wy, wz = state.angular
         vx, vy, vz = state.linear
@@ -41,19 +41,14 @@ class _Accelerometer:
             x, y, z = ((new - old) / seconds for new, old in zip(velocity, self._last[1], strict=True))
             acceleration = (x, y, z)
         self._last = (time_ns, velocity)
-        back = inverse(pose).orientation
-        return pose, rotate(back, state.angular), rotate(back, acceleration)
+        return pose, rotate_back(pose.orientation, state.angular), rotate_back(pose.orientation, acceleration)
 
 
 def offset_of(plugin: PluginBase) -> Pose:
     """Return the pose of xyzOffset and rpyOffset."""
-    vectors = []
-    for tag in ("xyzOffset", "rpyOffset"):
-        values = [float(word) for word in plugin.text(tag, "0 0 0").split()]
-        if len(values) != 3:
-            raise PluginError(f"<{tag}> has {len(values)} numbers, not three")
-        vectors.append((values[0], values[1], values[2]))
-    return pose_from_rpy(*vectors)
+    x, y, z = plugin.numbers("xyzOffset", (0.0, 0.0, 0.0))
+    roll, pitch, yaw = plugin.numbers("rpyOffset", (0.0, 0.0, 0.0))
+    return pose_from_rpy((x, y, z), (roll, pitch, yaw))
 
 
 def _message(plugin: PluginBase, frame: str, noise: float, values: tuple[Pose, Vector, Vector]) -> ImuMsg:
@@ -88,7 +83,7 @@ class Imu(ModelPlugin):
         if not body:
             raise PluginError("imu plugin missing <bodyName>, cannot proceed")
         link, place = self.link(body)
-        self._place = multiply(place, offset_of(self))
+        self._place = compose(place, offset_of(self))
         self._meter = _Accelerometer(link, self._place)
         self._link = link
         self._noise = self.number("gaussianNoise", 0.0)
@@ -144,9 +139,9 @@ class ImuSensor(SensorPlugin):
     def sense(self) -> None:
         """Publish a measurement."""
         pose, angular, acceleration = self._meter.measure(self.simulation.time_ns)
-        gx, gy, gz = rotate(inverse(pose).orientation, self.simulation.physics.gravity)
+        gx, gy, gz = rotate_back(pose.orientation, self.simulation.physics.gravity)
         ax, ay, az = acceleration
-        turned = multiply(self._reference, pose._replace(position=(0.0, 0.0, 0.0)))
-        shown = multiply(self._offset, turned)
+        turned = compose(self._reference, pose._replace(position=(0.0, 0.0, 0.0)))
+        shown = compose(self._offset, turned)
         values = (shown, angular, (ax - gx, ay - gy, az - gz))
         self._publisher.publish(_message(self, self._frame, self._noise, values))

@@ -13,6 +13,7 @@ from sensor_msgs.msg import CameraInfo
 from minirospy.base.xml_text import XmlElement
 from minirospy.core.sdf.model import IDENTITY, Pose
 from minirospy.core.sdf.poses import pose_from_rpy
+from minirospy.ros.gazebo_ros.parameters import number_of, numbers_of, text_of
 
 __all__ = ["Optics", "add_noise", "encode", "encoding_of", "read_optics", "to_camera_info"]
 
@@ -60,25 +61,25 @@ class Optics:
 
 
 def read_optics(camera: XmlElement | None) -> Optics:
-    """Read ``<camera>``. Raise ValueError if a value is not a number."""
+    """Read ``<camera>``. Raise PluginError if a value cannot be used."""
     if camera is None:
         return Optics()
     image, clip = camera.first("image"), camera.first("clip")
     noise, lens = camera.first("noise"), camera.first("distortion")
-    kind = _text(noise, "type") or (noise.attributes.get("type", "") if noise is not None else "")
+    kind = text_of(noise, "type") or (noise.attributes.get("type", "") if noise is not None else "")
     is_noisy = kind in ("gaussian", "gaussian_quantized")
     return Optics(
         camera.attributes.get("name", ""),
         _pose(camera),
-        int(_number(image, "width", 320)),
-        int(_number(image, "height", 240)),
-        _text(image, "format") or "R8G8B8",
-        _number(camera, "horizontal_fov", 1.047),
-        _number(clip, "near", 0.1),
-        _number(clip, "far", 100.0),
-        _number(noise, "mean", 0.0) if is_noisy else 0.0,
-        _number(noise, "stddev", 0.0) if is_noisy else 0.0,
-        tuple(_number(lens, tag, 0.0) for tag in ("k1", "k2", "p1", "p2", "k3")),
+        int(number_of(image, "width", 320)),
+        int(number_of(image, "height", 240)),
+        text_of(image, "format") or "R8G8B8",
+        number_of(camera, "horizontal_fov", 1.047),
+        number_of(clip, "near", 0.1),
+        number_of(clip, "far", 100.0),
+        number_of(noise, "mean", 0.0) if is_noisy else 0.0,
+        number_of(noise, "stddev", 0.0) if is_noisy else 0.0,
+        tuple(number_of(lens, tag, 0.0) for tag in ("k1", "k2", "p1", "p2", "k3")),
     )
 
 
@@ -137,19 +138,8 @@ def add_noise(picture: Picture, optics: Optics, random: np.random.Generator) -> 
 
 
 def _pose(camera: XmlElement) -> Pose:
-    element = camera.first("pose")
-    values = [float(each) for each in element.text.split()] if element is not None else []
-    if len(values) != 6:
+    values = numbers_of(camera, "pose", (6,))
+    if not values:
         return IDENTITY
     x, y, z, roll, pitch, yaw = values
     return pose_from_rpy((x, y, z), (roll, pitch, yaw))
-
-
-def _text(element: XmlElement | None, tag: str) -> str:
-    child = element.first(tag) if element is not None else None
-    return child.text.strip() if child is not None else ""
-
-
-def _number(element: XmlElement | None, tag: str, default: float) -> float:
-    text = _text(element, tag)
-    return float(text) if text else default

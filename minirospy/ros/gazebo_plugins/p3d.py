@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nav_msgs.msg import Odometry
 
-from minirospy.core.sdf.poses import multiply
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.gazebo_plugins.imu import offset_of
 from minirospy.ros.gazebo_ros.frames import relative_state
 from minirospy.ros.gazebo_ros.messages import to_pose, to_twist
@@ -44,13 +44,13 @@ class P3D(ModelPlugin):
         if not self._timer.is_due(self.simulation.time_ns) or not self._publisher.get_num_connections():
             return
         state = self._link.state
-        state = State(multiply(state.pose, self._place), state.linear, state.angular)
+        state = State(compose(state.pose, self._place), state.linear, state.angular)
         if self._reference is not None:
             link, place = self._reference
             base = link.state
-            state = relative_state(state, State(multiply(base.pose, place), base.linear, base.angular))
+            state = relative_state(state, State(compose(base.pose, place), base.linear, base.angular))
         x, y, z = (a + b for a, b in zip(state.pose.position, self._offset.position, strict=True))
-        rotation = multiply(
+        rotation = compose(
             self._offset._replace(position=(0.0, 0.0, 0.0)), state.pose._replace(position=(0.0, 0.0, 0.0))
         ).orientation
         message = Odometry(child_frame_id=self._body)

@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from minirospy.base.xml_text import XmlElement
 from minirospy.core.sdf.model import Sensor
+from minirospy.ros.gazebo_ros.parameters import PluginError, number_of, text_of
 from minirospy.ros.gazebo_ros.physics import Simulation
 
 __all__ = ["Rays", "read_rays"]
+
+MAX_RAYS = 1_000_000  # of one sensor; more would fill the memory
 
 
 @dataclass(frozen=True)
@@ -40,46 +43,38 @@ class Rays:
 
 
 def read_rays(sensor: Sensor) -> Rays:
-    """Read ``<ray>``, or ``<lidar>``. Raise ValueError if a value is not a number."""
+    """Read ``<ray>``, or ``<lidar>``. Raise PluginError if a value cannot be used."""
     ray = sensor.element.first("ray") or sensor.element.first("lidar")
     scan = _child(ray, "scan")
     horizontal, vertical = _child(scan, "horizontal"), _child(scan, "vertical")
     low, high, count = _angles(horizontal, 640)
     bottom, top, rows = _angles(vertical, 1)
+    if count * rows > MAX_RAYS:
+        raise PluginError(f"the sensor has {count} x {rows} rays: at most {MAX_RAYS} are possible")
     around = np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
     upwards = np.linspace(bottom, top, rows) if rows > 1 else np.array([(bottom + top) / 2])
     pitch, yaw = (grid.ravel() for grid in np.meshgrid(upwards, around, indexing="ij"))
     columns = (np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch))
     limits, noise = _child(ray, "range"), _child(ray, "noise")
-    is_noisy = noise is not None and _text(noise, "type") in ("gaussian", "gaussian_quantized")
+    is_noisy = noise is not None and text_of(noise, "type") in ("gaussian", "gaussian_quantized")
     return Rays(
         np.stack(columns, axis=1),
         low,
         high,
         count,
-        _number(limits, "min", 0.0),
-        _number(limits, "max", 0.0),
-        _number(noise, "mean", 0.0) if is_noisy else 0.0,
-        _number(noise, "stddev", 0.0) if is_noisy else 0.0,
+        number_of(limits, "min", 0.0),
+        number_of(limits, "max", 0.0),
+        number_of(noise, "mean", 0.0) if is_noisy else 0.0,
+        number_of(noise, "stddev", 0.0) if is_noisy else 0.0,
     )
 
 
 def _angles(element: XmlElement | None, samples: int) -> tuple[float, float, int]:
     if element is None:
         return 0.0, 0.0, 1
-    count = int(_number(element, "samples", samples) * _number(element, "resolution", 1.0))
-    return _number(element, "min_angle", 0.0), _number(element, "max_angle", 0.0), max(1, count)
+    count = int(number_of(element, "samples", samples) * number_of(element, "resolution", 1.0))
+    return number_of(element, "min_angle", 0.0), number_of(element, "max_angle", 0.0), max(1, count)
 
 
 def _child(element: XmlElement | None, tag: str) -> XmlElement | None:
     return element.first(tag) if element is not None else None
-
-
-def _text(element: XmlElement | None, tag: str) -> str:
-    child = _child(element, tag)
-    return child.text.strip() if child is not None else ""
-
-
-def _number(element: XmlElement | None, tag: str, default: float) -> float:
-    text = _text(element, tag)
-    return float(text) if text else default

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from minirospy.core.sdf.model import Pose, Vector
-from minirospy.core.sdf.poses import inverse, multiply, rotate
+from minirospy.core.sdf.model import Vector
+from minirospy.core.sdf.poses import relative, rotate_back
 from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, SimModel, State
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ __all__ = [
     "find_joint",
     "find_link",
     "relative_state",
-    "turned_back",
 ]
 
 WORLD_FRAMES = ("", "world", "map", "/map")
@@ -53,15 +52,10 @@ def find_joint(simulation: Simulation, name: str) -> SimJoint | None:
 def relative_state(state: State, frame: State) -> State:
     """Return a state relative to a frame: the pose, and the difference of velocities in the frame's axes."""
     return State(
-        multiply(inverse(frame.pose), state.pose),
-        turned_back(frame.pose, difference(state.linear, frame.linear)),
-        turned_back(frame.pose, difference(state.angular, frame.angular)),
+        relative(frame.pose, state.pose),
+        rotate_back(frame.pose.orientation, difference(state.linear, frame.linear)),
+        rotate_back(frame.pose.orientation, difference(state.angular, frame.angular)),
     )
-
-
-def turned_back(frame: Pose, vector: Vector) -> Vector:
-    """Return a vector of the world in a frame's axes."""
-    return rotate(inverse(frame).orientation, vector)
 
 
 def difference(left: Vector, right: Vector) -> Vector:

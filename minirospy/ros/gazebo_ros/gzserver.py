@@ -111,9 +111,10 @@ def _run(
     simulation: Simulation, world: World, resources: ResourcePaths, *, paused: bool, steps: int
 ) -> SimulationLoop:
     from minirospy.ros.gazebo_ros.loop import SimulationLoop
+    from minirospy.ros.gazebo_ros.physics_services import PhysicsServices
     from minirospy.ros.gazebo_ros.reconfigure import PhysicsReconfigure
     from minirospy.ros.gazebo_ros.server import Server
-    from minirospy.ros.gazebo_ros.services import Services
+    from minirospy.ros.gazebo_ros.state_services import StateServices
 
     clock = None
     if rospy.get_param("/use_sim_time"):
@@ -127,7 +128,8 @@ def _run(
     try:
         loop.call(lambda: server.start(world))
         if has_network:
-            PhysicsReconfigure(server, Services(server))
+            StateServices(server)
+            PhysicsReconfigure(server, PhysicsServices(server))
             rospy.loginfo("Physics dynamic reconfigure ready.")
         else:
             rospy.loginfo("ROS gazebo topics/services are disabled")

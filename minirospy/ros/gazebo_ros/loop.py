@@ -22,6 +22,8 @@ DEFAULT_TICK_HZ = 250.0  # /clock and the states of models; 1000 messages/s woul
 MAX_LAG_SECONDS = 0.1  # a simulation that is later than this does not try to catch up
 MAX_STEPPING_SECONDS = 0.1  # of wall time, after which jobs run before the next tick: a step may be 1 ns
 
+MAX_WAIT_SECONDS = 60.0  # for the next steps; longer times overflow in wait()
+
 
 class LoopClosed(MinirospyError):
     """Raised by a job if the simulation has ended."""
@@ -186,7 +188,7 @@ class SimulationLoop:
             if not self._rate or now - self._deadline > MAX_LAG_SECONDS:
                 self._deadline = now
             if now < self._deadline:
-                self._wake.wait(self._deadline - now)
+                self._wake.wait(min(self._deadline - now, MAX_WAIT_SECONDS))
                 return True
         return False
 

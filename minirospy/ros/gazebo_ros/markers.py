@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import client as rospy
 from minirospy.core.sdf.model import Box, Color, Cylinder, MeshShape, Plane, Pose, Sphere, Visual
-from minirospy.core.sdf.poses import multiply
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.gazebo_ros.messages import time_of, to_pose
 from minirospy.workspace.packages import package_name
 
@@ -78,7 +78,7 @@ class WorldMarkers:
             if marker is not None:
                 marker.ns = link.scoped_name
                 marker.id = index
-                marker.pose = to_pose(multiply(pose, visual.pose))
+                marker.pose = to_pose(compose(pose, visual.pose))
                 found.append(marker)
         return found
 

@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from minirospy import client as rospy
-from minirospy.base.errors import ManifestError, MinirospyError
+from minirospy.base.errors import ManifestError
 from minirospy.base.times import Time
 from minirospy.base.xml_text import XmlElement
 from minirospy.core.sdf.model import IDENTITY, Plugin, Pose, Sensor
-from minirospy.core.sdf.poses import multiply
+from minirospy.core.sdf.poses import compose
 from minirospy.ros.gazebo_ros.messages import time_of
+from minirospy.ros.gazebo_ros.parameters import PluginError, number_of, numbers_of, text_of
 from minirospy.workspace.manifest import read_manifest
 from minirospy.workspace.packages import Packages
 
@@ -41,6 +42,8 @@ __all__ = [
 ]
 
 _T = TypeVar("_T")
+
+_RATES = ("odometryRate", "updateRate", "updateRateHZ")
 
 _PLUGINS = "minirospy.ros.gazebo_plugins"
 LIBRARIES = {
@@ -75,10 +78,6 @@ LIBRARIES = {
 """Dict from library, without ``lib`` and ``.so``, to module and class."""
 
 
-class PluginError(MinirospyError):
-    """Raised by ``load`` if a plugin's parameters cannot be used; the message is one line."""
-
-
 class PluginBase:
     """A plugin of the world.
 
@@ -110,6 +109,11 @@ class PluginBase:
         self._closing.clear()
 
     @property
+    def title(self) -> str:
+        """Return the plugin's name and library, for messages."""
+        return _title(self.plugin, "the world")
+
+    @property
     def namespace(self) -> str:
         """Return ``<robotNamespace>``, which is resolved in the node's namespace, or the default, without a final slash."""
         text = self.text("robotNamespace", self.default_namespace)
@@ -126,16 +130,22 @@ class PluginBase:
 
     def text(self, tag: str, default: str = "") -> str:
         """Return a parameter's text, or the default if it is missing or empty."""
-        child = self.element.first(tag)
-        return (child.text.strip() or default) if child is not None else default
+        return text_of(self.element, tag, default)
 
     def number(self, tag: str, default: float) -> float:
-        """Return a parameter's number. Raise PluginError if it is not a number."""
-        text = self.text(tag)
-        try:
-            return float(text) if text else default
-        except ValueError:
-            raise PluginError(f"<{tag}> is '{text}', not a number") from None
+        """Return a parameter's number. Raise PluginError if it is not a number, or out of the tag's range.
+
+        A negative rate means each step, as in Gazebo, and is named.
+        """
+        value = number_of(self.element, tag, default)
+        if value < 0 and tag in _RATES:
+            rospy.logwarn("%s: <%s> is '%s': each step is used", self.title, tag, self.text(tag))
+            return 0.0
+        return value
+
+    def numbers(self, tag: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Return a parameter's numbers, as many as the default has. Raise PluginError as :meth:`number` does."""
+        return numbers_of(self.element, tag, (len(default),)) or default
 
     def flag(self, tag: str, default: bool) -> bool:
         """Return a parameter's boolean."""
@@ -190,6 +200,11 @@ class ModelPlugin(PluginBase):
         super().__init__(loop, plugin)
         self.model = model
 
+    @property
+    def title(self) -> str:
+        """Return the name and library of the plugin, and the model, for messages."""
+        return _title(self.plugin, f"model '{self.model.name}'")
+
     def joint(self, name: str) -> SimJoint:
         """Return a joint that can move. Raise PluginError if the model has none of this name."""
         joint = self.model.joints.get(name)
@@ -243,7 +258,7 @@ class SensorPlugin(ModelPlugin):
     @property
     def sensor_pose(self) -> Pose:
         """Return the sensor's pose in the world."""
-        return multiply(self.sensor_link.pose, self.sensor.pose)
+        return compose(self.sensor_link.pose, self.sensor.pose)
 
     def is_needed(self) -> bool:
         """Return whether anything uses the sensor's data, such as a subscriber."""
@@ -329,9 +344,12 @@ class PluginHost:
         self._running = [plugin for plugins in self._plugins.values() for plugin in plugins]
 
     def _load(self, owner: str, kind: type[PluginBase], base: type, plugin: Plugin, *context: object) -> None:
-        where = f"plugin '{plugin.name}' ({plugin.library})"
+        where = _title(plugin, f"model '{owner}'" if owner else "the world")
         if not issubclass(kind, base):
             rospy.logerr("%s is ignored: it must be a %s", where, base.__name__)
+            return
+        if issubclass(kind, SensorPlugin) and base is not SensorPlugin:
+            rospy.logerr("%s is ignored: it must be in a <sensor>", where)
             return
         created: PluginBase | None = None
         try:
@@ -349,13 +367,7 @@ class PluginHost:
             self._close(created)
 
     def _fail(self, plugin: PluginBase, error: Exception) -> None:
-        rospy.logerr(
-            "plugin '%s' (%s) failed and is closed: %s: %s",
-            plugin.name,
-            plugin.plugin.library,
-            type(error).__name__,
-            error,
-        )
+        rospy.logerr("%s failed and is closed: %s: %s", plugin.title, type(error).__name__, error)
         for plugins in self._plugins.values():
             if plugin in plugins:
                 plugins.remove(plugin)
@@ -367,7 +379,7 @@ class PluginHost:
         try:
             plugin.close()
         except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
-            rospy.logerr("plugin '%s' failed at its end: %s", plugin.name, error)
+            rospy.logerr("%s failed at its end: %s", plugin.title, error)
 
     def _find(self, plugin: Plugin, owner: str) -> type[PluginBase] | None:
         """Return the class of a plugin's library, or None after one line that names what is missing."""
@@ -398,6 +410,10 @@ class PluginHost:
                 plugin.name,
             )
         return None
+
+
+def _title(plugin: Plugin, owner: str) -> str:
+    return f"plugin '{plugin.name}' ({plugin.library}) of {owner}"
 
 
 def _exported_plugins() -> dict[str, tuple[str, Path]]:

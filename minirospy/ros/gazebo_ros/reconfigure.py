@@ -11,8 +11,8 @@ from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server 
 from minirospy.ros.gazebo_ros.physics import SimulationError
 
 if TYPE_CHECKING:
+    from minirospy.ros.gazebo_ros.physics_services import PhysicsServices
     from minirospy.ros.gazebo_ros.server import Server
-    from minirospy.ros.gazebo_ros.services import Services
 
 __all__ = ["PhysicsReconfigure"]
 
@@ -34,7 +34,7 @@ _ODE = (
 class PhysicsReconfigure:
     """Serves /gazebo/set_parameters, parameter_descriptions and parameter_updates."""
 
-    def __init__(self, server: Server, services: Services) -> None:
+    def __init__(self, server: Server, services: PhysicsServices) -> None:
         self._server = server
         self._services = services
         self._is_started = False

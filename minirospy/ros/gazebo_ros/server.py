@@ -42,6 +42,7 @@ class Server:
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
         self._published_ns = -1
+        self._told = len(loop.simulation.warnings)  # those that gzserver logs itself
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         if not only_clock:
@@ -122,6 +123,9 @@ class Server:
             self._published_ns = now
             self._clock_publisher.publish(Clock(time_of(now)))
         self._publish_states()
+        for line in self.loop.simulation.warnings[self._told :]:
+            rospy.logwarn("%s", line)
+            self._told += 1
 
     def _publish_states(self) -> None:
         if self._states is not None:

@@ -83,6 +83,7 @@ class _Drive:
         self._pid = pid
         self._loop = loop
         self._held: float | None = None  # the position at the emergency stop
+        self._target = joint.position  # the last commanded position that was finite
 
     def read(self) -> None:
         position = self._simulated.position
@@ -94,14 +95,15 @@ class _Drive:
         joint.effort = self._simulated.effort
 
     def write(self, seconds: float, is_stopped: bool) -> None:
+        """Send the command. One that is not finite, which a controller may write after the limits were enforced, is not sent."""
         joint, simulated = self.joint, self._simulated
         kind = joint.active or self._first
         if kind is Interface.EFFORT:
             is_commanded = joint.active is not None and not is_stopped
-            simulated.set_force(joint.effort_command if is_commanded else 0.0)
+            simulated.set_force(_finite(joint.effort_command) if is_commanded else 0.0)
             return
         if kind is Interface.VELOCITY:
-            velocity = 0.0 if is_stopped else joint.velocity_command
+            velocity = 0.0 if is_stopped else _finite(joint.velocity_command)
             if self._pid is None:
                 simulated.set_velocity(velocity, self.max_effort)
             else:
@@ -111,7 +113,9 @@ class _Drive:
             self._held = None
         elif self._held is None:
             self._held = joint.position
-        position = joint.position_command if self._held is None else self._held
+        if math.isfinite(joint.position_command):
+            self._target = joint.position_command
+        position = self._target if self._held is None else self._held
         if self._pid is None:
             # As in Gazebo, the position is reached whatever the effort is.
             simulated.set_position(position + simulated.position - joint.position)
@@ -121,3 +125,7 @@ class _Drive:
 
     def _push(self, effort: float) -> None:
         self._simulated.set_force(min(max(effort, -self.max_effort), self.max_effort))
+
+
+def _finite(command: float) -> float:
+    return command if math.isfinite(command) else 0.0

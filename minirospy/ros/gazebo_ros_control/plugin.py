@@ -29,6 +29,7 @@ from minirospy.ros.gazebo_ros_control.hardware import SimulatedHardware
 __all__ = ["GazeboRosControl"]
 
 _DEFAULT_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
+_WARN_SECONDS = 10.0  # between two warnings about commands that are not finite
 _POLL_SECONDS = 0.1  # between two looks for the robot description
 
 
@@ -153,7 +154,11 @@ class GazeboRosControl(ModelPlugin):
             is_reset = self._is_reset or (self._was_stopped and not hardware.is_stopped)
             self._was_stopped, self._is_reset = hardware.is_stopped, False
             manager.update(now, period, is_reset)
-            self._limits.enforce(period)
+            if invalid := self._limits.enforce(period):
+                rospy.logwarn_throttle(
+                    _WARN_SECONDS,
+                    f"model '{self.model.name}': commands that are not finite were replaced, joints: {', '.join(invalid)}",
+                )
         hardware.write(now, Duration(*divmod(max(now_ns - self._last_write, 0), 1_000_000_000)))
         self._last_write = now_ns
 

@@ -273,3 +273,69 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
         with pytest.raises(MeshError, match=text) as caught:
             read_mesh(str(path))
         assert str(caught.value).startswith(f"{path}: ")
+
+
+DAE_WITH_TEXTURE = b"""<COLLADA><library_images><image id="i">
+<init_from>../pictures/my%20board.png</init_from></image></library_images>
+<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><surface><init_from>i</init_from></surface></newparam>
+<technique><phong><diffuse><texture texture="s" texcoord="U"/></diffuse></phong></technique>
+</profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array>0 0 0 1 0 0 1 1 0 0 1 0</float_array></source>
+<source id="t"><float_array>0 0 1 0 1 1 0 1</float_array>
+  <technique_common><accessor stride="2"/></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist material="m" count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#t" offset="1"/>
+<vcount>4</vcount><p>0 3 1 2 2 1 3 0</p></polylist></mesh></geometry></library_geometries></COLLADA>"""
+OBJ_WITH_TEXTURE = (
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 1\nvt 1 1\nvt 1 0\nvt 0 0\nf 1/1 2/2 3/3 4/-1\nf 1 2 3\n"
+)
+
+
+def test_texture_coordinates_belong_to_corners() -> None:
+    (mesh,) = parse_dae(DAE_WITH_TEXTURE)
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert mesh.texcoords is not None
+    assert mesh.texcoords.tolist() == [[[0, 1], [1, 1], [1, 0]], [[0, 1], [1, 0], [0, 0]]]
+
+    (mesh,) = parse_obj(OBJ_WITH_TEXTURE)
+    assert mesh.texcoords is not None
+    assert mesh.texcoords.tolist() == [
+        [[0, 1], [1, 1], [1, 0]],
+        [[0, 1], [1, 0], [0, 0]],
+        [[0, 0], [0, 0], [0, 0]],
+    ]
+    mirrored = mesh.scaled((-1.0, 1.0, 1.0))
+    assert mirrored.texcoords is not None
+    assert mirrored.texcoords[0].tolist() == [[1, 0], [1, 1], [0, 1]]
+
+
+@pytest.mark.parametrize(
+    "change", [(b"#t", b"#x"), (b"1 2 2 1", b"1 9 2 1"), (b"0 0 1 0 1 1 0 1<", b"0 0 1 0 nan 1 0 1<")]
+)
+def test_texture_coordinates_that_cannot_be_used_are_left_out(change: tuple[bytes, bytes]) -> None:
+    (mesh,) = parse_dae(DAE_WITH_TEXTURE.replace(*change))
+    assert mesh.texcoords is None
+
+
+@pytest.mark.parametrize(
+    "change", [("3/3", "3/9"), ("3/3", "3/x"), ("3/3", "3//1"), ("vt 1 0", "vt one 0"), ("vt 1 0", "vt")]
+)
+def test_an_object_without_usable_texture_coordinates_is_read(change: tuple[str, str]) -> None:
+    (mesh,) = parse_obj(OBJ_WITH_TEXTURE.replace(*change))
+    assert len(mesh.triangles) == 3
+    assert mesh.texcoords is None
+
+
+def test_textures_are_found_beside_the_mesh(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    file = tmp_path / "meshes" / "board.dae"
+    file.write_bytes(DAE_WITH_TEXTURE)
+    assert [each.texture for each in read_mesh(str(file))[0].materials] == [""]
+    file.write_bytes(DAE_WITH_TEXTURE + b" ")  # another time of change
+    textures = tmp_path / "materials" / "textures"
+    textures.mkdir(parents=True)
+    (textures / "my board.png").write_bytes(b"")
+    assert [each.texture for each in read_mesh(str(file))[0].materials] == [str(textures / "my board.png")]

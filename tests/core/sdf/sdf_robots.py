@@ -6,8 +6,8 @@ import random
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
+from minirospy.core.sdf.inertias import Inertia, turned_inertia
 from minirospy.core.sdf.model import Model, Pose
-from minirospy.core.sdf.poses import Inertia, turned_inertia
 
 _T = TypeVar("_T")
 

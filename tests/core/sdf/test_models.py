@@ -235,10 +235,13 @@ class TestShapes:
     @pytest.mark.parametrize(
         ("text", "why"),
         [
-            ("<box><size>0 0 0</size></box>", "visual [v] is left out: the box has a size of 0 or less"),
+            (
+                "<box><size>0 0 0</size></box>",
+                "visual [v] is left out: the box has a size of 0 or less: 0 0 0",
+            ),
             (
                 "<sphere><radius>-1</radius></sphere>",
-                "visual [v] is left out: the sphere's radius is 0 or less",
+                "visual [v] is left out: the sphere's radius is 0 or less: -1",
             ),
             (
                 "<mesh><uri>model://a.dae</uri></mesh>",
@@ -432,3 +435,41 @@ class TestNested:
         assert mimic is not None
         assert mimic.joint == "arm::other"
         assert [plugin.name for plugin in model.plugins] == ["p"]
+
+
+class TestNumbers:
+    JOINT = """<link name="a"/><link name="b"/><joint name="j" type="revolute"><parent>a</parent><child>b</child>
+      <axis><xyz>0 0 1</xyz><dynamics>{}</dynamics></axis></joint>"""
+
+    @pytest.mark.parametrize(
+        ("body", "line"),
+        [
+            (JOINT.format("<damping>-1</damping>"), "<damping> is -1: it is 0 instead"),
+            (JOINT.format("<friction>-0.5</friction>"), "<friction> is -0.5: it is 0 instead"),
+            (
+                '<link name="a"><velocity_decay><linear>-2</linear></velocity_decay></link>',
+                "<linear> is -2: it is 0 instead",
+            ),
+            (
+                '<link name="a"><sensor name="s" type="imu"><update_rate>-5</update_rate></sensor></link>',
+                "<update_rate> is -5: it is 0 instead",
+            ),
+            (
+                '<link name="a"><inertial><mass>-2</mass></inertial></link>',
+                "link [a] has the mass -2 kg, which is not possible: it gets 1 kg",
+            ),
+            (
+                '<link name="a"><inertial><mass>1e308</mass></inertial></link>',
+                "link [a] has the mass inf kg, which is not possible: it gets 1 kg",
+            ),
+        ],
+    )
+    def test_numbers_below_zero_are_named(self, body: str, line: str) -> None:
+        (warning,) = read(body).warnings
+        assert warning.partition(": ")[2] == line
+
+    @pytest.mark.parametrize("value", ["inf", "-inf", "1e308", "-1e17", "1e400"])
+    @pytest.mark.parametrize("tag", ["damping", "friction", "spring_stiffness", "spring_reference"])
+    def test_numbers_that_overflow_are_refused(self, tag: str, value: str) -> None:
+        with pytest.raises(SdfError, match=f"<{tag}> has an infinite number: '{value}'"):
+            read(self.JOINT.format(f"<{tag}>{value}</{tag}>"))

@@ -221,9 +221,15 @@ class TestParts:
         assert read(profiles).physics.step == 0.2
 
     def test_a_step_that_is_not_possible_is_named(self) -> None:
-        world = read("<physics><max_step_size>0</max_step_size></physics>")
-        assert world.physics.step == 0.001
-        assert world.warnings == ("world:1: the step of 0 s is not possible: it is 0.001 s",)
+        for step in ("0", "4e-10"):
+            world = read(f"<physics><max_step_size>{step}</max_step_size></physics>")
+            assert world.physics.step == 0.001
+            assert world.warnings == (f"world:1: the step of {step} s is not possible: it is 0.001 s",)
+
+    def test_an_infinite_number_of_iterations_is_named(self) -> None:
+        world = read("<physics><ode><solver><iters>inf</iters></solver></ode></physics>")
+        assert world.physics == Physics()
+        assert "<iters> has an infinite number: 'inf'" in world.warnings[0]
 
     def test_scene_camera_lights_and_plugins(self) -> None:
         world = read(

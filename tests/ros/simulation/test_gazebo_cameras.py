@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from sensor_msgs.srv import SetCameraInfo
 
 from minirospy import Node
-from tests.ros.simulation.processes import Start, call, end, run, start_world, until
+from tests.ros.simulation.processes import Start, call, end, run, start_world, until, written
 
 WIDTH, HEIGHT, FOV = 80, 60, math.radians(60)
 FOCAL = WIDTH / (2 * math.tan(FOV / 2))
@@ -94,6 +95,23 @@ def test_a_camera_sees_a_red_box(master: str, start: Start) -> None:
     run(body)
     output, errors = end(process)
     assert process.returncode == 0, output + errors
+
+
+@pytest.mark.usefixtures("_opengl")
+def test_a_texture_that_cannot_be_read_is_named(master: str, start: Start, tmp_path: Path) -> None:
+    pytest.importorskip("PIL")
+    broken = written(tmp_path, "broken.png", "no picture")
+    box = BOX.replace("<ambient>", f"<pbr><metal><albedo_map>{broken}</albedo_map></metal></pbr><ambient>")
+    process = start_world(start)
+
+    async def body(node: Node) -> None:
+        await spawn(node, "box", box, 2.5, 0.0, 1.0)
+        await spawn(node, "eye", eye("camera", "gazebo_ros_camera", "<cameraName>cam</cameraName>"))
+        await until(node, "/cam/image_raw", Image, lambda each: is_red(pixels(each)[30, 40]))
+
+    run(body)
+    output, errors = end(process)
+    assert (output + errors).count(f"model 'box': the picture {broken} is not shown: ") == 1
 
 
 @pytest.mark.usefixtures("_opengl")

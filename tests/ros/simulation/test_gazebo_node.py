@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -322,7 +323,7 @@ def test_values_that_are_not_finite_are_refused(master: str, start: Start) -> No
 
     async def body(node: Node) -> None:
         assert (await spawn(node, BOX, "box", at(z=5)))[0]
-        refused = (False, "a force, position or velocity is not finite")
+        refused = (False, "box: a force, position or velocity is not finite")
         state = ModelState(model_name="box", pose=at(x=math.nan))
         response = await call(node, "set_model_state", SetModelState, state)
         assert (response.success, response.status_message) == refused
@@ -361,6 +362,32 @@ def test_gzclient_prints_the_address_of_the_world(master: str, start: Start) -> 
     line = process.stdout.readline()
     assert line.startswith("Open in a browser: http://127.0.0.1:")
     assert "/#/3d?file=1&frame=world" in line
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="BROWSER names a program of POSIX")
+def test_the_window_ends_if_gazebo_is_killed(
+    master: str, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("websockets")
+    monkeypatch.setenv("BROWSER", "true")
+    process = start("gazebo_ros", "gazebo", "-u")
+    assert process.stdout is not None
+    while not (line := process.stdout.readline()).startswith("The browser opens http://127.0.0.1:"):
+        assert process.poll() is None
+    port = int(line.partition("127.0.0.1:")[2].partition("/")[0])
+    socket.create_connection(("127.0.0.1", port)).close()
+    process.kill()
+
+    async def until_refused() -> None:
+        while True:
+            try:
+                _, writer = await asyncio.open_connection("127.0.0.1", port)
+            except ConnectionRefusedError:
+                return
+            writer.close()
+            await asyncio.sleep(0.05)
+
+    asyncio.run(asyncio.wait_for(until_refused(), SECONDS))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="BROWSER names a program of POSIX")

@@ -7,13 +7,21 @@ import math
 import subprocess
 from pathlib import Path
 
-from controller_manager_msgs.srv import ListControllers
+import pytest
+from controller_manager_msgs.srv import (
+    ListControllers,
+    LoadController,
+    SwitchController,
+    SwitchControllerRequest,
+)
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty
 
 from minirospy import Node
+from tests.conftest import write_files
 from tests.ros.robot_state_publisher.conftest import SECONDS
 from tests.ros.simulation.processes import Start, call, end, run, until, written
 
@@ -53,8 +61,15 @@ gazebo_ros_control: {pid_gains: {tuned: {p: 100.0, i: 10.0, d: 5.0}}}
 NAMES = "states direct_controller tuned_controller wheel_controller pushed_controller"
 
 
-def start_robot(launch: Start, folder: Path) -> subprocess.Popen[str]:
-    urdf = written(folder, "rig.urdf", ROBOT)
+FREE = (
+    robot(direct="PositionJointInterface", wheel="VelocityJointInterface", pushed="EffortJointInterface")
+    .replace('<limit lower="-300" upper="300" effort="50" velocity="4"/>', "")
+    .replace('"revolute"', '"continuous"')
+)
+
+
+def start_robot(launch: Start, folder: Path, robot: str = ROBOT, names: str = NAMES) -> subprocess.Popen[str]:
+    urdf = written(folder, "rig.urdf", robot)
     gains = written(folder, "controllers.yaml", CONTROLLERS)
     file = written(
         folder,
@@ -64,7 +79,7 @@ def start_robot(launch: Start, folder: Path) -> subprocess.Popen[str]:
           <param name="robot_description" textfile="{urdf}"/>
           <rosparam file="{gains}"/>
           <node name="spawn" pkg="gazebo_ros" type="spawn_model" args="-urdf -param robot_description -model rig"/>
-          <node name="spawner" pkg="controller_manager" type="spawner" args="{NAMES}" output="screen"/>
+          <node name="spawner" pkg="controller_manager" type="spawner" args="{names}" output="screen"/>
         </launch>""",
     )
     return launch(file)
@@ -114,3 +129,71 @@ def test_each_interface_moves_its_joint(master: str, tmp_path: Path, launch: Sta
     run(body)
     output, _ = end(process)
     assert "Loaded gazebo_ros_control." in output
+
+
+CONTROLLER = """from controller_interface import Controller
+from hardware_interface import Interface
+
+class Raw(Controller):
+    interfaces = (Interface.POSITION, Interface.VELOCITY, Interface.EFFORT)
+
+    def init(self, hardware, context):
+        self.value = context.parameters.number("value", 0.0)
+        self.joints = [
+            hardware.joint(name, kind) for name, kind in zip(("direct", "wheel", "pushed"), self.interfaces)
+        ]
+
+    def update(self, time, period):
+        direct, wheel, pushed = self.joints
+        direct.position_command = wheel.velocity_command = self.value
+        pushed.effort_command = 0.0 if self.value == 1e300 else self.value
+"""
+PACKAGE = {
+    "package.xml": """<package format="2"><name>raw_control</name><version>0.1.0</version><description>d</description>
+      <maintainer email="a@b.c">me</maintainer><license>BSD</license>
+      <export><controller_interface plugin="${prefix}/plugins.xml"/></export></package>""",
+    "plugins.xml": """<library path="raw_control"><class name="raw_control/Raw" type="raw_control.raw.Raw"
+      base_class_type="controller_interface::ControllerBase"/></library>""",
+    "src/raw_control/__init__.py": "",
+    "src/raw_control/raw.py": CONTROLLER,
+}
+
+
+def test_commands_that_are_not_finite_do_not_reach_the_physics(
+    master: str, tmp_path: Path, launch: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_files(tmp_path / "raw_control", PACKAGE)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    process = start_robot(launch, tmp_path, FREE, "states")
+
+    async def body(node: Node) -> None:
+        await node.wait_for_service("/controller_manager/list_controllers", SECONDS)
+        for number, value in enumerate((math.nan, math.inf, 1e300)):
+            name = f"raw{number}"
+            is_told = asyncio.create_task(until(node, "/rosout", Log, lambda each: "not finite" in each.msg))
+            await node.set_param(f"/{name}", {"type": "raw_control/Raw", "value": value})
+            assert (await node.call("/controller_manager/load_controller", LoadController, name)).ok
+            switch = SwitchControllerRequest(
+                start_controllers=[name], strictness=SwitchControllerRequest.STRICT
+            )
+            assert (await node.call("/controller_manager/switch_controller", SwitchController, switch)).ok
+            if number == 0:
+                line = (
+                    "model 'rig': commands that are not finite were replaced, joints: direct, wheel, pushed"
+                )
+                assert (await is_told).msg == line
+            is_told.cancel()
+            await until(
+                node, "/joint_states", JointState, lambda each: all(map(math.isfinite, each.position))
+            )
+            if number < 2:
+                await until(node, "/joint_states", JointState, lambda each: abs(each.position[0]) < 1e-3)
+            switch = SwitchControllerRequest(
+                stop_controllers=[name], strictness=SwitchControllerRequest.STRICT
+            )
+            assert (await node.call("/controller_manager/switch_controller", SwitchController, switch)).ok
+        assert "rig" in (await call(node, "get_world_properties", GetWorldProperties)).model_names
+
+    run(body)
+    output, errors = end(process)
+    assert "is closed" not in output + errors

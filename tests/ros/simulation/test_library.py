@@ -9,7 +9,7 @@ import pytest
 
 import minirospy.ros.gazebo_ros.paths as paths_module
 from minirospy.core.sdf.model import Box, Cylinder, World
-from minirospy.core.sdf.poses import inverse, multiply, rotate
+from minirospy.core.sdf.poses import compose, inverse, rotate
 from minirospy.core.sdf.read import parse_model, parse_world
 from minirospy.ros.gazebo_ros.paths import resource_paths
 
@@ -82,7 +82,7 @@ def distance_to_obstacles(world: World, x: float, y: float) -> float:
     for model in world.models:
         for link in model.links.values():
             for collision in link.collisions:
-                pose = multiply(multiply(model.pose, link.pose), collision.pose)
+                pose = compose(compose(model.pose, link.pose), collision.pose)
                 back = inverse(pose)
                 px, py, pz = rotate(back.orientation, (x, y, 0.1))
                 here = (px + back.position[0], py + back.position[1], pz + back.position[2])

@@ -49,6 +49,17 @@ def test_jobs_run_in_the_loops_thread_while_paused() -> None:
     loop.close()
 
 
+def test_a_rate_near_zero_waits_and_answers() -> None:
+    counter = Counter()
+    loop = loop_of(counter)
+    loop.set_update_rate(1e-300)
+    loop.start()
+    for _ in range(50):
+        loop.call(lambda: None)
+    loop.close()
+    assert loop.failure is None
+
+
 def test_ticks_follow_the_rate_of_simulated_time() -> None:
     counter = Counter()
     loop = loop_of(counter, tick_rate=100.0)

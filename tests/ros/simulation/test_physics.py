@@ -23,7 +23,7 @@ from minirospy.core.sdf.model import (
     Vector,
     World,
 )
-from minirospy.core.sdf.pose_math import compose, rotate
+from minirospy.core.sdf.poses import compose, rotate
 from minirospy.ros.gazebo_ros.physics import Simulation, State
 from tests.ros.simulation.worlds import GROUND, arm, at, body, diff_drive, pendulum, single, still
 

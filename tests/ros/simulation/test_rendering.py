@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import math
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
 
 from collections.abc import Iterator
 
-from minirospy.core.sdf.model import Box, Light, Link, Material, Model, Plane, Pose, Sphere, Visual, World
+from minirospy.core.sdf.model import (
+    Box,
+    Light,
+    Link,
+    Material,
+    MeshShape,
+    Model,
+    Plane,
+    Pose,
+    Sphere,
+    Visual,
+    World,
+)
 from minirospy.ros.gazebo_ros.physics import Simulation, SimulationError, rendering
 from minirospy.ros.gazebo_ros.physics.rendering import Renderer
 from tests.ros.simulation.worlds import at
@@ -104,3 +118,73 @@ def test_missing_opengl_is_one_line_with_the_libraries(monkeypatch: pytest.Monke
 def test_a_picture_has_a_size() -> None:
     with pytest.raises(SimulationError, match="a picture of 0x10 is not possible"):
         Simulation().renderer(0, 10)
+
+
+QUARTERS = np.array([[RED[:3], GREEN[:3]], [(0.0, 0.0, 1.0), (1.0, 1.0, 0.0)]])
+OBJ = """mtllib board.mtl
+v 0 1 -1
+v 0 -1 -1
+v 0 -1 1
+v 0 1 1
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+usemtl painted
+f 1/1 2/2 3/3 4/4
+"""
+
+
+def write_picture(folder: Path) -> str:
+    """Write a picture with a red, a green, a blue and a yellow quarter; return its path."""
+    image = pytest.importorskip("PIL.Image")
+    path = folder / "quarters.png"
+    pixels = (255 * QUARTERS).astype(np.uint8).repeat(32, axis=0).repeat(32, axis=1)
+    image.fromarray(pixels).save(path)
+    return str(path)
+
+
+def seen(renderer: Renderer) -> NDArray[np.float64]:
+    """Return which of red, green and blue are bright in the middles of the quarters of a board 2 m ahead."""
+    renderer.capture(at(x=-2.0), math.radians(60))
+    picture = renderer.color()
+    rows, columns = (42, 78), (62, 98)
+    return np.array([[picture[row, column] > 100 for column in columns] for row in rows]).astype(float)
+
+
+def drawn(visual: Visual) -> tuple[NDArray[np.float64], list[str]]:
+    simulation = Simulation(World(models=(visible("board", visual, at()),)))
+    try:
+        renderer = simulation.renderer(160, 120)
+    except SimulationError as error:
+        pytest.skip(str(error))
+    try:
+        return seen(renderer), simulation.warnings
+    finally:
+        renderer.close()
+
+
+def test_a_mesh_shows_its_texture(tmp_path: Path) -> None:
+    write_picture(tmp_path)
+    (tmp_path / "board.mtl").write_text("newmtl painted\nmap_Kd quarters.png\n")
+    (tmp_path / "board.obj").write_text(OBJ)
+    colors, warnings = drawn(Visual("v", MeshShape(str(tmp_path / "board.obj"))))
+    assert colors.tolist() == QUARTERS.tolist()
+    assert warnings == []
+
+
+def test_a_box_shows_its_texture(tmp_path: Path) -> None:
+    material = Material((1.0, 1.0, 1.0, 1.0), texture=write_picture(tmp_path))
+    colors, warnings = drawn(Visual("v", Box((0.2, 2.0, 2.0)), material=material))
+    assert colors.tolist() == QUARTERS.tolist()
+    assert warnings == []
+
+
+def test_a_picture_that_cannot_be_read_is_named_once(tmp_path: Path) -> None:
+    pytest.importorskip("PIL")
+    broken = tmp_path / "broken.png"
+    broken.write_bytes(b"no picture")
+    colors, warnings = drawn(Visual("v", Box((0.2, 2.0, 2.0)), material=Material(RED, texture=str(broken))))
+    assert colors.tolist() == [[list(RED[:3])] * 2] * 2
+    (line,) = warnings
+    assert line.startswith(f"model 'board': the picture {broken} is not shown: ")

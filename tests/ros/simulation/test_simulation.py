@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import struct
 from pathlib import Path
@@ -27,6 +28,7 @@ from minirospy.core.sdf.model import (
     Polyline,
     Pose,
     Sphere,
+    Vector,
     World,
 )
 from minirospy.ros.gazebo_ros.physics import Simulation, SimulationError, State
@@ -183,6 +185,33 @@ def test_an_exploding_model_is_removed_and_named(reason: str, capfd: pytest.Capt
     assert output.out + output.err == ""
 
 
+@pytest.mark.parametrize("force", [1e9, 1e150, 1e300, 1.7e308])
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
+def test_a_huge_force_removes_only_the_model_on_which_it_acts(force: float, direction: Vector) -> None:
+    boxes = [
+        single(name, Box((0.3, 0.3, 0.3)), pose=at(z=z))
+        for name, z in zip("abc", (0.15, 0.45, 0.75), strict=True)
+    ]
+    simulation = Simulation(World(models=(GROUND, *boxes)))
+    simulation.step(200)
+    x, y, z = direction
+    simulation.model("b").canonical_link.add_wrench((force * x, force * y, force * z), duration=1.0)
+
+    lost = simulation.step(300)
+
+    assert [each.name for each in lost] == ["b"]
+    assert simulation.model("a").pose.position == pytest.approx((0.0, 0.0, 0.15), abs=1e-3)
+    assert simulation.model("c").pose.position == pytest.approx((0.0, 0.0, 0.45), abs=1e-2)
+
+
+def test_a_huge_joint_effort_removes_only_the_model_on_which_it_acts() -> None:
+    other = dataclasses.replace(pendulum(), name="other")
+    simulation = Simulation(World(models=(pendulum(2), other)))
+    simulation.model("pendulum").joints["joint1"].add_force(1e300)
+    assert [each.name for each in simulation.step(300)] == ["pendulum"]
+    assert abs(simulation.model("other").joints["joint0"].position) < 0.2
+
+
 def test_forces_and_states_that_are_not_finite_are_refused() -> None:
     simulation = Simulation(World(models=(pendulum(),)))
     model = simulation.model("pendulum")
@@ -201,7 +230,7 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
         lambda: link.set_state(State(bad)),
         lambda: model.set_velocity((0.0, math.nan, 0.0), (0.0, 0.0, 0.0)),
     ):
-        with pytest.raises(SimulationError, match="not finite"):
+        with pytest.raises(SimulationError, match=r"^pendulum(::joint0|::rod0)?: .* is not finite$"):
             call()
     assert simulation.step(10) == []
 
@@ -401,7 +430,13 @@ def test_a_world_without_models_runs() -> None:
 
 def test_invalid_physics_are_refused() -> None:
     simulation = Simulation()
-    for physics in (Physics(step=0.0), Physics(step=math.nan), Physics(gravity=(0.0, 0.0, math.inf))):
+    for physics in (
+        Physics(step=0.0),
+        Physics(step=4e-10),
+        Physics(step=math.nan),
+        Physics(gravity=(0.0, 0.0, math.inf)),
+        Physics(update_rate=math.nan),
+    ):
         with pytest.raises(SimulationError, match="the step must be positive"):
             simulation.set_physics(physics)
 

@@ -21,7 +21,7 @@ from minirospy.core.sdf.model import (
     Vector,
     World,
 )
-from minirospy.core.sdf.pose_math import compose, inverse, relative, rotate, transform
+from minirospy.core.sdf.poses import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 from minirospy.ros.gazebo_ros.physics.shapes import Shapes
@@ -141,7 +141,13 @@ class Builder:
                     self.shapes.add_visual(built.bodies[link.name], scoped, visual)
                 except (SimulationError, ValueError, TypeError) as error:
                     warnings.append(f"model '{name}': visual '{visual.name}': {_first_line(error)}")
-        return warnings
+        return warnings + self.take_warnings(name)
+
+    def take_warnings(self, name: str) -> list[str]:
+        """Return the lines about shapes of a model that was just added."""
+        lines = [f"model '{name}': {line}" for line in self.shapes.warnings]
+        self.shapes.warnings.clear()
+        return lines
 
     def delete(self, built: BuiltModel) -> None:
         """Delete a model from the spec."""

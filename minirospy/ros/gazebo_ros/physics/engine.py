@@ -21,6 +21,7 @@ __all__ = ["Engine"]
 RAY_GROUPS = np.array([each in (GROUP_COLLISION, GROUP_RAY_ONLY) for each in range(6)], np.uint8)
 MIN_SWING = 0.5  # rad/s; Coriolis forces of slower joints need no correction
 MAX_FORCE = 1e9  # N or N m; a motor without a limit
+MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster targets of motors would make contacts explode
 
 
 class Engine:
@@ -54,7 +55,7 @@ class Engine:
         self.target_velocity: NDArray[np.float64] = np.zeros(count)
         self.motor_force: NDArray[np.float64] = np.zeros(count)  # of the last step
         self.target_position: NDArray[np.float64] = np.zeros(count)
-        self.max_velocity: NDArray[np.float64] = np.full(count, np.inf)
+        self.max_velocity: NDArray[np.float64] = np.full(count, MAX_MOTOR_SPEED)
         self.follows_position: NDArray[np.bool_] = np.zeros(count, np.bool_)
         self._followers: NDArray[np.intp] = np.zeros(0, np.intp)
         self._follower_positions: NDArray[np.intp] = np.zeros(0, np.intp)
@@ -203,8 +204,8 @@ class Engine:
         """Give position motors the velocity that reaches the target with this step."""
         dofs = self._followers
         lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
-        limit = self.max_velocity[dofs]
-        self._bias[dofs] = np.clip(lacking / self.physics.step, -limit, limit) * self._rate
+        limit, step = self.max_velocity[dofs], self.physics.step
+        self._bias[dofs] = np.clip(lacking, -limit * step, limit * step) * (self._rate / step)
 
     def _record(self) -> None:
         """Keep the contacts and forces of the step before the next one's replace them."""

@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 
 from minirospy.core.sdf.model import Axis, Inertial, Joint, Link, Model, Pose, Vector
-from minirospy.core.sdf.pose_math import compose, inverse, normalized, rotate, transform
+from minirospy.core.sdf.poses import compose, inverse, normalized, rotate, rotate_back, transform
 from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names, set_inertial
-from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, Engine
+from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, MAX_MOTOR_SPEED, Engine
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
 from minirospy.ros.gazebo_ros.physics.states import ZERO, State, Wrench
 
@@ -97,7 +97,7 @@ class SimLink:
 
     def set_state(self, state: State) -> None:
         """Move the whole model so that this link has the state, with joint angles kept and joint velocities zero."""
-        _check(*state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
+        _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         change = compose(state.pose, inverse(self.pose))
         self.model.move(change, state.linear, state.angular, state.pose.position)
 
@@ -124,9 +124,9 @@ class SimLink:
 
     def set_inertial(self, inertial: Inertial) -> None:
         """Change the mass and the inertia; the world is compiled again. A static model has none."""
-        _check(inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
+        _check(self, inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
         if inertial.mass <= 0:
-            raise SimulationError("a mass must be positive")
+            raise SimulationError(f"{self.scoped_name}: a mass must be positive")
         self.record = replace(self.record, inertial=inertial)
         if not self.model.is_static:
             set_inertial(self.model.built.bodies[self.name], inertial)
@@ -145,7 +145,7 @@ class SimLink:
 
         ``start``: time of the simulation in seconds; a time in the past means now. A negative duration means for ever.
         """
-        _check(*force, *torque, *point)
+        _check(self, *force, *torque, *point)
         start = max(start, self.model.time())
         end = start + duration if duration >= 0 else math.inf
         self.wrenches.append(TimedWrench(force, torque, point, start, end))
@@ -153,7 +153,7 @@ class SimLink:
 
     def push(self, force: Vector = ZERO, torque: Vector = ZERO, *, point: Vector = ZERO) -> None:
         """Apply a force and a torque in world axes at a point of the link's frame for the next step."""
-        _check(*force, *torque, *point)
+        _check(self, *force, *torque, *point)
         now = self.model.time()
         self.wrenches.append(TimedWrench(force, torque, point, now, now))
         self.model.forces_changed()
@@ -180,8 +180,8 @@ class SimLink:
             _, linear, angular = self.state
             mass = float(self.engine.model.body_mass[self.id])
             moments = self.engine.model.body_inertia[self.id].tolist()
-            loss = self.record.linear_damping * mass / step
-            slow = self.record.angular_damping * min(moments) / step
+            loss = min(self.record.linear_damping, 1.0) * mass / step
+            slow = min(self.record.angular_damping, 1.0) * min(moments) / step
             row[:3] -= [loss * value for value in linear]
             row[3:] -= [slow * value for value in angular]
         return bool(self.wrenches) or self.has_damping
@@ -208,7 +208,7 @@ class SimJoint:
         self._max_force = 0.0  # of the motor; 0: no motor
         self._velocity = 0.0
         self._target: float | None = None
-        self._max_velocity = math.inf
+        self._max_velocity = MAX_MOTOR_SPEED
 
     @property
     def has_axis(self) -> bool:
@@ -235,7 +235,7 @@ class SimJoint:
 
     def set_state(self, position: float, velocity: float = 0.0) -> None:
         """Set position and velocity at once."""
-        _check(position, velocity)
+        _check(self, position, velocity)
         if self.dof >= 0:
             self.engine.data.qpos[self._address] = position
             self.engine.data.qvel[self.dof] = velocity
@@ -255,13 +255,13 @@ class SimJoint:
 
     def set_force(self, force: float) -> None:
         """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
-        _check(force)
+        _check(self, force)
         self._force = force
         self.model.forces_changed()
 
     def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
         """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: for ever)."""
-        _check(force)
+        _check(self, force)
         start = max(start, self.model.time())
         end = start + duration if duration >= 0 else math.inf
         self._timed.append(TimedForce(force, start, end))
@@ -275,16 +275,17 @@ class SimJoint:
 
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
         """Start or change a motor that holds a velocity with at most a force."""
-        _check(velocity)
-        self._velocity, self._target = velocity, None
+        _check(self, velocity)
+        self._velocity, self._target = min(max(velocity, -MAX_MOTOR_SPEED), MAX_MOTOR_SPEED), None
         self._start_motor(max_force)
 
     def set_position(
         self, position: float, max_force: float = math.inf, max_velocity: float = math.inf
     ) -> None:
         """Start or change a motor that moves to a position, with at most a force and a velocity."""
-        _check(position)
-        self._velocity, self._target, self._max_velocity = 0.0, position, max_velocity
+        _check(self, position)
+        self._velocity, self._target = 0.0, position
+        self._max_velocity = min(max_velocity, MAX_MOTOR_SPEED)
         self._start_motor(max_force)
 
     def stop_motor(self) -> None:
@@ -294,7 +295,7 @@ class SimJoint:
 
     def _start_motor(self, max_force: float) -> None:
         if math.isnan(max_force):
-            raise SimulationError("a motor's maximum force is not finite")
+            raise SimulationError(f"{self.model.name}::{self.name}: the motor's maximum force is not finite")
         force = min(max(max_force, 0.0), MAX_FORCE)
         same = force == self._max_force > 0 and self.dof >= 0
         self._max_force = force
@@ -370,9 +371,8 @@ class SimJoint:
         anchor = transform(pose, self.record.pose.position)
         arm = _difference((reference[0], reference[1], reference[2]), anchor)
         torque = _sum((torque_x, torque_y, torque_z), _cross(arm, force))
-        back = inverse(pose).orientation
-        fx, fy, fz = rotate(back, force)
-        tx, ty, tz = rotate(back, torque)
+        fx, fy, fz = rotate_back(pose.orientation, force)
+        tx, ty, tz = rotate_back(pose.orientation, torque)
         return Wrench((-fx, -fy, -fz), (-tx, -ty, -tz))
 
 
@@ -427,13 +427,13 @@ class SimModel:
 
     def set_state(self, state: State) -> None:
         """Move the model; joint angles are kept, joint velocities become zero."""
-        _check(*state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
+        _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         change = compose(state.pose, inverse(self.pose))
         self.move(change, state.linear, state.angular, state.pose.position)
 
     def set_velocity(self, linear: Vector, angular: Vector) -> None:
         """Set the velocity of the model's origin in world axes; the pose and the joints stay as they are."""
-        _check(*linear, *angular)
+        _check(self, *linear, *angular)
         origin = self.pose.position
         for name in self.built.free:
             self._set_free_velocity(self.links[name], linear, angular, origin)
@@ -480,7 +480,7 @@ class SimModel:
         dof = int(engine.model.body_dofadr[link.id])
         moved = _sum(linear, _cross(angular, _difference(pose.position, origin)))
         engine.data.qvel[dof : dof + 3] = moved
-        engine.data.qvel[dof + 3 : dof + 6] = rotate(inverse(pose).orientation, angular)
+        engine.data.qvel[dof + 3 : dof + 6] = rotate_back(pose.orientation, angular)
 
     def all_joints(self) -> Iterator[SimJoint]:
         """Yield each axis."""
@@ -534,10 +534,11 @@ class SimModel:
         self._owner.forced[self.name] = None
 
 
-def _check(*values: float) -> None:
-    """Raise SimulationError if a value is infinite or NaN."""
+def _check(owner: SimLink | SimJoint | SimModel, *values: float) -> None:
+    """Raise SimulationError if a value for the owner is infinite or NaN."""
     if not all(map(math.isfinite, values)):
-        raise SimulationError("a force, position or velocity is not finite")
+        name = owner.name if isinstance(owner, SimModel) else f"{owner.model.name}::{owner.name}"
+        raise SimulationError(f"{name}: a force, position or velocity is not finite")
 
 
 def _sum(left: Vector, right: Vector) -> Vector:

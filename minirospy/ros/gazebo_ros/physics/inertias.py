@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from minirospy.core.sdf.model import Inertial, Pose, Quaternion, Vector
-from minirospy.core.sdf.pose_math import multiply
+from minirospy.core.sdf.poses import multiply
 from minirospy.core.urdf.poses import quaternion_from_matrix
 
 __all__ = ["PrincipalInertia", "principal_inertia"]

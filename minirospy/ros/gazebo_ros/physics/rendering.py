@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from minirospy.core.sdf.model import Pose
-from minirospy.core.sdf.pose_math import rotate
+from minirospy.core.sdf.poses import rotate
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, import_context
 from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL

@@ -30,8 +30,10 @@ from minirospy.core.sdf.model import (
     Surface,
     Visual,
 )
-from minirospy.core.sdf.pose_math import compose
+from minirospy.core.sdf.poses import compose
+from minirospy.ros.gazebo_ros.physics.decomposition import Decomposition
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
+from minirospy.ros.gazebo_ros.physics.textures import Textures
 
 __all__ = [
     "GROUP_COLLISION",
@@ -58,6 +60,7 @@ MAX_FRICTION = 2.0
 PART = "\t"  # separates the name of a collision from the number of its geom
 MIN_SIZE = 1e-6  # m; MuJoCo refuses sizes of zero
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
+_WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 
 
 def friction(surface: Surface) -> tuple[float, int]:
@@ -80,6 +83,8 @@ class _Piece:
     asset: str = ""
     group: int = GROUP_COLLISION
     color: Color | None = None
+    texture: str = ""  # the path of a picture
+    has_texcoords: bool = False
 
 
 class Shapes:
@@ -88,6 +93,9 @@ class Shapes:
     def __init__(self, spec: Any) -> None:
         self._mujoco = load_mujoco()
         self._spec = spec
+        self.warnings: list[str] = []  # about textures and moving meshes
+        self._textures = Textures(spec, self.warnings)
+        self._decomposition = Decomposition(self.warnings)
         self._assets: dict[tuple[object, ...], list[_Piece]] = {}
         self._count = 0
 
@@ -117,7 +125,13 @@ class Shapes:
             geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, visual.pose)
             geom.group = GROUP_VISUAL
             geom.contype = geom.conaffinity = 0
-            red, green, blue, alpha = visual.material.color or piece.color or _GREY
+            picture = visual.material.texture or ("" if visual.material.color else piece.texture)
+            material = self._textures.material(picture, is_flat=piece.kind in ("PLANE", "MESH"))
+            if material and (piece.kind != "MESH" or piece.has_texcoords):
+                geom.material = material
+                red, green, blue, alpha = visual.material.color or _WHITE
+            else:
+                red, green, blue, alpha = visual.material.color or piece.color or _GREY
             geom.rgba = [red, green, blue, alpha * opacity]
 
     def _add(self, body: Any, name: str, piece: _Piece, pose: Pose) -> Any:
@@ -147,7 +161,10 @@ class Shapes:
             return
 
         mesh = _joined(_meshes(geometry))
-        parts = collision_parts(mesh, is_static=is_static)
+        name = geometry.path if isinstance(geometry, MeshShape) else "of a polyline"
+        parts = collision_parts(
+            mesh, is_static=is_static, split=lambda part: self._decomposition.split(part, name)
+        )
         is_whole = parts.are_exact
         for part in parts.meshes:
             name = self._add_mesh(part.vertices, part.triangles if is_whole else None)
@@ -169,13 +186,25 @@ class Shapes:
                 self._assets[key] = self._pieces(geometry, is_static=True)
             else:
                 self._assets[key] = [
-                    _Piece("MESH", asset=self._add_mesh(mesh.vertices, triangles), color=color)
-                    for mesh in _meshes(geometry)
-                    for triangles, color in mesh.by_material()
+                    self._section(section) for mesh in _meshes(geometry) for section in mesh.sections()
                 ]
         return self._assets[key]
 
-    def _add_mesh(self, vertices: NDArray[np.float64], triangles: NDArray[np.int32] | None) -> str:
+    def _section(self, mesh: Mesh) -> _Piece:
+        """Add the part of a mesh that has one material."""
+        (material,) = mesh.materials[:1]
+        asset = self._add_mesh(mesh.vertices, mesh.triangles, mesh.texcoords)
+        has_texcoords = mesh.texcoords is not None
+        return _Piece(
+            "MESH", asset=asset, color=material.color, texture=material.texture, has_texcoords=has_texcoords
+        )
+
+    def _add_mesh(
+        self,
+        vertices: NDArray[np.float64],
+        triangles: NDArray[np.int32] | None,
+        texcoords: NDArray[np.float32] | None = None,
+    ) -> str:
         self._count += 1
         name = f"mesh{self._count}"
         mesh = self._spec.add_mesh(name=name)
@@ -183,6 +212,10 @@ class Shapes:
             used, faces = np.unique(triangles, return_inverse=True)
             vertices = vertices[used]
             mesh.userface = faces.ravel().astype(np.int32)
+            if texcoords is not None:
+                # MuJoCo counts from the picture's upper left corner.
+                mesh.usertexcoord = (texcoords * (1, -1) + (0, 1)).astype(np.float32).ravel()
+                mesh.userfacetexcoord = np.arange(faces.size, dtype=np.int32)
         mesh.uservert = vertices.astype(np.float32).ravel()
         # An open or flat mesh has no volume; the bodies' inertias are given, so this only chooses the mesh's own frame.
         mesh.inertia = self._mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL

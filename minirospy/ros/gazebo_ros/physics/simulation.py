@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from minirospy.core.sdf.model import Axis, Model, Physics, Pose, Vector, World
-from minirospy.core.sdf.pose_math import rotate
+from minirospy.core.sdf.model import MIN_STEP, Axis, Model, Physics, Pose, Vector, World
+from minirospy.core.sdf.poses import rotate
 from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
@@ -73,9 +73,13 @@ class Simulation:
         return self.engine.physics
 
     def set_physics(self, physics: Physics) -> None:
-        """Set the step and the gravity. Raise SimulationError if a value is not finite or the step is not positive."""
-        if not (0 < physics.step <= 1 and all(map(math.isfinite, physics.gravity))):
-            raise SimulationError("the step must be positive and at most 1 s, and gravity finite")
+        """Set the step and the gravity. Raise SimulationError if a value is not finite, or the step is below 1 ns."""
+        if not (
+            MIN_STEP <= physics.step <= 1 and all(map(math.isfinite, (*physics.gravity, physics.update_rate)))
+        ):
+            raise SimulationError(
+                "the step must be positive, from 1 ns to 1 s; gravity and update rate must be finite"
+            )
         self.engine.set_physics(physics)
 
     @property
@@ -118,24 +122,18 @@ class Simulation:
     def _remove_lost(
         self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
     ) -> list[LostModel]:
-        """Remove the models with invalid states; the others return to the state before the step."""
+        """Remove the models that caused invalid states; the others return to the state before the step."""
         data = self.engine.data
-        lost: dict[str, str] = {}
+        broken: dict[str, str] = {}
         fastest = np.full(len(data.qvel), MAX_SPEED)
-        _find_lost(lost, data.qvel, fastest, "is faster than 100 km/s", self._model_of_dof)
+        _find_lost(broken, data.qvel, fastest, "is faster than 100 km/s", self._model_of_dof)
+        lost: dict[str, str] = {}
         _find_lost(lost, data.qpos, self._farthest, "is more than 100 km away", self._model_of_position)
-        is_spread = not all(np.isfinite(data.qvel))
-        if is_spread and len(set(self._model_of_dof)) > 1:
-            # A NaN spreads to all models in contact: the fastest one before the step is its source.
-            candidates = [name for name, reason in lost.items() if reason == "became NaN"]
-            speeds = dict.fromkeys(candidates, 0.0)
-            for dof, name in enumerate(self._model_of_dof):
-                if name in speeds:
-                    speed = abs(float(velocities[dof]))
-                    speeds[name] = max(speeds[name], speed if math.isfinite(speed) else math.inf)
-            if speeds:
-                source = max(speeds, key=lambda name: speeds[name])
-                lost = {name: why for name, why in lost.items() if name == source or name not in candidates}
+        if broken:
+            lost = {name: why for name, why in lost.items() if name not in broken and why != "became NaN"}
+            lost |= {
+                name: broken.get(name, "has too large a force") for name in self._sources(broken, velocities)
+            }
 
         data.qpos[:], data.qvel[:] = positions, velocities
         data.qacc_warmstart[:] = 0
@@ -143,6 +141,20 @@ class Simulation:
         result = [LostModel(name, f"{reason}: removed") for name, reason in lost.items()]
         self._remove([each.name for each in result])
         return result
+
+    def _sources(self, broken: Iterable[str], velocities: NDArray[np.float64]) -> list[str]:
+        """Return the models that made some too fast or NaN in the last step, before which the velocities were given.
+
+        Contacts spread large velocities and NaN to other models. A model's velocity without contacts shows the source: if none
+        is too large, it is that of the fastest of the broken models.
+        """
+        with np.errstate(all="ignore"):
+            free = abs(velocities + self.engine.data.qacc_smooth * self.physics.step)
+        speeds: dict[str, float] = {}
+        for name, speed in zip(self._model_of_dof, free.tolist(), strict=True):
+            speeds[name] = max(speeds.get(name, 0.0), math.inf if math.isnan(speed) else speed)
+        sources = [name for name, speed in speeds.items() if speed >= MAX_SPEED]
+        return sources or [max(broken, key=lambda name: speeds[name])]
 
     # ---- models
 
@@ -216,6 +228,7 @@ class Simulation:
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise SimulationError(f"model '{name}': the pose is not finite")
         built = self._builder.add(model, name, pose)
+        self.warnings += self._builder.take_warnings(name)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
         added = SimModel(self.engine, name, model, pose, built, self)

@@ -1,0 +1,67 @@
+"""Pictures on visible shapes, as MuJoCo's materials."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from minirospy.ros.gazebo_ros.physics.library import load_mujoco
+
+__all__ = ["Textures"]
+
+MAX_PIXELS = 1024  # on a side; larger pictures are reduced, because cameras show less of them
+SIDES = (90, 270, 180, 0, 0, 180)  # degrees, for upright pictures at x, -x, y, -y, z and -z
+MAX_AREA = 60_000_000  # pixels of a file; reading a larger one takes seconds
+
+
+class Textures:
+    """Adds pictures to an MjSpec, each once. A picture that cannot be read is in the warnings once, and its shapes are plain."""
+
+    def __init__(self, spec: Any, warnings: list[str]) -> None:
+        self._spec = spec
+        self._names: dict[tuple[str, bool], str] = {}
+        self._warnings = warnings
+
+    def material(self, path: str, *, is_flat: bool) -> str:
+        """Return the name of the material with a picture, or an empty string if there is none.
+
+        ``is_flat``: the picture is put on a plane, or on a mesh by its texture coordinates. On other shapes it is on six sides.
+        """
+        key = (path, is_flat)
+        if path and key not in self._names:
+            try:
+                self._names[key] = self._add(path, is_flat)
+            except (OSError, ValueError, SyntaxError) as error:
+                self._names[key] = ""
+                line = f"the picture {path} is not shown: {error}"
+                if line not in self._warnings:
+                    self._warnings.append(line)
+        return self._names.get(key, "")
+
+    def _add(self, path: str, is_flat: bool) -> str:
+        """Add a texture and its material. Raise OSError, ValueError or SyntaxError, as Pillow does, if it cannot be read."""
+        try:
+            from PIL import Image
+        except ImportError:
+            raise ValueError("textures need the library Pillow: minirospy[images]") from None
+        with Image.open(path) as picture:
+            width, height = picture.size
+            if width * height > MAX_AREA:
+                raise ValueError(f"it has {width} x {height} pixels")
+            pixels = picture.convert("RGB")
+        pixels.thumbnail((MAX_PIXELS, MAX_PIXELS))
+        if not is_flat:
+            side = max(pixels.size)
+            pixels = pixels.resize((side, side))
+
+        mujoco = load_mujoco()
+        name = f"picture{len(self._names)}"
+        kind = mujoco.mjtTexture.mjTEXTURE_2D if is_flat else mujoco.mjtTexture.mjTEXTURE_CUBE
+        texture = self._spec.add_texture(name=name, type=kind)
+        turns = (0,) if is_flat else SIDES
+        texture.width, texture.height, texture.nchannel = pixels.width, pixels.height * len(turns), 3
+        texture.data = b"".join(pixels.rotate(turn).tobytes() for turn in turns)
+        material = self._spec.add_material(name=name)
+        roles = material.textures
+        roles[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+        material.textures = roles
+        return name
