@@ -1,4 +1,4 @@
-"""The world as markers for the dashboard's 3D view: /gazebo/world_markers, in the frame ``world``.
+"""The world as markers, for rviz: /gazebo/world_markers, in the frame ``world``. The dashboard's window uses window.py.
 
 All visuals of all models are published (latched) whenever a model is added or removed. Models that move are published again
 while there are subscribers.
@@ -21,9 +21,9 @@ from minirospy.ros.gazebo_ros.messages import time_of, to_pose
 from minirospy.workspace.packages import package_name
 
 if TYPE_CHECKING:
-    from minirospy.ros.gazebo_ros.physics import SimLink, Simulation
+    from minirospy.ros.gazebo_ros.physics import SimModel, Simulation
 
-__all__ = ["WorldMarkers"]
+__all__ = ["WorldMarkers", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
 RATE_HZ = 10.0  # of simulated time, for models that move
@@ -47,8 +47,9 @@ class WorldMarkers:
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        links = [link for model in self._simulation.models.values() for link in model.links.values()]
-        return [marker for link in links for marker in self._markers(link)]
+        models = self._simulation.models.values()
+        self._published = {link.scoped_name: link.pose for model in models for link in model.links.values()}
+        return [marker for model in models for marker in model_markers(model)]
 
     def publish_moved(self) -> None:
         """Publish the links that have moved, at a low rate, if there are subscribers."""
@@ -69,18 +70,18 @@ class WorldMarkers:
             marker.header.stamp = stamp
         self._publisher.publish(MarkerArray(markers))
 
-    def _markers(self, link: SimLink) -> list[Marker]:
+
+def model_markers(model: SimModel) -> list[Marker]:
+    """Return the shapes of a model where they are now, in the frame ``world``."""
+    found = []
+    for link in model.links.values():
         pose = link.pose
-        self._published[link.scoped_name] = pose
-        found = []
         for index, visual in enumerate(link.record.visuals):
-            marker = _marker(visual)
+            marker = marker_of(visual, link.scoped_name, index, multiply(pose, visual.pose))
             if marker is not None:
-                marker.ns = link.scoped_name
-                marker.id = index
-                marker.pose = to_pose(multiply(pose, visual.pose))
+                marker.header.frame_id = "world"
                 found.append(marker)
-        return found
+    return found
 
 
 @functools.cache
@@ -93,8 +94,14 @@ def _uri(path: str) -> str:
     return file.as_uri()
 
 
-def _marker(visual: Visual) -> Marker | None:
-    marker = Marker(action=Marker.ADD)
+def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker | None:
+    """Return the marker of a visual at a pose, without a frame; None if its shape cannot be shown.
+
+    Its text is the URI of its picture, which rviz ignores.
+    """
+    marker = Marker(action=Marker.ADD, ns=namespace, id=number, pose=to_pose(pose))
+    if visual.material.texture:
+        marker.text = _uri(visual.material.texture)
     red, green, blue, opacity = visual.material.color or GREY
     marker.color = ColorRGBA(red, green, blue, opacity * (1 - visual.transparency))
     shape = visual.geometry
