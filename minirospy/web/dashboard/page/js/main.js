@@ -24,6 +24,7 @@ import { Publish } from "./views/publish.js";
 import { Reconfigure } from "./views/reconfigure.js";
 import { Scene } from "./views/scene.js";
 import { Services } from "./views/services.js";
+import { Simulation } from "./views/simulation.js";
 import { Smach } from "./views/smach.js";
 import { Teleop } from "./views/teleop.js";
 import { Tf } from "./views/tf.js";
@@ -38,6 +39,7 @@ const VIEWS = {
   graph: ["Graph", Graph],
   image: ["Image", Image],
   "3d": ["3D", Scene],
+  simulation: ["Simulation", Simulation],
   tf: ["Frames", Tf],
   board: ["Board", Board],
   turtlesim: ["Turtlesim", Turtlesim],
