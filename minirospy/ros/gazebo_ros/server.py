@@ -49,7 +49,7 @@ class Server:
         if not only_clock:
             self._states = _StatePublishers(loop)
             self._markers = WorldMarkers(loop.simulation)
-            self._window = Window(loop, self.plugins, world.name, resources.models)
+            self._window = Window(loop, self.plugins, world, resources.models)
         loop.before_step = self.plugins.update
         loop.on_tick = self._tick
         loop.on_lost = self._lost

@@ -6,7 +6,8 @@ Gazebo's window gets these from Gazebo's own transport:
 shapes     visualization_msgs/MarkerArray   the visible shapes, latched; frames are ``world`` (models that are static) and
                                             ``model::link``; the text of a shape is the URI of its picture
 poses      tf2_msgs/TFMessage               the poses of ``model::link`` in ``world``, latched, at most 30 times a second
-state      diagnostic_msgs/DiagnosticStatus the world's name, ``running`` or ``paused``, time, real-time factor, rate, step
+state      diagnostic_msgs/DiagnosticStatus the world's name, ``running`` or ``paused``, time, real-time factor, rate, step,
+                                            and the camera's pose (x y z, quaternion) if the world file has one
 joints     sensor_msgs/JointState           all joints that can move, as ``model::joint``
 contacts   visualization_msgs/MarkerArray   points and normals of contacts
 rays       visualization_msgs/MarkerArray   the rays of laser scanners and range sensors
@@ -37,6 +38,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import client as rospy
+from minirospy.core.sdf.model import Pose, World
 from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
 from minirospy.ros.gazebo_ros.markers import marker_of, model_markers
 from minirospy.ros.gazebo_ros.messages import time_of
@@ -66,7 +68,7 @@ class Window:
     """Publishes in a thread of its own, which asks the simulation's thread for its data between two steps."""
 
     def __init__(
-        self, loop: SimulationLoop, plugins: PluginHost, world: str, model_folders: Iterable[str]
+        self, loop: SimulationLoop, plugins: PluginHost, world: World, model_folders: Iterable[str]
     ) -> None:
         self._loop = loop
         self._simulation = loop.simulation
@@ -179,9 +181,10 @@ class Window:
         }
         return DiagnosticStatus(
             level=DiagnosticStatus.OK,
-            name=self._world,
+            name=self._world.name,
             message="paused" if loop.is_paused else "running",
-            values=[KeyValue(key, repr(value)) for key, value in values.items()],
+            values=[KeyValue(key, repr(value)) for key, value in values.items()]
+            + _camera(self._world.camera),
         )
 
     def _read_joints(self) -> JointState:
@@ -262,6 +265,12 @@ def model_names(folders: Iterable[str]) -> list[str]:
 
 def _is_model(folder: Path) -> bool:
     return (folder / "model.config").is_file() or (folder / "model.sdf").is_file()
+
+
+def _camera(pose: Pose | None) -> list[KeyValue]:
+    if pose is None:
+        return []
+    return [KeyValue("camera", " ".join(f"{value:.6g}" for value in (*pose.position, *pose.orientation)))]
 
 
 def _publisher(name: str, kind: type[rospy.Message], *, latch: bool = False) -> rospy.Publisher[Any]:

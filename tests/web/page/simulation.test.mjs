@@ -22,6 +22,7 @@ import {
   splitLink,
   stateOf,
   toRpy,
+  viewOf,
 } from "../../../minirospy/web/dashboard/page/js/simulation.js";
 
 test("numbers of fields are read, and anything else is named", () => {
@@ -90,12 +91,23 @@ test("the state is read from a diagnostic status", () => {
     time_step: "0.001",
   });
   const message = { name: "default", message: "paused", values: values.map(([key, value]) => ({ key, value })) };
-  const expected = { world: "default", isPaused: true, time: 61.5, factor: 0.98, rate: 1000, step: 0.001 };
+  const expected = { world: "default", isPaused: true, time: 61.5, factor: 0.98, rate: 1000, step: 0.001, camera: "" };
   assert.deepEqual(readState(message), expected);
   assert.equal(clockText(3661.25), "01:01:01.250");
   assert.equal(clockText(undefined), "–");
   assert.equal(rateOf(0.5, 0.001), 500);
   assert.equal(rateOf(0, 0.001), 0);
+});
+
+test("the camera of a world becomes a view around what it sees of the ground", () => {
+  const view = viewOf(["0", "-10", "10", ...fromRpy([0, Math.PI / 4, Math.PI / 2])].join(" "));
+  const near = (found, wanted) => assert.ok(Math.abs(found - wanted) < 1e-9, `${found} ${wanted}`);
+  view.focus.forEach((part) => near(part, 0));
+  near(view.distance, Math.sqrt(200));
+  near(view.pitch, Math.PI / 4);
+  near(view.yaw, -Math.PI / 2); // where the viewer is
+  assert.equal(viewOf("1 2 3 0 0 0 1").distance, 6);
+  for (const text of ["", "1 2 3", "1 2 3 0 0 0 nan", "a b c d e f g"]) assert.equal(viewOf(text), null);
 });
 
 test("joints and links belong to their model", () => {

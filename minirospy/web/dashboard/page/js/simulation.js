@@ -1,7 +1,7 @@
 // A simulation under Gazebo's names: its state, requests to its services, the SDF of new models. Pure.
 // Source: http://wiki.ros.org/gazebo_ros, http://sdformat.org/spec, and minirospy's own topics below /gazebo/window.
 
-import { fromRpy } from "./scene/transforms.js";
+import { fromRpy, normalized, rotate } from "./scene/transforms.js";
 import { schema } from "./scene/schemas.js";
 import { TextError } from "./ros1.js";
 
@@ -34,6 +34,8 @@ export const DIRECTIONS = {
   "-z": [0, 0, -1],
 };
 
+const USUAL_DISTANCE = 6; // metres from a camera that does not see the ground
+const MAX_DISTANCE = 40;
 const MAX_NAME = 100; // characters of a model's name
 const MAX_NUMBER = 1e6; // in any field
 const DENSITY = 200; // kg/m^3 of new shapes, as light wood
@@ -43,7 +45,7 @@ const IS_NAME = /^[\p{L}\p{N}_.-]+$/u;
 export const isThere = (services) =>
   ["pause_physics", "get_world_properties", "set_model_state"].every((name) => services.has(serviceOf(name)));
 
-/** Return {world, isPaused, time, factor, rate, step} of a diagnostic_msgs/DiagnosticStatus. */
+/** Return {world, isPaused, time, factor, rate, step, camera} of a diagnostic_msgs/DiagnosticStatus. */
 export function readState({ name, message, values }) {
   const numbers = Object.fromEntries(values.map(({ key, value }) => [key, Number(value)]));
   return {
@@ -53,6 +55,26 @@ export function readState({ name, message, values }) {
     factor: numbers.real_time_factor,
     rate: numbers.max_update_rate,
     step: numbers.time_step,
+    camera: values.find(({ key }) => key === "camera")?.value ?? "",
+  };
+}
+
+/**
+ * Return the view {distance, focus, yaw, pitch} of a camera's pose, "x y z qx qy qz qw", which looks along x; null if
+ * it is none. It turns around the point of the ground that the camera looks at.
+ */
+export function viewOf(camera) {
+  const numbers = camera.split(" ").map(Number);
+  if (numbers.length !== 7 || !numbers.every(Number.isFinite)) return null;
+  const [p, q] = [numbers.slice(0, 3), normalized(numbers.slice(3))];
+  const ahead = rotate(q, [1, 0, 0]);
+  const ground = p[2] > 0 && ahead[2] < -0.05 ? p[2] / -ahead[2] : USUAL_DISTANCE;
+  const distance = Math.min(ground, MAX_DISTANCE);
+  return {
+    distance,
+    focus: p.map((part, index) => part + distance * ahead[index]),
+    yaw: Math.atan2(-ahead[1], -ahead[0]),
+    pitch: Math.asin(Math.min(1, Math.max(-1, -ahead[2]))),
   };
 }
 

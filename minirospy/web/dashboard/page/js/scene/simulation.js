@@ -2,7 +2,7 @@
 // models.
 
 import { AmbientLight, DirectionalLight, Vector3 } from "../../vendor/three/three.min.js";
-import { MODEL_STATE, stateOf, topicOf } from "../simulation.js";
+import { MODEL_STATE, stateOf, topicOf, viewOf } from "../simulation.js";
 import { errorText, t } from "../texts.js";
 import { newSettings, setSetting } from "./classes.js";
 import { Config, newConfig } from "./config.js";
@@ -13,6 +13,8 @@ import { SceneView } from "./view.js";
 
 const DRAG_MS = 33; // between two poses of what is dragged
 const STILL = 4; // pixels of a click
+const MIN_LEVEL = 0.1; // of a view's direction, for a level push
+const FIRST_VIEW = { distance: 6, pitch: 0.45, yaw: 0.6 };
 const BACKGROUNDS = { light: "206; 214; 224", dark: "38; 43; 51" };
 const SIM_TOOLS = {
   move: { ...TOOLS.move, title: "Select", hint: "click a model: select · drag: turn · shift: move · wheel: zoom" },
@@ -23,7 +25,10 @@ const SIM_TOOLS = {
 };
 
 export class SimulationScene extends SceneView {
-  /** `window`: {selected(model), call(service, request), push(hit, direction), changed()}, the view around it. */
+  /**
+   * `window`: {selected(model), call(service, request), push(hit, direction), changed(), unfollowed()}, the
+   * view around it.
+   */
   constructor(link, main, window) {
     super(link, new URLSearchParams(), main);
     this.window = window;
@@ -72,7 +77,11 @@ export class SimulationScene extends SceneView {
     setSetting(grid, "Offset/Z", 0.004); // above the ground plane
     manager.Displays = [grid];
     manager["Global Options"]["Fixed Frame"] = "world";
-    Object.assign(manager.Views.Current, { Distance: 6, Pitch: 0.45, Yaw: 0.6 });
+    Object.assign(manager.Views.Current, {
+      Distance: FIRST_VIEW.distance,
+      Pitch: FIRST_VIEW.pitch,
+      Yaw: FIRST_VIEW.yaw,
+    });
     return { config: new Config(raw), isAutomatic: false };
   }
 
@@ -106,6 +115,22 @@ export class SimulationScene extends SceneView {
       this.overlays.delete(name);
     }
     this.context.isFresh = true;
+  }
+
+  /** Look as the world's camera does, once; "" is a world without a camera. */
+  showCamera(camera) {
+    this.camera = camera;
+    const key = `${this.key} camera`;
+    if ((localStorage.getItem(key) ?? "") === camera) return;
+    localStorage.setItem(key, camera);
+    this.resetView();
+  }
+
+  resetView() {
+    this.followed = "";
+    super.resetView();
+    this.stage.setView(viewOf(this.camera ?? "") ?? FIRST_VIEW);
+    this.window.unfollowed();
   }
 
   /** Let the view follow a link, or stand again with "". */
@@ -188,9 +213,11 @@ class SimulationTools extends Tools {
       this.view.say(t("there is nothing at this place"), true);
       return;
     }
-    const { camera } = this.view.stage;
+    const direction = this.view.stage.camera.getWorldDirection(new Vector3());
+    // Level: a push downwards would mostly add friction. From straight above it is downwards.
+    if (Math.hypot(direction.x, direction.y) > MIN_LEVEL) direction.setZ(0).normalize();
     this.view.window.selected(hit.model);
-    this.view.window.push(hit, camera.getWorldDirection(new Vector3()).toArray());
+    this.view.window.push(hit, direction.toArray());
   }
 
   // --- dragging

@@ -264,7 +264,9 @@ export class Simulation {
         call: (service, request) => this.call(service, request),
         push: (hit, direction) => this.act(() => this.pushHit(hit, direction)),
         changed: () => this.list(),
+        unfollowed: () => this.showFollowed(),
       });
+      if (this.state) this.scene.showCamera(this.state.camera);
       this.scene.world.select(this.model);
       for (const [name, button] of Object.entries(this.toggles))
         if (button.getAttribute("aria-pressed") === "true") this.scene.setOverlay(name, true);
@@ -293,6 +295,7 @@ export class Simulation {
   received(message) {
     this.state = readState(message);
     this.stateAt = performance.now();
+    this.scene?.showCamera(this.state.camera);
     this.look();
   }
 
