@@ -10,14 +10,27 @@ import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import client as rospy
-from minirospy.core.sdf.model import Box, Color, Cylinder, MeshShape, Plane, Pose, Sphere, Visual
+from minirospy.core.meshes.errors import MeshError
+from minirospy.core.sdf.model import (
+    Box,
+    Color,
+    Cylinder,
+    Heightmap,
+    MeshShape,
+    Plane,
+    Polyline,
+    Pose,
+    Sphere,
+    Visual,
+)
 from minirospy.core.sdf.poses import multiply
 from minirospy.ros.gazebo_ros.messages import time_of, to_pose
+from minirospy.ros.gazebo_ros.triangles import read_triangles
 from minirospy.workspace.packages import package_name
 
 if TYPE_CHECKING:
@@ -30,6 +43,8 @@ RATE_HZ = 10.0  # of simulated time, for models that move
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 MAX_PLANE = 100.0  # m; larger planes are drawn smaller
 PLANE_THICKNESS = 0.001  # m
+
+_named: set[MeshShape | Polyline | Heightmap] = set()  # shapes that are missing, after the line that says so
 
 
 class WorldMarkers:
@@ -116,12 +131,30 @@ def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker
         marker.type = Marker.CUBE
         width, height = (min(size, MAX_PLANE) for size in shape.size)
         marker.scale = Vector3(width, height, PLANE_THICKNESS)
-    elif isinstance(shape, MeshShape):
+    elif not isinstance(shape, MeshShape) or shape.submesh or not _uri(shape.path).startswith("package:"):
+        return _add_triangles(marker, shape, is_colored=visual.material.color is not None)
+    else:
         marker.type, marker.scale = Marker.MESH_RESOURCE, Vector3(*shape.scale)
         marker.mesh_resource = _uri(shape.path)
         if visual.material.color is None:
             marker.mesh_use_embedded_materials = True
             marker.color = ColorRGBA(0.0, 0.0, 0.0, 0.0)
-    else:
+    return marker
+
+
+def _add_triangles(
+    marker: Marker, shape: MeshShape | Polyline | Heightmap, *, is_colored: bool
+) -> Marker | None:
+    """Return the marker with the triangles of a shape, or None after one line if there are none."""
+    try:
+        found = read_triangles(shape)
+    except MeshError as error:
+        if shape not in _named:
+            _named.add(shape)
+            rospy.logwarn("a shape is missing in the window: %s", error)
         return None
+    marker.type, marker.scale = Marker.TRIANGLE_LIST, Vector3(1.0, 1.0, 1.0)
+    marker.points = [Point(x, y, z) for x, y, z in found.corners.tolist()]
+    if found.colors is not None and not is_colored:
+        marker.colors = [ColorRGBA(*color) for color in found.colors.tolist()]
     return marker

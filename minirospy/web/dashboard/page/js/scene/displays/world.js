@@ -1,16 +1,17 @@
 // The shapes of a simulation at the poses of its links. All shapes come again when a model is added or removed. Those
 // that have not changed stay, so that nothing flickers; those that are missing are removed.
 
-import { DataTexture } from "../../../vendor/three/three.min.js";
+import { DataTexture, DoubleSide } from "../../../vendor/three/three.min.js";
 import { newSettings } from "../classes.js";
 import { splitLink, topicOf } from "../../simulation.js";
 import { t } from "../../texts.js";
+import { bodyMaterial } from "../shapes.js";
 import { Markers } from "./markers.js";
 
 const DELETE_ALL = 3;
 const MAX_PIXELS = 1024; // of a texture's side
 const GLOW = 0x1b4f9c; // of what is selected
-const [CUBE, SPHERE, CYLINDER] = [1, 2, 3];
+const [CUBE, SPHERE, CYLINDER, TRIANGLES] = [1, 2, 3, 11];
 /** @type {any} */
 const LINEAR = 1006; // three's LinearFilter
 
@@ -33,8 +34,7 @@ export class World extends Markers {
     const kept = new Map();
     for (const marker of message.markers) {
       if (marker.action === DELETE_ALL) continue;
-      const { stamp: _, ...header } = marker.header;
-      kept.set(`${marker.ns}/${marker.id}`, { marker, text: JSON.stringify({ ...marker, header }) });
+      kept.set(`${marker.ns}/${marker.id}`, { marker, text: identityOf(marker) });
     }
     for (const key of [...this.markers.keys()]) if (this.texts.get(key) !== kept.get(key)?.text) this.drop(key);
     const fresh = [...kept].filter(([key]) => !this.markers.has(key)).map(([, { marker }]) => marker);
@@ -52,6 +52,7 @@ export class World extends Markers {
     if (!item) return;
     item.object.userData.link = marker.ns;
     item.object.userData.isMoving = marker.frame_locked;
+    if (marker.type === TRIANGLES && marker.colors.length) light(item.object);
     if (marker.text && [CUBE, SPHERE, CYLINDER].includes(marker.type)) this.paint(item.object, marker.text);
   }
 
@@ -122,6 +123,25 @@ export class World extends Markers {
       });
     }
   }
+}
+
+/** Let light fall on triangles with colors of their own, which markers have none on. */
+function light(object) {
+  object.traverse((each) => {
+    if (!each.isMesh) return;
+    each.geometry.computeVertexNormals();
+    each.material.dispose();
+    each.material = bodyMaterial([255, 255, 255], each.material.opacity, { side: DoubleSide, vertexColors: true });
+  });
+}
+
+/** Return a text that differs for markers that look different. */
+function identityOf({ header, points, colors, ...rest }) {
+  let sum = colors.length;
+  points.forEach(({ x, y, z }, index) => {
+    sum += (x + 2 * y + 3 * z) * ((index % 97) + 1);
+  });
+  return JSON.stringify([header.frame_id, points.length, sum, rest]);
 }
 
 async function loadTexture(link, uri) {
