@@ -58,10 +58,11 @@ STEPS_AT_ONCE = 50  # then the simulation serves others
 MAX_CONTACTS = 2000  # that are shown
 MAX_RAYS = 360  # of one sensor that are shown
 NORMAL_LENGTH = 0.12  # m
-POINT_SIZE = 0.03  # m
+POINT_SIZE = 0.022  # m
+RAY_WIDTH = 0.01  # m
 CONTACT_COLOR = ColorRGBA(1.0, 0.25, 0.15, 1.0)
 NORMAL_COLOR = ColorRGBA(1.0, 0.8, 0.1, 1.0)
-RAY_COLOR = ColorRGBA(0.2, 0.55, 1.0, 0.35)
+RAY_COLOR = ColorRGBA(0.1, 0.45, 1.0, 0.45)
 
 
 class Window:
@@ -224,7 +225,7 @@ class Window:
             lines = _new_marker(
                 f"{plugin.sensor_link.scoped_name}::{plugin.sensor.name}", Marker.LINE_LIST, RAY_COLOR
             )
-            lines.scale.x = POINT_SIZE / 6
+            lines.scale.x = RAY_WIDTH
             (lines.pose.position.x, lines.pose.position.y, lines.pose.position.z) = pose.position
             lines.pose.orientation = Quaternion(*pose.orientation)
             starts = directions * rays.min_range

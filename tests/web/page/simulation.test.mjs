@@ -21,6 +21,7 @@ import {
   shapeSdf,
   splitLink,
   stateOf,
+  threeDecimals,
   toRpy,
   viewOf,
 } from "../../../minirospy/web/dashboard/page/js/simulation.js";
@@ -97,6 +98,7 @@ test("the state is read from a diagnostic status", () => {
   assert.equal(clockText(undefined), "–");
   assert.equal(rateOf(0.5, 0.001), 500);
   assert.equal(rateOf(0, 0.001), 0);
+  assert.deepEqual([-0.0001, -1.2345, 2].map(threeDecimals), ["0.000", "-1.234", "2.000"]);
 });
 
 test("the camera of a world becomes a view around what it sees of the ground", () => {

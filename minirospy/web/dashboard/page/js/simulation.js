@@ -229,6 +229,9 @@ export function jointsOf({ name, position, velocity }, model) {
   return found;
 }
 
+/** Return a number with three decimals, and zero without a sign. */
+export const threeDecimals = (value) => value.toFixed(3).replace(/^-(0\.0+)$/, "$1");
+
 /** Return [model, link] of model::link. */
 export function splitLink(scoped) {
   const at = scoped.indexOf("::");

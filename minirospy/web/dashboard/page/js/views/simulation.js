@@ -24,6 +24,7 @@ import {
   splitLink,
   stateOf,
   STEP,
+  threeDecimals,
   topicOf,
   toRpy,
 } from "../simulation.js";
@@ -537,7 +538,7 @@ export class Simulation {
       const values = [p.x, p.y, p.z, ...toRpy([q.x, q.y, q.z, q.w])];
       POSE.forEach((name, index) => {
         const field = this.fields[name];
-        const text = values[index].toFixed(3).replace(/^-(0\.0+)$/, "$1");
+        const text = threeDecimals(values[index]);
         if (!field.dataset.edited && field !== document.activeElement && field.value !== text) field.value = text;
       });
     } catch {
@@ -616,7 +617,7 @@ export class Simulation {
       this.showJointFields();
     }
     joints.forEach(({ position, velocity }, index) => {
-      setText(this.joints[index].shown, position.toFixed(3));
+      setText(this.joints[index].shown, threeDecimals(position));
       this.joints[index].shown.title = `${velocity.toFixed(3)} /s`;
     });
   }

@@ -10,7 +10,7 @@ import { Markers } from "./markers.js";
 
 const DELETE_ALL = 3;
 const MAX_PIXELS = 1024; // of a texture's side
-const GLOW = 0x1b4f9c; // of what is selected
+const GLOW = 0x123468; // of what is selected
 const [CUBE, SPHERE, CYLINDER, TRIANGLES] = [1, 2, 3, 11];
 /** @type {any} */
 const LINEAR = 1006; // three's LinearFilter
