@@ -12,7 +12,7 @@ from geometry_msgs.msg import Pose
 
 from tests.interop.browser import Page
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
-from tests.interop.test_interop_dashboard_3d import drag, mouse, wait_color
+from tests.interop.test_interop_dashboard_3d import colors, drag, mouse, wait_color
 from tests.ros.robot_state_publisher.conftest import Start, start
 from tests.waiting import wait_until
 from tests.web.dashboard.conftest import Served, serve
@@ -157,6 +157,31 @@ def test_models_are_inserted_set_and_deleted(serve: Serve, browse: Browse, start
     page.wait(f"return document.querySelector('{SELECTED}').hidden")
     page.click("[data-model=desk] .sim-delete")
     page.wait("return document.querySelectorAll('.sim-model').length === 2")
+
+
+def has_magenta(page: Page) -> bool:
+    return any(red > 120 and green < red / 3 and blue > red / 2 for red, green, blue in colors(page))
+
+
+@needs_chromium
+def test_deleted_reset_and_respawned_models_leave_nothing_behind(
+    serve: Serve, browse: Browse, start: Start
+) -> None:
+    world = World(serve, browse, start)
+    page = world.page
+    for _ in range(2):
+        page.evaluate("document.querySelector('.sim-side input[type=color]').value = '#ff00ff'")
+        world.insert(Name="ghost", x="0", y="0", z="1")
+        page.wait_text(f"{SELECTED} h3", "ghost")
+        page.click(".sim-model .name", "ghost")  # deselected, it has its own color
+        wait_until(lambda: has_magenta(page))
+        page.click(".sim-bar button", "Reset time")
+        wait_until(lambda: has_magenta(page))
+        page.click("[data-model=ghost] .sim-delete")
+        wait_until(lambda: not has_magenta(page))
+    page.click(".sim-bar button", "Reset world")
+    page.wait("return document.querySelectorAll('.sim-model').length === 1")
+    assert not has_magenta(page)
 
 
 @needs_chromium

@@ -82,6 +82,7 @@ class Window:
         self._contacts = _publisher("contacts", MarkerArray)
         self._rays = _publisher("rays", MarkerArray)
         self._is_stale = True  # whether models were added, removed or, if static, moved since the last shapes
+        self._known: dict[SimModel, list[Marker]] = {}  # in the last message with shapes
         self._moving: list[tuple[str, int]] = []  # the scoped names of moving links, and their rows
         self._generation = -1  # of the rows
         self._last: NDArray[np.float64] = np.zeros((0, 7))  # the poses in the last message
@@ -145,11 +146,12 @@ class Window:
     def _read_shapes(self) -> list[Marker]:
         markers = [Marker(action=Marker.DELETEALL)]
         markers[0].header.frame_id = "world"
+        known, self._known = self._known, {}
         for model in self._simulation.models.values():
-            markers += _shapes(model)
-        stamp = time_of(self._simulation.time_ns)
-        for marker in markers:
-            marker.header.stamp = stamp
+            # Static models may have been moved.
+            shapes = known[model] if model in known and not model.is_static else _shapes(model)
+            self._known[model] = shapes
+            markers += shapes
         return markers
 
     def _read_poses(self) -> tuple[list[str], NDArray[np.float64], int] | None:
@@ -282,7 +284,7 @@ def _has_subscribers(publisher: rospy.Publisher[Any]) -> bool:
     return publisher.get_num_connections() > 0
 
 
-def _shapes(model: SimModel) -> Iterable[Marker]:
+def _shapes(model: SimModel) -> list[Marker]:
     """Return the shapes of a model: of a static one where they are, of another one in the frames of its links."""
     if model.is_static:
         return model_markers(model)

@@ -53,7 +53,7 @@ export class SimulationScene extends SceneView {
     const sun = new DirectionalLight(0xffffff, Math.PI * 0.35);
     sun.position.set(4, -3, 8);
     stage.light.intensity = Math.PI * 0.3;
-    stage.scene.add(sun, new AmbientLight(0xffffff, Math.PI * 0.4));
+    stage.scene.add(sun, new AmbientLight(0xffffff, Math.PI * 0.5));
   }
 
   get key() {
