@@ -159,6 +159,16 @@ def test_models_are_inserted_set_and_deleted(serve: Serve, browse: Browse, start
     page.wait("return document.querySelectorAll('.sim-model').length === 2")
 
 
+def point_at(page: Page, model: str) -> None:
+    """Move the mouse over the picture's middle until the page shows this model's name there."""
+
+    def is_shown() -> bool:
+        mouse(page, "mouseMoved", 0, -10)
+        return bool(page.evaluate(f"document.querySelector('.status').textContent.includes('{model} · ')"))
+
+    wait_until(is_shown)
+
+
 def has_magenta(page: Page) -> bool:
     return any(red > 120 and green < red / 3 and blue > red / 2 for red, green, blue in colors(page))
 
@@ -207,6 +217,7 @@ def test_models_are_pushed_dragged_and_have_contacts(serve: Serve, browse: Brows
     page.click(".tools button", "Drag")
     page.type("input[aria-label=N]", "400")
     x, y, _ = world.place("box_0")
+    point_at(page, "box_0")
     drag(page, (0, -10), (150, -10))
     wait_until(lambda: abs(world.place("box_0")[0] - x) + abs(world.place("box_0")[1] - y) > 0.5)
     wait_until(lambda: world.place("box_0")[2] == pytest.approx(0.25, abs=0.02))
@@ -215,6 +226,7 @@ def test_models_are_pushed_dragged_and_have_contacts(serve: Serve, browse: Brows
 
     # The tool Push moves it away from the viewer, who is at +x and +y.
     page.click(".tools button", "Push")
+    point_at(page, "box_0")
     mouse(page, "mousePressed", 0, -10, 1)
     mouse(page, "mouseReleased", 0, -10)
     page.wait_text("[role=status]", "box_0::link: 400 N for 0.2 s")

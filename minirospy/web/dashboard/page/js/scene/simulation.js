@@ -2,6 +2,7 @@
 // models.
 
 import { AmbientLight, DirectionalLight, Vector3 } from "../../vendor/three/three.min.js";
+import { setText } from "../dom.js";
 import { MODEL_STATE, stateOf, topicOf, viewOf } from "../simulation.js";
 import { errorText, t } from "../texts.js";
 import { newSettings, setSetting } from "./classes.js";
@@ -12,6 +13,7 @@ import { TOOLS, Tools } from "./tools.js";
 import { SceneView } from "./view.js";
 
 const DRAG_MS = 33; // between two poses of what is dragged
+const HOVER_MS = 100; // between two searches for the model under the mouse
 const STILL = 4; // pixels of a click
 const MIN_LEVEL = 0.1; // of a view's direction, for a level push
 const FIRST_VIEW = { distance: 6, pitch: 0.45, yaw: 0.6 };
@@ -153,6 +155,8 @@ class SimulationTools extends Tools {
   constructor(view) {
     super(view);
     this.pressed = null; // {x, y} of a press that may be a click
+    this.over = ""; // the model under the mouse
+    this.hovered = 0; // when it was looked for
     this.dragged = null; // what is dragged: {model, pose, last, by, timer}
   }
 
@@ -200,6 +204,18 @@ class SimulationTools extends Tools {
     super.up(event);
     if (pressed && event.type === "pointerup" && ["move", "drag"].includes(this.name))
       this.view.window.selected(this.view.world.find(pressed.x, pressed.y)?.model ?? "");
+  }
+
+  /** Show the name of the model under the mouse, too. */
+  hover(x, y) {
+    super.hover(x, y);
+    const now = performance.now();
+    if (now - this.hovered > HOVER_MS) {
+      this.hovered = now;
+      this.over = this.view.world.find(x, y)?.model ?? "";
+    }
+    const { place } = this.view;
+    if (this.over) setText(place, [this.over, place.textContent].filter(Boolean).join(" · "));
   }
 
   click(x, y) {
