@@ -34,6 +34,7 @@ SEEN = {
     "graph": ("svg.graph .node", "/talker_scan"),
     "image": ("select option", "/camera"),
     "3d": (".labels .name", "base_link"),
+    "simulation": (".empty", "roslaunch gazebo_ros empty_world.launch"),
     "tf": (".tf .frame-box", "left_wheel"),
     "board": ("svg.board text", "GPIO 11"),
     "turtlesim": (".turtle-row", "/turtle1"),

@@ -42,6 +42,15 @@ def test_full_queue_drops_the_oldest_of_the_same_topic() -> None:
     assert queue.dropped_of == {"image": 3}
 
 
+def test_replaced_message_does_not_count_as_dropped() -> None:
+    """/clock with 250 messages a second would warn about each page that is busy for a moment."""
+    queue = SendQueue()
+    for number in range(5):
+        queue.put("time", (b"%d" % number,), newest_only=True)
+    assert drained(queue) == [b"4"]
+    assert (queue.dropped, queue.dropped_of) == (0, {})
+
+
 def test_new_topic_displaces_the_one_that_holds_most() -> None:
     queue = SendQueue(limit=10, entry_bytes=0)
     queue.put("image", (b"11111",))

@@ -17,7 +17,7 @@ class BlockLaser(SensorPlugin):
 
     def load(self) -> None:
         """Read the sensor's rays."""
-        self._rays = read_rays(self.sensor)
+        self.shown_rays = self._rays = read_rays(self.sensor)
         self._frame = self.frame("frameName", "/world")
         self._noise = self.number("gaussianNoise", 0.0)
         self._publisher = self.publish_to(self.text("topicName", "/world"), PointCloud)

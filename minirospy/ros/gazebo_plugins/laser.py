@@ -16,7 +16,7 @@ class Laser(SensorPlugin):
 
     def load(self) -> None:
         """Read the sensor's rays."""
-        self._rays = read_rays(self.sensor)
+        self.shown_rays = self._rays = read_rays(self.sensor)
         self._frame = self.frame("frameName", "/world")
         self._publisher = self.publish_to(self.text("topicName", "/world"), LaserScan)
 

@@ -1,4 +1,4 @@
-"""The world as markers for the dashboard's 3D view: /gazebo/world_markers, in the frame ``world``.
+"""The world as markers, for rviz: /gazebo/world_markers, in the frame ``world``. The dashboard's window uses window.py.
 
 All visuals of all models are published (latched) whenever a model is added or removed. Models that move are published again
 while there are subscribers.
@@ -10,26 +10,41 @@ import functools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import client as rospy
-from minirospy.core.sdf.model import Box, Color, Cylinder, MeshShape, Plane, Pose, Sphere, Visual
+from minirospy.core.meshes.errors import MeshError
+from minirospy.core.sdf.model import (
+    Box,
+    Color,
+    Cylinder,
+    Heightmap,
+    MeshShape,
+    Plane,
+    Polyline,
+    Pose,
+    Sphere,
+    Visual,
+)
 from minirospy.core.sdf.poses import compose
 from minirospy.ros.gazebo_ros.messages import time_of, to_pose
+from minirospy.ros.gazebo_ros.triangles import read_triangles
 from minirospy.workspace.packages import package_name
 
 if TYPE_CHECKING:
-    from minirospy.ros.gazebo_ros.physics import SimLink, Simulation
+    from minirospy.ros.gazebo_ros.physics import SimModel, Simulation
 
-__all__ = ["WorldMarkers"]
+__all__ = ["WorldMarkers", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
 RATE_HZ = 10.0  # of simulated time, for models that move
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 MAX_PLANE = 100.0  # m; larger planes are drawn smaller
 PLANE_THICKNESS = 0.001  # m
+
+_named: set[MeshShape | Polyline | Heightmap] = set()  # shapes that are missing, after the line that says so
 
 
 class WorldMarkers:
@@ -47,8 +62,9 @@ class WorldMarkers:
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        links = [link for model in self._simulation.models.values() for link in model.links.values()]
-        return [marker for link in links for marker in self._markers(link)]
+        models = self._simulation.models.values()
+        self._published = {link.scoped_name: link.pose for model in models for link in model.links.values()}
+        return [marker for model in models for marker in model_markers(model)]
 
     def publish_moved(self) -> None:
         """Publish the links that have moved, at a low rate, if there are subscribers."""
@@ -69,18 +85,18 @@ class WorldMarkers:
             marker.header.stamp = stamp
         self._publisher.publish(MarkerArray(markers))
 
-    def _markers(self, link: SimLink) -> list[Marker]:
+
+def model_markers(model: SimModel) -> list[Marker]:
+    """Return the shapes of a model where they are now, in the frame ``world``."""
+    found = []
+    for link in model.links.values():
         pose = link.pose
-        self._published[link.scoped_name] = pose
-        found = []
         for index, visual in enumerate(link.record.visuals):
-            marker = _marker(visual)
+            marker = marker_of(visual, link.scoped_name, index, compose(pose, visual.pose))
             if marker is not None:
-                marker.ns = link.scoped_name
-                marker.id = index
-                marker.pose = to_pose(compose(pose, visual.pose))
+                marker.header.frame_id = "world"
                 found.append(marker)
-        return found
+    return found
 
 
 @functools.cache
@@ -93,8 +109,14 @@ def _uri(path: str) -> str:
     return file.as_uri()
 
 
-def _marker(visual: Visual) -> Marker | None:
-    marker = Marker(action=Marker.ADD)
+def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker | None:
+    """Return the marker of a visual at a pose, without a frame; None if its shape cannot be shown.
+
+    Its text is the URI of its picture, which rviz ignores.
+    """
+    marker = Marker(action=Marker.ADD, ns=namespace, id=number, pose=to_pose(pose))
+    if visual.material.texture:
+        marker.text = _uri(visual.material.texture)
     red, green, blue, opacity = visual.material.color or GREY
     marker.color = ColorRGBA(red, green, blue, opacity * (1 - visual.transparency))
     shape = visual.geometry
@@ -109,12 +131,30 @@ def _marker(visual: Visual) -> Marker | None:
         marker.type = Marker.CUBE
         width, height = (min(size, MAX_PLANE) for size in shape.size)
         marker.scale = Vector3(width, height, PLANE_THICKNESS)
-    elif isinstance(shape, MeshShape):
+    elif not isinstance(shape, MeshShape) or shape.submesh or not _uri(shape.path).startswith("package:"):
+        return _add_triangles(marker, shape, is_colored=visual.material.color is not None)
+    else:
         marker.type, marker.scale = Marker.MESH_RESOURCE, Vector3(*shape.scale)
         marker.mesh_resource = _uri(shape.path)
         if visual.material.color is None:
             marker.mesh_use_embedded_materials = True
             marker.color = ColorRGBA(0.0, 0.0, 0.0, 0.0)
-    else:
+    return marker
+
+
+def _add_triangles(
+    marker: Marker, shape: MeshShape | Polyline | Heightmap, *, is_colored: bool
+) -> Marker | None:
+    """Return the marker with the triangles of a shape, or None after one line if there are none."""
+    try:
+        found = read_triangles(shape)
+    except MeshError as error:
+        if shape not in _named:
+            _named.add(shape)
+            rospy.logwarn("a shape is missing in the window: %s", error)
         return None
+    marker.type, marker.scale = Marker.TRIANGLE_LIST, Vector3(1.0, 1.0, 1.0)
+    marker.points = [Point(x, y, z) for x, y, z in found.corners.tolist()]
+    if found.colors is not None and not is_colored:
+        marker.colors = [ColorRGBA(*color) for color in found.colors.tolist()]
     return marker

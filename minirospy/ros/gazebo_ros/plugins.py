@@ -14,7 +14,10 @@ import importlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from minirospy import client as rospy
 from minirospy.base.errors import ManifestError
@@ -243,8 +246,27 @@ class Timer:
         return True
 
 
+class RayFan(Protocol):
+    """The rays of a sensor: (n, 3) unit vectors in the sensor's frame, and the limits of their length in m."""
+
+    @property
+    def directions(self) -> NDArray[np.float64]:
+        """Return the directions."""
+
+    @property
+    def min_range(self) -> float:
+        """Return the distance at which rays begin."""
+
+    @property
+    def max_range(self) -> float:
+        """Return the distance at which rays end."""
+
+
 class SensorPlugin(ModelPlugin):
-    """A plugin of a sensor: :meth:`sense` is called at the sensor's rate, or at ``self.rate`` if ``load`` sets it."""
+    """A plugin of a sensor: :meth:`sense` is called at the sensor's rate, or at ``self.rate`` if ``load`` sets it.
+
+    If ``load`` sets ``self.shown_rays``, the simulation's window can show them.
+    """
 
     def __init__(
         self, loop: SimulationLoop, plugin: Plugin, model: SimModel, sensor: Sensor, link: SimLink
@@ -253,6 +275,7 @@ class SensorPlugin(ModelPlugin):
         self.sensor = sensor
         self.sensor_link = link
         self.rate = sensor.update_rate
+        self.shown_rays: RayFan | None = None
         self._timer: Timer | None = None
 
     @property
@@ -334,6 +357,12 @@ class PluginHost:
                 plugin.reset()
             except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
                 self._fail(plugin, error)
+
+    def ray_sensors(self) -> list[SensorPlugin]:
+        """Return the sensors that have rays."""
+        return [
+            each for each in self._running if isinstance(each, SensorPlugin) and each.shown_rays is not None
+        ]
 
     def close(self) -> None:
         """Close all plugins."""

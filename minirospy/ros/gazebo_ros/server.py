@@ -14,6 +14,7 @@ from minirospy.ros.gazebo_ros.messages import time_of, to_pose, to_twist
 from minirospy.ros.gazebo_ros.paths import ResourcePaths
 from minirospy.ros.gazebo_ros.physics import LostModel, SimModel, State
 from minirospy.ros.gazebo_ros.plugins import PluginHost
+from minirospy.ros.gazebo_ros.window import Window
 
 __all__ = ["Server"]
 
@@ -45,9 +46,11 @@ class Server:
         self._told = len(loop.simulation.warnings)  # those that gzserver logs itself
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
+        self._window: Window | None = None
         if not only_clock:
             self._states = _StatePublishers(loop)
             self._markers = WorldMarkers(loop.simulation)
+            self._window = Window(loop, self.plugins, world, resources.models)
         loop.before_step = self.plugins.update
         loop.on_tick = self._tick
         loop.on_lost = self._lost
@@ -72,8 +75,10 @@ class Server:
         self.loop.simulation.remove_model(name)
         self._changed()
 
-    def moved(self, _name: str) -> None:
+    def moved(self, name: str) -> None:
         """Publish the states now if the simulation is paused. Call it in the loop's thread."""
+        if self._window is not None and self.loop.simulation.models[name].is_static:
+            self._window.changed()
         if self.loop.is_paused:
             self._publish_states()
 
@@ -87,11 +92,15 @@ class Server:
     def reset(self, *, with_time: bool) -> None:
         """Reset the models, and with the time also the plugins. Call it in the loop's thread."""
         self.loop.reset(with_time=with_time)
+        if self._window is not None:
+            self._window.changed()  # static models may have been moved
         if with_time:
             self.plugins.reset()
 
     def close(self) -> None:
         """Close the plugins and end the loop."""
+        if self._window is not None:
+            self._window.close()
         try:
             self.loop.call(self.plugins.close)
         except LoopClosed:
@@ -102,6 +111,8 @@ class Server:
     def _changed(self) -> None:
         if self._markers is not None:
             self._markers.publish_all()
+        if self._window is not None:
+            self._window.changed()
         self._publish_states()
 
     def _lost(self, lost: LostModel) -> None:

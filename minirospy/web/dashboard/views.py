@@ -19,6 +19,7 @@ VIEWS = (
     "graph",
     "image",
     "3d",
+    "simulation",
     "tf",
     "board",
     "turtlesim",

@@ -93,14 +93,17 @@ class SendQueue:
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
         """Append a message.
 
-        Drop older messages if the limit is exceeded, or with ``newest_only`` all older messages of its key.
+        Drop older messages if the limit is exceeded. With ``newest_only`` the message replaces all older messages of its key,
+        which do not count as dropped.
         """
         size = sum(map(len, pieces)) + self._entry_bytes
         waiting = self._waiting.get(key)
         if waiting is None:
             waiting = self._waiting[key] = _Waiting()
 
-        while waiting.numbers and (newest_only or self.size + size > self.limit):
+        while waiting.numbers and newest_only:
+            self._remove_oldest(key)
+        while waiting.numbers and self.size + size > self.limit:
             self._drop_oldest(key)
         while self.size and self.size + size > self.limit:
             self._drop_oldest(max(self._waiting, key=lambda each: self._waiting[each].size))
@@ -171,12 +174,15 @@ class SendQueue:
         self.size = self.answers = 0
 
     def _drop_oldest(self, key: Hashable) -> None:
+        self.dropped += 1
+        self.dropped_of[key] += 1
+        self._remove_oldest(key)
+
+    def _remove_oldest(self, key: Hashable) -> None:
         waiting = self._waiting[key]
         entry = self._entries.pop(waiting.numbers.popleft())
         if entry.size >= LARGE_PIECE:
             self._release(entry)
-        self.dropped += 1
-        self.dropped_of[key] += 1
         self._shrunk(key, waiting, entry.size)
 
     def _hold(self, pieces: tuple[Piece, ...]) -> None:

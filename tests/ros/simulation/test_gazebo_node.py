@@ -361,7 +361,7 @@ def test_gzclient_prints_the_address_of_the_world(master: str, start: Start) -> 
     assert process.stdout is not None
     line = process.stdout.readline()
     assert line.startswith("Open in a browser: http://127.0.0.1:")
-    assert "/#/3d?file=1&frame=world" in line
+    assert "/#/simulation?token=" in line
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="BROWSER names a program of POSIX")

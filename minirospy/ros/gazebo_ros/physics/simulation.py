@@ -357,6 +357,19 @@ class Simulation:
             self.warnings += self._builder.add_visuals(model.built, model.record, model.name)
         self.recompile()
 
+    def body_poses(self) -> NDArray[np.float64]:
+        """Return (n, 7) positions and orientations (x, y, z, w) in the world, by the ids of links."""
+        self.engine.refresh()
+        data = self.engine.data
+        return np.concatenate((data.xpos, data.xquat[:, (1, 2, 3, 0)]), axis=1)
+
+    def contact_points(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the (n, 3) points and unit normals of all contacts, in the world."""
+        self.engine.refresh()
+        contact = self.engine.data.contact
+        touching = contact.dist <= 0
+        return contact.pos[touching].copy(), contact.frame[touching, :3].copy()
+
     def contacts(self) -> list[Contact]:
         """Return the contacts of the last step; ``records_details`` must have been set before it."""
         engine = self.engine

@@ -26,6 +26,7 @@ import { Publish } from "./views/publish.js";
 import { Reconfigure } from "./views/reconfigure.js";
 import { Scene } from "./views/scene.js";
 import { Services } from "./views/services.js";
+import { Simulation } from "./views/simulation.js";
 import { Smach } from "./views/smach.js";
 import { Teleop } from "./views/teleop.js";
 import { Tf } from "./views/tf.js";
@@ -42,6 +43,7 @@ const VIEWS = {
   graph: ["Graph", Graph, "Look"],
   image: ["Image", Image, "Look"],
   "3d": ["3D", Scene, "Look"],
+  simulation: ["Simulation", Simulation, "Drive"],
   tf: ["Frames", Tf, "Look"],
   board: ["Board", Board, "System"],
   turtlesim: ["Turtlesim", Turtlesim, "Drive"],

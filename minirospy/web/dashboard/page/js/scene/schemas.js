@@ -6,6 +6,8 @@ const DEFINITIONS = {
   "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z",
   "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
   "geometry_msgs/Pose": "Point position\nQuaternion orientation",
+  "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z",
+  "geometry_msgs/Twist": "Vector3 linear\nVector3 angular",
   "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance",
 };
 

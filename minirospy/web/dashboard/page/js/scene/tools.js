@@ -53,7 +53,7 @@ export const TOOLS = {
   },
 };
 
-/** The tools of a view: {stage, context, config, link, say(text, isError), chosen(name)}. */
+/** The tools of a view: {stage, context, config, link, toolTable, say(text, isError), chosen(name)}. */
 export class Tools {
   constructor(view) {
     this.view = view;
@@ -96,11 +96,11 @@ export class Tools {
       this.advertised.add(topic);
     }
     this.view.chosen(name);
-    this.view.say(t(TOOLS[name].hint));
+    this.view.say(t(this.view.toolTable[name].hint));
   }
 
   target(name) {
-    const { tool, topic, type } = TOOLS[name];
+    const { tool, topic, type } = this.view.toolTable[name];
     return { topic: topic && this.view.config.toolTopic(tool, topic), type };
   }
 
@@ -193,7 +193,8 @@ export class Tools {
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const found = Object.keys(TOOLS).find((name) => TOOLS[name].key === event.key.toLowerCase());
+    const table = this.view.toolTable;
+    const found = Object.keys(table).find((name) => table[name].key === event.key.toLowerCase());
     if (found) this.choose(found);
     else if (event.key === "Escape") this.choose("move");
     else {

@@ -59,7 +59,6 @@ const DISPLAYS = {
   Camera,
   DepthCloud,
 };
-const KEY = "3d"; // of what the browser keeps
 const MAX_AUTOMATIC = 20; // displays that are added without a click
 const LEFT_OUT = /_updates$|^\/rosout/;
 const VIEWS = { orbit: "Orbit", top: "Top down", follow: "Follow" };
@@ -87,7 +86,7 @@ export class SceneView {
     this.toolbar = h(
       "div",
       { class: "tools", role: "toolbar", "aria-label": "Tools" },
-      Object.entries(TOOLS).map(([name, { title, key }]) => {
+      Object.entries(this.toolTable).map(([name, { title, key }]) => {
         const button = h(
           "button",
           {
@@ -134,13 +133,13 @@ export class SceneView {
     this.context = new Context(link, this.stage, () => {
       this.panel.isStale = true;
     });
-    this.tools = new Tools(this);
-    this.stage.onTick = () => this.context.tick(this.displays.values());
+    this.tools = this.makeTools();
+    this.stage.onTick = () => this.context.tick([...this.displays.values(), ...this.fixedDisplays()]);
     this.stage.onAim = (camera) => {
       for (const display of this.displays.values()) display.face?.(camera);
     };
     this.stage.onView = () => this.viewChanged();
-    this.toggleSide(localStorage.getItem(`${KEY} side`) !== "hidden" && innerWidth > 700);
+    this.toggleSide(this.isSideShown());
     this.apply();
     this.tools.choose("move");
     const leave = () => this.save();
@@ -158,16 +157,46 @@ export class SceneView {
     clearInterval(this.timer);
     clearTimeout(this.saving);
     for (const end of this.ends) end();
-    for (const display of this.displays.values()) display.close();
+    for (const display of [...this.displays.values(), ...this.fixedDisplays()]) display.close();
     this.tools.close();
     this.context.close();
     this.stage.close();
   }
 
+  // --- what the window of a simulation does in another way
+
+  /** Where the browser keeps what is shown. */
+  get key() {
+    return "3d";
+  }
+
+  /** @returns {Record<string, any>} the tools by name, as TOOLS */
+  get toolTable() {
+    return TOOLS;
+  }
+
+  makeTools() {
+    return new Tools(this);
+  }
+
+  /** Return what is shown at first. */
+  first() {
+    return { config: new Config(), isAutomatic: !this.hasFile };
+  }
+
+  isSideShown() {
+    return localStorage.getItem(`${this.key} side`) !== "hidden" && innerWidth > 700;
+  }
+
+  /** Return displays that are not in the configuration. */
+  fixedDisplays() {
+    return [];
+  }
+
   // --- what is shown, kept by the browser; that of a file until the page is loaded again
 
   restored() {
-    const text = (this.hasFile ? sessionStorage : localStorage).getItem(KEY);
+    const text = (this.hasFile ? sessionStorage : localStorage).getItem(this.key);
     try {
       const { raw, isAutomatic, dismissed, isOpened, origin } = JSON.parse(text);
       // Another command's file.
@@ -175,7 +204,7 @@ export class SceneView {
       this.dismissed = new Set(dismissed);
       return { config: new Config(raw), isAutomatic, isOpened };
     } catch {
-      return { config: new Config(), isAutomatic: !this.hasFile, isOpened: false };
+      return { ...this.first(), isOpened: false };
     }
   }
 
@@ -185,7 +214,7 @@ export class SceneView {
     const store = this.hasFile ? sessionStorage : localStorage;
     try {
       store.setItem(
-        KEY,
+        this.key,
         JSON.stringify({
           raw: this.config.raw,
           isAutomatic,
@@ -412,7 +441,8 @@ export class SceneView {
   pickable() {
     return [...this.displays]
       .filter(([settings]) => !["TF", "Grid"].includes(classOf(settings)))
-      .map(([, display]) => display.object);
+      .map(([, display]) => display.object)
+      .concat(this.fixedDisplays().map(({ object }) => object));
   }
 
   // --- the bars
@@ -445,6 +475,6 @@ export class SceneView {
   toggleSide(isShown = this.panel.element.hidden) {
     this.panel.element.hidden = !isShown;
     this.sideButton.setAttribute("aria-pressed", String(isShown));
-    localStorage.setItem(`${KEY} side`, isShown ? "" : "hidden");
+    localStorage.setItem(`${this.key} side`, isShown ? "" : "hidden");
   }
 }
