@@ -182,7 +182,7 @@ def _file(element: Element, tag: str, what: str, source: Source) -> str:
         raise _LeftOutError(f"the {what} has no <{tag}>")
     path = source.find(uri)
     if path is None:
-        raise _LeftOutError(f"the {what} {uri} does not exist")
+        raise _LeftOutError(f"the {what} {source.missing(uri)}")
     return path
 
 

@@ -242,7 +242,8 @@ class TestShapes:
             ),
             (
                 "<mesh><uri>model://a.dae</uri></mesh>",
-                "visual [v] is left out: the mesh model://a.dae does not exist",
+                "visual [v] is left out: the mesh model://a.dae does not exist "
+                "(add its folder to GAZEBO_MODEL_PATH)",
             ),
             ("<torus/>", "visual [v]: the geometry <torus> is not supported, so it is left out"),
             ("", "visual [v] has no geometry and is left out"),
