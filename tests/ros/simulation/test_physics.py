@@ -17,6 +17,7 @@ from minirospy.core.sdf.model import (
     Link,
     Model,
     Physics,
+    Plane,
     Pose,
     Sphere,
     Surface,
@@ -194,6 +195,19 @@ def test_of_two_frictions_the_smaller_counts() -> None:
     simulation.step(1000)
 
     assert box.state.linear[0] == pytest.approx(2.0 - 0.1 * G, rel=0.03)
+
+
+def test_a_plane_that_hangs_on_a_wall_ends() -> None:
+    poster = still("poster", Plane(size=(1.0, 2.0)), compose(at(x=3.0, z=1.0), tilted(-math.pi / 2)))
+    behind = single("behind", Sphere(0.2), pose=at(x=4.0, z=0.2))
+    simulation = Simulation(World(models=(GROUND, poster, behind)))
+
+    simulation.step(200)
+
+    assert simulation.model("behind").pose.position == pytest.approx((4.0, 0.0, 0.2), abs=0.002)
+    forward = np.array([[1.0, 0.0, 0.0]])
+    assert simulation.cast_rays(at(z=1.2), forward, 10.0).distances[0] == pytest.approx(3.0)
+    assert math.isinf(simulation.cast_rays(at(y=1.1, z=1.2), forward, 10.0).distances[0])
 
 
 def test_a_velocity_motor_is_limited_by_its_force() -> None:

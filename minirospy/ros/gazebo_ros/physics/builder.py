@@ -16,6 +16,7 @@ from minirospy.core.sdf.model import (
     Link,
     Model,
     Physics,
+    Plane,
     Pose,
     Quaternion,
     Vector,
@@ -185,6 +186,7 @@ class Builder:
                 collision,
                 is_static=model.is_static,
                 is_wheel=joint is not None and _is_wheel(joint, collision),
+                is_wall=model.is_static and _is_steep(compose(local, collision.pose), collision),
             )
 
     def _add_joint(self, body: Any, scoped: str, joint: Joint) -> None:
@@ -320,6 +322,15 @@ def _is_wheel(joint: Joint, collision: Collision) -> bool:
     shift = sum(a * b for a, b in zip(offset, along, strict=True))
     distance = math.sqrt(max(sum(a * a for a in offset) - shift * shift, 0.0))
     return abs(cosine) > 0.999 and distance < 0.01 * shape.radius
+
+
+def _is_steep(pose: Pose, collision: Collision) -> bool:
+    """Return whether a collision is a plane that is nearer to a wall than to the ground. ``pose``: in the world."""
+    shape = collision.geometry
+    if not isinstance(shape, Plane):
+        return False
+    length = math.hypot(*shape.normal)
+    return abs(rotate(pose.orientation, shape.normal)[2]) < 0.5 * length
 
 
 def _check_numbers(link: Link, joint: Joint | None) -> None:
