@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from minirospy.core.meshes.errors import MeshError
 from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex"]
@@ -35,8 +36,10 @@ class Parts(NamedTuple):
 
 
 def collision_parts(mesh: Mesh, *, is_static: bool) -> Parts:
-    """Return the convex parts."""
+    """Return the convex parts. Raise MeshError if all triangles of the mesh have no area."""
     mesh = _welded(mesh)
+    if not _has_area(mesh).any():
+        raise MeshError("the mesh has no area")
     parts = connected_parts(mesh)
     if not is_static:
         if len(parts) > MAX_HULLS:

@@ -125,9 +125,12 @@ def _read_plane(element: Element, source: Source) -> Plane:
 
 def _read_mesh(element: Element, source: Source) -> MeshShape:
     submesh = element.first("submesh")
+    scale = source.vector(element, "scale", (1.0, 1.0, 1.0))
+    if scale.count(0.0) > 1:
+        raise _LeftOutError("the mesh has a scale of 0")
     return MeshShape(
         _file(element, "uri", "mesh", source),
-        source.vector(element, "scale", (1.0, 1.0, 1.0)),
+        scale,
         source.text(submesh, "name"),
         source.flag(submesh, "center", False),
     )

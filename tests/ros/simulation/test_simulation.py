@@ -454,6 +454,33 @@ def test_a_robot_drives_in_a_room_that_is_one_mesh(tmp_path: Path) -> None:
     } >= {"room::link::shape", "robot::base::shape"}
 
 
+def test_a_model_that_mujoco_refuses_leaves_the_others(tmp_path: Path) -> None:
+    """MuJoCo refuses a mesh that is too small. It must not stay in the spec, and fail each later compilation."""
+    small = [[(x * 1e-9, y * 1e-9, z * 1e-9) for x, y, z in corners] for corners in room()]
+    tiny = write_stl(tmp_path / "small.stl", small)
+    rooms = write_stl(tmp_path / "room.stl", room())
+    models = [
+        still(name, MeshShape(path)) for name, path in (("first", rooms), ("bad", tiny), ("last", rooms))
+    ]
+
+    simulation = Simulation(World(models=(GROUND, *models)))
+
+    assert list(simulation.models) == ["ground", "first", "last"]
+    assert len(simulation.warnings) == 1
+    assert simulation.warnings[0].startswith("model 'bad': ")
+    with pytest.raises(SimulationError, match="mesh"):
+        simulation.add_model(single("bad", MeshShape(tiny)))
+    simulation.add_model(still("more", MeshShape(rooms, scale=(2.0, 2.0, 2.0))))
+
+
+def test_a_mesh_without_area_is_named(tmp_path: Path) -> None:
+    line = write_stl(tmp_path / "line.stl", [[(0, 0, 0), (1, 0, 0), (2, 0, 0)]])
+    simulation = Simulation(World(models=(GROUND,)))
+    for model in (single("bad", MeshShape(line)), still("bad", MeshShape(line))):
+        with pytest.raises(SimulationError, match="line.stl: the mesh has no area"):
+            simulation.add_model(model)
+
+
 def test_a_moving_mesh_collides_as_the_hulls_of_its_parts(tmp_path: Path) -> None:
     def box(x: float) -> list[list[tuple[float, float, float]]]:
         low, high = -0.1, 0.1

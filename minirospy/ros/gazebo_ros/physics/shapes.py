@@ -90,7 +90,23 @@ class Shapes:
         self._mujoco = load_mujoco()
         self._spec = spec
         self._assets: dict[tuple[object, ...], list[_Piece]] = {}
+        self._elements: dict[int, Any] = {}  # the spec's meshes and heightmaps by their numbers
         self._count = 0
+
+    @property
+    def last(self) -> int:
+        """Return the number of the mesh or heightmap that was added last."""
+        return self._count
+
+    def delete_after(self, last: int) -> None:
+        """Delete the meshes and heightmaps with greater numbers than ``last``; no geom may use them."""
+        numbers = [number for number in self._elements if number > last]
+        names = {self._elements[number].name for number in numbers}
+        for number in numbers:
+            self._spec.delete(self._elements.pop(number))
+        for key, pieces in list(self._assets.items()):
+            if any(piece.asset in names for piece in pieces):
+                del self._assets[key]
 
     def add_collision(
         self,
@@ -160,7 +176,10 @@ class Shapes:
             return
 
         mesh = _joined(_meshes(geometry))
-        parts = collision_parts(mesh, is_static=is_static)
+        try:
+            parts = collision_parts(mesh, is_static=is_static)
+        except MeshError as error:
+            raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
         is_whole = parts.are_exact
         for part in parts.meshes:
             name = self._add_mesh(part.vertices, part.triangles if is_whole else None)
@@ -191,7 +210,7 @@ class Shapes:
     def _add_mesh(self, vertices: NDArray[np.float64], triangles: NDArray[np.int32] | None) -> str:
         self._count += 1
         name = f"mesh{self._count}"
-        mesh = self._spec.add_mesh(name=name)
+        mesh = self._elements[self._count] = self._spec.add_mesh(name=name)
         if triangles is not None:
             used, faces = np.unique(triangles, return_inverse=True)
             vertices = vertices[used]
@@ -213,7 +232,7 @@ class Shapes:
         name = f"terrain{self._count}"
         x, y, z = shape.size
         rows, columns = heights.shape
-        self._spec.add_hfield(
+        self._elements[self._count] = self._spec.add_hfield(
             name=name,
             nrow=rows,
             ncol=columns,
