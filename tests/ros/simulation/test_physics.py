@@ -197,6 +197,19 @@ def test_of_two_frictions_the_smaller_counts() -> None:
     assert box.state.linear[0] == pytest.approx(2.0 - 0.1 * G, rel=0.03)
 
 
+@pytest.mark.parametrize(("mu", "mu2", "expected"), [(1.5, 0.3, 0.3), (0.3, 1.5, 0.3), (0.4, 0.0, 0.2)])
+def test_of_two_directions_the_smoother_counts(mu: float, mu2: float, expected: float) -> None:
+    link = body("link", Box((0.2, 0.2, 0.1)), surface=Surface(mu, mu2))
+    simulation = Simulation(World(models=(GROUND, Model("box", {"link": link}, pose=at(z=0.05)))))
+    box = simulation.model("box")
+    simulation.step(100)
+    box.set_velocity((4.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    simulation.step(500)
+
+    assert box.state.linear[0] == pytest.approx(4.0 - 0.5 * expected * G, rel=0.03)
+
+
 def test_a_plane_that_hangs_on_a_wall_ends() -> None:
     poster = still("poster", Plane(size=(1.0, 2.0)), compose(at(x=3.0, z=1.0), tilted(-math.pi / 2)))
     behind = single("behind", Sphere(0.2), pose=at(x=4.0, z=0.2))

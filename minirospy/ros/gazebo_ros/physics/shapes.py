@@ -65,10 +65,13 @@ def friction(surface: Surface) -> tuple[float, int]:
     """Return a geom's coefficient and its priority.
 
     The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo has one
-    coefficient for both directions, so the mean of ``mu`` and ``mu2`` is used.
+    coefficient for both directions. The smaller one of ``mu`` and ``mu2`` is used: with a larger one, wheels that must slip
+    sideways, as those of a robot with four of them, do not turn it. If one is zero, as of a wheel that rolls sideways, the
+    mean is used: the wheel must drive.
     """
-    mean = (min(max(surface.mu, 0.0), MAX_FRICTION) + min(max(surface.mu2, 0.0), MAX_FRICTION)) / 2
-    return mean, round((MAX_FRICTION - mean) * 1e6)
+    mu, mu2 = (min(max(value, 0.0), MAX_FRICTION) for value in (surface.mu, surface.mu2))
+    value = min(mu, mu2) or (mu + mu2) / 2
+    return value, round((MAX_FRICTION - value) * 1e6)
 
 
 @dataclass(frozen=True)
