@@ -13,6 +13,7 @@ pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
 from minirospy.core.sdf.model import (
     Axis,
     Box,
+    Cylinder,
     Joint,
     Link,
     Model,
@@ -298,6 +299,32 @@ def test_damping_slows_a_joint() -> None:
     simulation.step(1000)
 
     assert handle.velocity == pytest.approx(5.0 * math.exp(-0.1 / rotor.inertial.inertia[5]), rel=0.002)
+
+
+def test_damping_does_not_slow_a_strong_motor() -> None:
+    wheel = body("wheel", Cylinder(0.025, 0.01), 0.01)
+    joint = Joint("joint", "continuous", "world", "wheel", axis=Axis(damping=1.0))
+    simulation = Simulation(World(models=(Model("wheel", {"wheel": wheel}, {"joint": joint}),)))
+    handle = simulation.model("wheel").joints["joint"]
+
+    handle.set_velocity(6.0, 500.0)
+    simulation.step(5)
+    assert handle.velocity == pytest.approx(6.0, abs=0.01)
+    assert handle.effort == pytest.approx(6.0, abs=0.01)
+
+    # The damping takes all of a weak motor's force.
+    handle.set_velocity(6.0, 3.0)
+    simulation.step(100)
+    assert handle.velocity == pytest.approx(3.0, rel=0.03)
+
+    handle.set_velocity(0.0, 3.0)
+    simulation.step(5)
+    assert handle.velocity == pytest.approx(0.0, abs=0.01)
+
+    handle.set_state(0.0, 5.0)
+    handle.stop_motor()
+    simulation.step(100)
+    assert abs(handle.velocity) < 0.01
 
 
 def test_joint_friction_stops_a_joint() -> None:
