@@ -184,6 +184,33 @@ def test_a_robot_on_rough_casters_drives_smoothly() -> None:
     assert max(speeds) - min(speeds) < 0.001
 
 
+def test_a_robot_with_four_wheels_turns_in_place() -> None:
+    """With Coulomb friction, wheels at (+-length/2, +-width/2) turn it by 2 v width / (width^2 + length^2)."""
+    length, width, radius = 0.3, 0.33, 0.0625
+    half = math.sqrt(0.5)
+    links = {"base": body("base", Box((0.3, 0.25, 0.1)), 4.5, at(z=0.1))}
+    joints: dict[str, Joint] = {}
+    for index, (x, y) in enumerate([(1, 1), (-1, 1), (1, -1), (-1, -1)]):
+        place = Pose((x * length / 2, y * width / 2, radius), (-half, 0.0, 0.0, half))
+        links[f"wheel{index}"] = body(f"wheel{index}", Cylinder(radius, 0.04), 0.28, place)
+        axis = Axis((0.0, 0.0, 1.0))
+        joints[f"joint{index}"] = Joint(f"joint{index}", "continuous", "base", f"wheel{index}", axis=axis)
+    simulation = Simulation(World(models=(GROUND, Model("robot", links, joints))))
+    robot = simulation.model("robot")
+    simulation.step(500)
+    for index, speed in enumerate((-3.5, -3.5, 3.5, 3.5)):
+        robot.joints[f"joint{index}"].set_velocity(speed, 1.7)
+    simulation.step(500)
+    rates: list[float] = []
+    for _ in range(1000):
+        simulation.step()
+        rates.append(robot.state.angular[2])
+
+    expected = 2 * 3.5 * radius * width / (width**2 + length**2)
+    assert sum(rates) / len(rates) == pytest.approx(expected, rel=0.04)
+    assert math.hypot(*robot.pose.position[:2]) < 0.01
+
+
 def test_of_two_frictions_the_smaller_counts() -> None:
     floor = still("floor", Box((20, 20, 0.2)), at(z=-0.1), mu=0.1)
     simulation = Simulation(

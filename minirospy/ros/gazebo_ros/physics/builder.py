@@ -185,6 +185,7 @@ class Builder:
                 f"{scoped}::{collision.name}",
                 collision,
                 is_static=model.is_static,
+                turns=joint is not None and _turns_freely(joint),
                 is_wheel=joint is not None and _is_wheel(joint, collision),
                 is_wall=model.is_static and _is_steep(compose(local, collision.pose), collision),
             )
@@ -308,12 +309,15 @@ def has_limits(axis: Axis) -> bool:
     return max(axis.lower, axis.upper) < MAX_LIMIT or min(axis.lower, axis.upper) > -MAX_LIMIT
 
 
+def _turns_freely(joint: Joint) -> bool:
+    """Return whether a joint turns without limits."""
+    return joint.kind == "continuous" or (joint.kind == "revolute" and not has_limits(joint.axis))
+
+
 def _is_wheel(joint: Joint, collision: Collision) -> bool:
     """Return whether a collision is a short cylinder that a joint without limits turns about its own axis."""
     shape = collision.geometry
-    if joint.kind not in ("continuous", "revolute") or not isinstance(shape, Cylinder):
-        return False
-    if (joint.kind == "revolute" and has_limits(joint.axis)) or shape.length > 2 * shape.radius:
+    if not _turns_freely(joint) or not isinstance(shape, Cylinder) or shape.length > 2 * shape.radius:
         return False
     axis, along = _direction(joint, joint.axis), rotate(collision.pose.orientation, (0.0, 0.0, 1.0))
     length = math.hypot(*axis)

@@ -53,6 +53,9 @@ SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with s
 # A contact begins soft and is stiff from 0.6 mm on. If it began stiff, a robot on four supports would rattle: each of them in
 # turn would lose the ground, and the wheels their grip.
 SOLIMP = (0.5, 0.99, 0.0006, 0.5, 2.0)
+# A wheel that turns in place is pulled sideways, too: it lost the ground in most steps, and a robot with four of them
+# turned too slowly. This contact begins softer.
+SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
 # A larger coefficient, such as 1e5, holds no better, and a wheel that touches the ground at two points then resists turning.
 MAX_FRICTION = 2.0
 PART = "\t"  # separates the name of a collision from the number of its geom
@@ -118,12 +121,14 @@ class Shapes:
         collision: Collision,
         *,
         is_static: bool,
+        turns: bool = False,
         is_wheel: bool = False,
         is_wall: bool = False,
     ) -> None:
         """Add a collision's geoms.
 
-        ``is_wheel``: the collision is a cylinder that turns about its axis. ``is_wall``: it is a plane that is not level.
+        ``turns``: a joint without limits turns the body. ``is_wheel``: the collision is a cylinder that turns about its axis.
+        ``is_wall``: it is a plane that is not level.
         """
         mu, priority = friction(collision.surface)
         pose = collision.pose
@@ -138,7 +143,7 @@ class Shapes:
             geom.group = piece.group
             geom.friction = [mu, 0.0, 0.0]
             geom.priority = priority
-            geom.solref, geom.solimp = SOLREF, SOLIMP
+            geom.solref, geom.solimp = SOLREF, SOLIMP_WHEEL if turns else SOLIMP
             if piece.group == GROUP_RAY_ONLY:
                 geom.contype = geom.conaffinity = 0
 
