@@ -535,6 +535,21 @@ def test_a_heightmap_is_a_terrain(tmp_path: Path) -> None:
     assert ball.pose.position[0] < 1.0  # it rolls down
 
 
+def test_a_heightmap_of_elevations_keeps_them(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="heightmaps need Pillow")
+    heights = np.tile(np.linspace(-1.0, 5.0, 65), (65, 1)).astype(np.float32)  # rises with x
+    heights[0, :10] = -99999.0  # no data
+    image.fromarray(heights).save(tmp_path / "slope.tif")
+    simulation = Simulation(
+        World(models=(still("terrain", Heightmap(str(tmp_path / "slope.tif"), (8.0, 8.0, 5.0))),))
+    )
+
+    down = np.array([[0.0, 0.0, -1.0]])
+    for x in (-3.6, -2.0, 0.5, 3.0):
+        hit = simulation.cast_rays(at(x, 1.0, 10.0), down, 20.0)
+        assert 10.0 - hit.distances[0] == pytest.approx(max(6.0 * (x + 4) / 8 - 1.0, 0.0), abs=0.001)
+
+
 def test_an_unreadable_heightmap_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "no.png").write_bytes(b"no picture")
     with pytest.raises(SimulationError, match="the heightmap cannot be read"):
