@@ -13,12 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from minirospy.core.meshes.errors import MeshError
 from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
 MAX_HULLS = 32  # of a moving mesh; one with more parts collides as the hull of all
-MAX_PRISMS = 1500  # of a static mesh; a finer one is simplified until it has fewer flat patches
+# A static mesh with more flat patches is simplified until it has fewer. Worlds have many small models with fine meshes.
+MAX_PRISMS = 1500
+MIN_PRISMS = 100  # of a small mesh
+PRISMS_PER_METER = 200  # of the longest side
 MAX_CONVEX = 5000  # triangles; the test of a larger part would take seconds
 MAX_RAYS = 200  # from the largest triangles, to find out whether a mesh is hollow
 MAX_TESTS = 2_000_000  # of a ray and a triangle; these take 0.2 s
@@ -43,6 +47,8 @@ def collision_parts(
 ) -> Parts:
     """Return the convex parts. ``split`` returns those of a hollow part that moves, or None if its hull must do."""
     mesh = _welded(mesh)
+    if not _has_area(mesh).any():
+        raise MeshError("the mesh has no area")
     parts = connected_parts(mesh)
     if not is_static:
         if len(parts) > MAX_HULLS:
@@ -177,12 +183,14 @@ def _thickened(part: Mesh) -> Mesh:
 
 def _prisms(mesh: Mesh) -> list[Mesh]:
     """Return a prism below each flat convex patch of the surface."""
-    patches = _patches(mesh)
-    cell = float(np.ptp(mesh.vertices, axis=0).max()) / 1000
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    limit = min(max(round(PRISMS_PER_METER * size), MIN_PRISMS), MAX_PRISMS)
+    patches = _patches(mesh, limit)
+    cell = size / 1000
     simple = mesh
     while patches is None:
         simple = _simplified(mesh, cell)
-        patches = _patches(simple)
+        patches = _patches(simple, limit)
         cell *= 1.6
     mesh = simple
     depths = _depths(mesh, patches)
@@ -192,12 +200,12 @@ def _prisms(mesh: Mesh) -> list[Mesh]:
     ]
 
 
-def _patches(mesh: Mesh) -> list[tuple[Points, Points]] | None:
-    """Return the outlines of flat convex patches, and their normals, or None if there are too many."""
+def _patches(mesh: Mesh, limit: int) -> list[tuple[Points, Points]] | None:
+    """Return the outlines of flat convex patches, and their normals, or None if there are more than the limit."""
     normals = _normals(mesh)
     patches: list[tuple[Points, Points]] = []
     groups = _coplanar(mesh, normals)
-    if len(groups) > MAX_PRISMS:
+    if len(groups) > limit:
         return None
     for rows in groups:
         outline = _convex_outline(mesh, rows, normals[rows[0]])
@@ -205,7 +213,7 @@ def _patches(mesh: Mesh) -> list[tuple[Points, Points]] | None:
             patches.append((outline, normals[rows[0]]))
         else:
             patches.extend((mesh.vertices[mesh.triangles[row]], normals[row]) for row in rows)
-    return patches if len(patches) <= 2 * MAX_PRISMS else None
+    return patches if len(patches) <= 2 * limit else None
 
 
 def _simplified(mesh: Mesh, cell: float) -> Mesh:

@@ -14,6 +14,7 @@ __all__ = ["polyline_mesh", "terrain"]
 
 MAX_POINTS = 2000  # of a polyline; triangulating takes the square of it
 MIN_EAR = 1e-12  # m^2
+NO_ELEVATION = -12_000.0  # m; below the deepest sea, as the numbers that mark missing data are
 MAX_TERRAIN = 2049  # pixels on a side; four million triangles
 
 
@@ -72,7 +73,11 @@ def _is_ear(points: NDArray[np.float64], left: list[int], at: int, limit: float)
 
 
 def terrain(path: str) -> NDArray[np.float64]:
-    """Return a grey picture's heights from 0 to 1, the first row at the smallest y. Raise MeshError if it cannot be read."""
+    """Return a grey picture's heights from 0 to 1, the first row at the smallest y. Raise MeshError if it cannot be read.
+
+    A picture of floating-point numbers has elevations in metres, as files of digital elevation models do: 1 is the highest,
+    0 the sea or, above it, the lowest.
+    """
     try:
         from PIL import Image
     except ImportError:
@@ -81,8 +86,19 @@ def terrain(path: str) -> NDArray[np.float64]:
         with Image.open(path) as picture:
             if max(picture.size) > MAX_TERRAIN:
                 raise MeshError(f"the heightmap is larger than {MAX_TERRAIN} pixels", path)
+            if picture.mode == "F":
+                return _relative(np.asarray(picture, np.float64)[::-1])
             pixels = np.asarray(picture.convert("I" if picture.mode.startswith("I") else "L"), np.float64)
     except (OSError, ValueError, SyntaxError) as error:
         raise MeshError(f"the heightmap cannot be read: {error}", path) from None
     scale = 65535.0 if pixels.max() > 255 else 255.0
     return np.clip(pixels[::-1] / scale, 0.0, 1.0)
+
+
+def _relative(elevations: NDArray[np.float64]) -> NDArray[np.float64]:
+    known = np.isfinite(elevations) & (elevations > NO_ELEVATION)
+    if not known.any():
+        raise ValueError("it has no elevation")
+    lowest, highest = max(elevations[known].min(), 0.0), elevations[known].max()
+    heights: NDArray[np.float64] = np.where(known, elevations - lowest, 0.0) / max(highest - lowest, 1e-9)
+    return np.clip(heights, 0.0, 1.0)

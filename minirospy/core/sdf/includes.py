@@ -42,8 +42,7 @@ def open_include(element: Element, source: Source) -> Included | None:
         raise source.error(element, "<include> has no <uri>")
     path = source.find(uri)
     if path is None:
-        hint = " (add its folder to GAZEBO_MODEL_PATH)" if uri.startswith("model://") else ""
-        raise source.error(element, f"{uri} does not exist{hint}")
+        raise source.error(element, source.missing(uri))
     root, inner = source.open(element, model_file(path))
     inner = replace(inner, version=sdf_version(root))
     entity = (

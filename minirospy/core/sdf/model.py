@@ -81,7 +81,7 @@ class Sphere(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """A plane through the origin. It is infinite for collisions; ``size`` is that of the visible part."""
+    """A plane through the origin. ``size`` is that of the visible part; collisions of the ground are infinite."""
 
     normal: Vector = (0.0, 0.0, 1.0)
     size: tuple[float, float] = (1.0, 1.0)

@@ -108,7 +108,7 @@ class _Reader:
 
     def read(self) -> Model:
         source, element = self.source, self.element
-        is_static = source.flag(element, "static", False) if self.static is None else self.static
+        is_static = bool(self._own_static()) if self.static is None else self.static
         self.static = is_static
         self._collect()
         frames: dict[str, Frame] = {}
@@ -137,6 +137,32 @@ class _Reader:
         return Model(self.name, links, joints, IDENTITY, is_static, self_collide, plugins)
 
     # ---- what there is
+
+    def _own_static(self) -> bool | None:
+        """Return the first ``<static>`` of the model and of those that it includes, or None if there is none.
+
+        sdformat moves the children of an included model into the model, also ``<static>``.
+        """
+        for child in self.element.children:
+            if child.tag == "static":
+                return self.source.flag(self.element, "static", False)
+            if child.tag != "include":
+                continue
+            self.source.count(child)
+            if (found := self._find_include(child)) is not None:
+                inner = _Reader(found.entity, found.source, found.name, None)
+                is_static = inner._own_static() if found.is_static is None else found.is_static
+                if is_static is not None:
+                    return is_static
+        return None
+
+    def _find_include(self, child: Element) -> Included | None:
+        """Return the model that an ``<include>`` names, or None if there is none."""
+        uri = self.source.text(child, "uri")
+        if uri and self.source.find(uri) is None:
+            return None
+        included = open_include(child, self.source.inside(child))
+        return included if included is not None and included.entity.tag == "model" else None
 
     def _collect(self) -> None:
         source = self.source
@@ -168,8 +194,8 @@ class _Reader:
         if uri and source.find(uri) is None:
             source.warn(child, f"{uri} does not exist, and is left out of model [{self.name}]")
             return
-        included = open_include(child, source.inside(child))
-        if included is None or included.entity.tag != "model":
+        included = self._find_include(child)
+        if included is None:
             source.warn(
                 child, f"{source.text(child, 'uri')} has no model, and is left out of model [{self.name}]"
             )

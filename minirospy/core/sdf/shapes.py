@@ -122,9 +122,12 @@ def _read_plane(element: Element, source: Source) -> Plane:
 
 def _read_mesh(element: Element, source: Source) -> MeshShape:
     submesh = element.first("submesh")
+    scale = source.vector(element, "scale", (1.0, 1.0, 1.0))
+    if scale.count(0.0) > 1:
+        raise _LeftOutError("the mesh has a scale of 0")
     return MeshShape(
         _file(element, "uri", "mesh", source),
-        source.vector(element, "scale", (1.0, 1.0, 1.0)),
+        scale,
         source.text(submesh, "name"),
         source.flag(submesh, "center", False),
     )
@@ -177,7 +180,7 @@ def _file(element: Element, tag: str, what: str, source: Source) -> str:
         raise _LeftOutError(f"the {what} has no <{tag}>")
     path = source.find(uri)
     if path is None:
-        raise _LeftOutError(f"the {what} {uri} does not exist")
+        raise _LeftOutError(f"the {what} {source.missing(uri)}")
     return path
 
 

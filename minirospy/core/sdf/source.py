@@ -77,6 +77,11 @@ class Source:
             line = f"{self.file}: there are more than {MAX_WARNINGS} warnings: the others are not listed"
         self.warnings.append(line)
 
+    def missing(self, uri: str) -> str:
+        """Return the text that a file does not exist, with advice if there is any."""
+        hint = " (add its folder to GAZEBO_MODEL_PATH)" if uri.startswith("model://") else ""
+        return f"{uri} does not exist{hint}"
+
     def error(self, element: Element, text: str) -> SdfError:
         """Return the error for an element that cannot be read."""
         return SdfError(self.file, element.line, text)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from minirospy.ros.gazebo_ros.loop import SimulationLoop
     from minirospy.ros.gazebo_ros.physics import Simulation
 
-__all__ = ["ABOUT", "main", "new_parser", "read_world_file"]
+__all__ = ["ABOUT", "main", "new_parser", "read_world_file", "world_warnings"]
 
 ABOUT = "minirospy's simulation (MuJoCo) under Gazebo's names"
 DEFAULT_WORLD = "worlds/empty.world"
@@ -62,6 +62,20 @@ def read_world_file(name: str, resources: ResourcePaths) -> World:
     return parse_world(text, resources.resolve, file=path)
 
 
+def world_warnings(world: World) -> list[str]:
+    """Return the lines about a world and its models. A line that several models share is returned once, with their number."""
+    places: dict[str, list[str]] = {}
+    for model in world.models:
+        for line in model.warnings:
+            place, _, text = line.partition(": ")
+            places.setdefault(text or place, []).append(place)
+    lines = list(world.warnings)
+    for text, found in places.items():
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        lines.append(f"{found[0]}: {text}{more}")
+    return lines
+
+
 def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
     """Run the node until it is shut down; return the exit status."""
     words = list(rospy.myargv()[1:] if argv is None else argv)
@@ -86,7 +100,7 @@ def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
 
     try:
         _start_node()
-        for line in (*world.warnings, *simulation.warnings):
+        for line in (*world_warnings(world), *simulation.warnings):
             rospy.logwarn("%s", line)
         loop = _run(simulation, world, resources, paused=arguments.pause, steps=arguments.iters)
         return 1 if loop.failure is not None else 0

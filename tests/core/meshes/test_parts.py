@@ -112,6 +112,15 @@ def test_fine_meshes_are_simplified() -> None:
     assert max(np.linalg.norm(part.vertices, axis=1).max() for part in parts.meshes) < 1.1
 
 
+@pytest.mark.parametrize(("scale", "most"), [(0.1, 200), (1.0, 800), (10.0, 3000)])
+def test_small_meshes_have_fewer_prisms(scale: float, most: int) -> None:
+    mesh = inside_out(sphere(60)).scaled((scale, scale, scale))
+    parts = collision_parts(mesh, is_static=True)
+    assert most / 10 < len(parts.meshes) <= most
+    radii = np.concatenate([np.linalg.norm(part.vertices, axis=1) for part in parts.meshes])
+    assert radii.max() < 1.1 * scale + THICKNESS
+
+
 def test_many_moving_parts_have_one_hull() -> None:
     parts = collision_parts(Mesh.join([box(2.0 * index) for index in range(40)]), is_static=False)
     assert len(parts.meshes) == 1

@@ -245,7 +245,12 @@ class TestShapes:
             ),
             (
                 "<mesh><uri>model://a.dae</uri></mesh>",
-                "visual [v] is left out: the mesh model://a.dae does not exist",
+                "visual [v] is left out: the mesh model://a.dae does not exist "
+                "(add its folder to GAZEBO_MODEL_PATH)",
+            ),
+            (
+                "<mesh><uri>model://a.dae</uri><scale>1 0 0</scale></mesh>",
+                "visual [v] is left out: the mesh has a scale of 0",
             ),
             ("<torus/>", "visual [v]: the geometry <torus> is not supported, so it is left out"),
             ("", "visual [v] has no geometry and is left out"),

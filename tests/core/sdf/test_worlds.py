@@ -87,6 +87,14 @@ class TestIncludes:
         path = model.links["a"].visuals[0].geometry[0]
         assert Path(str(path)).samefile(library.folder / "box" / "meshes" / "a.stl")
 
+    def test_a_model_takes_static_from_the_model_that_it_includes(self, library: Library) -> None:
+        library.add("wall", MODEL.format("wall").replace("</model>", "<static>true</static></model>"))
+        include = "<include><uri>model://wall</uri></include>"
+        own = "<static>false</static>"
+        bodies = [include, f"{own}{include}", f"{include}{own}"]
+        world = library.read("".join(f'<model name="m{i}">{body}</model>' for i, body in enumerate(bodies)))
+        assert [model.is_static for model in world.models] == [True, False, True]
+
     def test_models_include_models(self, library: Library) -> None:
         library.add("wheel", SDF.format(MODEL.format("wheel")))
         body = """<link name="body"/><include><uri>model://wheel</uri><name>left</name><pose>0 1 0 0 0 0</pose></include>

@@ -318,6 +318,19 @@ def test_a_world_that_does_not_exist(master: str, start: Start) -> None:
     )
 
 
+def test_parts_that_a_world_lacks_are_named_once(master: str, tmp_path: Path, start: Start) -> None:
+    uri = "model://no_such/wall.dae"
+    link = (
+        f'<link name="l"><visual name="v"><geometry><mesh><uri>{uri}</uri></mesh></geometry></visual></link>'
+    )
+    models = "\n".join(f'<model name="m{index}">{link}</model>' for index in range(3))
+    world = written(tmp_path, "my.world", f'<sdf version="1.6"><world name="w">{models}</world></sdf>')
+    output, errors = start_world(start, world, "--iters", "5").communicate(timeout=SECONDS)
+    assert (output + errors).count(uri) == 1
+    assert f"my.world:1: visual [v] is left out: the mesh {uri} does not exist" in output + errors
+    assert "(add its folder to GAZEBO_MODEL_PATH) (and 2 more)" in output + errors
+
+
 def test_values_that_are_not_finite_are_refused(master: str, start: Start) -> None:
     process = start_world(start, "-u")
 

@@ -13,10 +13,12 @@ pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
 from minirospy.core.sdf.model import (
     Axis,
     Box,
+    Cylinder,
     Joint,
     Link,
     Model,
     Physics,
+    Plane,
     Pose,
     Sphere,
     Surface,
@@ -182,6 +184,33 @@ def test_a_robot_on_rough_casters_drives_smoothly() -> None:
     assert max(speeds) - min(speeds) < 0.001
 
 
+def test_a_robot_with_four_wheels_turns_in_place() -> None:
+    """With Coulomb friction, wheels at (+-length/2, +-width/2) turn it by 2 v width / (width^2 + length^2)."""
+    length, width, radius = 0.3, 0.33, 0.0625
+    half = math.sqrt(0.5)
+    links = {"base": body("base", Box((0.3, 0.25, 0.1)), 4.5, at(z=0.1))}
+    joints: dict[str, Joint] = {}
+    for index, (x, y) in enumerate([(1, 1), (-1, 1), (1, -1), (-1, -1)]):
+        place = Pose((x * length / 2, y * width / 2, radius), (-half, 0.0, 0.0, half))
+        links[f"wheel{index}"] = body(f"wheel{index}", Cylinder(radius, 0.04), 0.28, place)
+        axis = Axis((0.0, 0.0, 1.0))
+        joints[f"joint{index}"] = Joint(f"joint{index}", "continuous", "base", f"wheel{index}", axis=axis)
+    simulation = Simulation(World(models=(GROUND, Model("robot", links, joints))))
+    robot = simulation.model("robot")
+    simulation.step(500)
+    for index, speed in enumerate((-3.5, -3.5, 3.5, 3.5)):
+        robot.joints[f"joint{index}"].set_velocity(speed, 1.7)
+    simulation.step(500)
+    rates: list[float] = []
+    for _ in range(1000):
+        simulation.step()
+        rates.append(robot.state.angular[2])
+
+    expected = 2 * 3.5 * radius * width / (width**2 + length**2)
+    assert sum(rates) / len(rates) == pytest.approx(expected, rel=0.04)
+    assert math.hypot(*robot.pose.position[:2]) < 0.01
+
+
 def test_of_two_frictions_the_smaller_counts() -> None:
     floor = still("floor", Box((20, 20, 0.2)), at(z=-0.1), mu=0.1)
     simulation = Simulation(
@@ -194,6 +223,32 @@ def test_of_two_frictions_the_smaller_counts() -> None:
     simulation.step(1000)
 
     assert box.state.linear[0] == pytest.approx(2.0 - 0.1 * G, rel=0.03)
+
+
+@pytest.mark.parametrize(("mu", "mu2", "expected"), [(1.5, 0.3, 0.3), (0.3, 1.5, 0.3), (0.4, 0.0, 0.2)])
+def test_of_two_directions_the_smoother_counts(mu: float, mu2: float, expected: float) -> None:
+    link = body("link", Box((0.2, 0.2, 0.1)), surface=Surface(mu, mu2))
+    simulation = Simulation(World(models=(GROUND, Model("box", {"link": link}, pose=at(z=0.05)))))
+    box = simulation.model("box")
+    simulation.step(100)
+    box.set_velocity((4.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    simulation.step(500)
+
+    assert box.state.linear[0] == pytest.approx(4.0 - 0.5 * expected * G, rel=0.03)
+
+
+def test_a_plane_that_hangs_on_a_wall_ends() -> None:
+    poster = still("poster", Plane(size=(1.0, 2.0)), compose(at(x=3.0, z=1.0), tilted(-math.pi / 2)))
+    behind = single("behind", Sphere(0.2), pose=at(x=4.0, z=0.2))
+    simulation = Simulation(World(models=(GROUND, poster, behind)))
+
+    simulation.step(200)
+
+    assert simulation.model("behind").pose.position == pytest.approx((4.0, 0.0, 0.2), abs=0.002)
+    forward = np.array([[1.0, 0.0, 0.0]])
+    assert simulation.cast_rays(at(z=1.2), forward, 10.0).distances[0] == pytest.approx(3.0)
+    assert math.isinf(simulation.cast_rays(at(y=1.1, z=1.2), forward, 10.0).distances[0])
 
 
 def test_a_velocity_motor_is_limited_by_its_force() -> None:
@@ -271,6 +326,32 @@ def test_damping_slows_a_joint() -> None:
     simulation.step(1000)
 
     assert handle.velocity == pytest.approx(5.0 * math.exp(-0.1 / rotor.inertial.inertia[5]), rel=0.002)
+
+
+def test_damping_does_not_slow_a_strong_motor() -> None:
+    wheel = body("wheel", Cylinder(0.025, 0.01), 0.01)
+    joint = Joint("joint", "continuous", "world", "wheel", axis=Axis(damping=1.0))
+    simulation = Simulation(World(models=(Model("wheel", {"wheel": wheel}, {"joint": joint}),)))
+    handle = simulation.model("wheel").joints["joint"]
+
+    handle.set_velocity(6.0, 500.0)
+    simulation.step(5)
+    assert handle.velocity == pytest.approx(6.0, abs=0.01)
+    assert handle.effort == pytest.approx(6.0, abs=0.01)
+
+    # The damping takes all of a weak motor's force.
+    handle.set_velocity(6.0, 3.0)
+    simulation.step(100)
+    assert handle.velocity == pytest.approx(3.0, rel=0.03)
+
+    handle.set_velocity(0.0, 3.0)
+    simulation.step(5)
+    assert handle.velocity == pytest.approx(0.0, abs=0.01)
+
+    handle.set_state(0.0, 5.0)
+    handle.stop_motor()
+    simulation.step(100)
+    assert abs(handle.velocity) < 0.01
 
 
 def test_joint_friction_stops_a_joint() -> None:

@@ -489,6 +489,33 @@ def test_a_robot_drives_in_a_room_that_is_one_mesh(tmp_path: Path) -> None:
     } >= {"room::link::shape", "robot::base::shape"}
 
 
+def test_a_model_that_mujoco_refuses_leaves_the_others(tmp_path: Path) -> None:
+    """MuJoCo refuses a mesh that is too small. It must not stay in the spec, and fail each later compilation."""
+    small = [[(x * 1e-9, y * 1e-9, z * 1e-9) for x, y, z in corners] for corners in room()]
+    tiny = write_stl(tmp_path / "small.stl", small)
+    rooms = write_stl(tmp_path / "room.stl", room())
+    models = [
+        still(name, MeshShape(path)) for name, path in (("first", rooms), ("bad", tiny), ("last", rooms))
+    ]
+
+    simulation = Simulation(World(models=(GROUND, *models)))
+
+    assert list(simulation.models) == ["ground", "first", "last"]
+    assert len(simulation.warnings) == 1
+    assert simulation.warnings[0].startswith("model 'bad': ")
+    with pytest.raises(SimulationError, match="mesh"):
+        simulation.add_model(single("bad", MeshShape(tiny)))
+    simulation.add_model(still("more", MeshShape(rooms, scale=(2.0, 2.0, 2.0))))
+
+
+def test_a_mesh_without_area_is_named(tmp_path: Path) -> None:
+    line = write_stl(tmp_path / "line.stl", [[(0, 0, 0), (1, 0, 0), (2, 0, 0)]])
+    simulation = Simulation(World(models=(GROUND,)))
+    for model in (single("bad", MeshShape(line)), still("bad", MeshShape(line))):
+        with pytest.raises(SimulationError, match="the mesh has no area"):
+            simulation.add_model(model)
+
+
 def test_a_moving_mesh_collides_as_the_hulls_of_its_parts(tmp_path: Path) -> None:
     def box(x: float) -> list[list[tuple[float, float, float]]]:
         low, high = -0.1, 0.1
@@ -541,6 +568,21 @@ def test_a_heightmap_is_a_terrain(tmp_path: Path) -> None:
     ball = simulation.add_model(single("ball", Sphere(0.1)), at(2.0, 0.0, 4.0))
     simulation.step(3000)
     assert ball.pose.position[0] < 1.0  # it rolls down
+
+
+def test_a_heightmap_of_elevations_keeps_them(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="heightmaps need Pillow")
+    heights = np.tile(np.linspace(-1.0, 5.0, 65), (65, 1)).astype(np.float32)  # rises with x
+    heights[0, :10] = -99999.0  # no data
+    image.fromarray(heights).save(tmp_path / "slope.tif")
+    simulation = Simulation(
+        World(models=(still("terrain", Heightmap(str(tmp_path / "slope.tif"), (8.0, 8.0, 5.0))),))
+    )
+
+    down = np.array([[0.0, 0.0, -1.0]])
+    for x in (-3.6, -2.0, 0.5, 3.0):
+        hit = simulation.cast_rays(at(x, 1.0, 10.0), down, 20.0)
+        assert 10.0 - hit.distances[0] == pytest.approx(max(6.0 * (x + 4) / 8 - 1.0, 0.0), abs=0.001)
 
 
 def test_an_unreadable_heightmap_is_an_error(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from minirospy.core.sdf.model import (
     Link,
     Model,
     Physics,
+    Plane,
     Pose,
     Quaternion,
     Vector,
@@ -190,7 +191,9 @@ class Builder:
                 f"{scoped}::{collision.name}",
                 collision,
                 is_static=model.is_static,
+                turns=joint is not None and _turns_freely(joint),
                 is_wheel=joint is not None and _is_wheel(joint, collision),
+                is_wall=model.is_static and _is_steep(compose(local, collision.pose), collision),
             )
 
     def _add_joint(self, body: Any, scoped: str, joint: Joint) -> None:
@@ -312,12 +315,15 @@ def has_limits(axis: Axis) -> bool:
     return max(axis.lower, axis.upper) < MAX_LIMIT or min(axis.lower, axis.upper) > -MAX_LIMIT
 
 
+def _turns_freely(joint: Joint) -> bool:
+    """Return whether a joint turns without limits."""
+    return joint.kind == "continuous" or (joint.kind == "revolute" and not has_limits(joint.axis))
+
+
 def _is_wheel(joint: Joint, collision: Collision) -> bool:
     """Return whether a collision is a short cylinder that a joint without limits turns about its own axis."""
     shape = collision.geometry
-    if joint.kind not in ("continuous", "revolute") or not isinstance(shape, Cylinder):
-        return False
-    if (joint.kind == "revolute" and has_limits(joint.axis)) or shape.length > 2 * shape.radius:
+    if not _turns_freely(joint) or not isinstance(shape, Cylinder) or shape.length > 2 * shape.radius:
         return False
     axis, along = _direction(joint, joint.axis), rotate(collision.pose.orientation, (0.0, 0.0, 1.0))
     length = math.hypot(*axis)
@@ -326,6 +332,15 @@ def _is_wheel(joint: Joint, collision: Collision) -> bool:
     shift = sum(a * b for a, b in zip(offset, along, strict=True))
     distance = math.sqrt(max(sum(a * a for a in offset) - shift * shift, 0.0))
     return abs(cosine) > 0.999 and distance < 0.01 * shape.radius
+
+
+def _is_steep(pose: Pose, collision: Collision) -> bool:
+    """Return whether a collision is a plane that is nearer to a wall than to the ground. ``pose``: in the world."""
+    shape = collision.geometry
+    if not isinstance(shape, Plane):
+        return False
+    length = math.hypot(*shape.normal)
+    return abs(rotate(pose.orientation, shape.normal)[2]) < 0.5 * length
 
 
 def _check_numbers(link: Link, joint: Joint | None) -> None:

@@ -57,6 +57,9 @@ class Engine:
         self.target_position: NDArray[np.float64] = np.zeros(count)
         self.max_velocity: NDArray[np.float64] = np.full(count, MAX_MOTOR_SPEED)
         self.follows_position: NDArray[np.bool_] = np.zeros(count, np.bool_)
+        self.motor_limit: NDArray[np.float64] = np.zeros(count)  # of motors on damped joints
+        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # of these joints, 0 for all others
+        self._damped: NDArray[np.intp] = np.zeros(0, np.intp)
         self._followers: NDArray[np.intp] = np.zeros(0, np.intp)
         self._follower_positions: NDArray[np.intp] = np.zeros(0, np.intp)
         self._bias: NDArray[np.float64] = np.zeros(count)
@@ -93,6 +96,7 @@ class Engine:
     def motors_changed(self) -> None:
         """Note that targets of motors have changed."""
         self._bias = self.target_velocity * self._rate
+        self._damped = np.flatnonzero(self.motor_damping)
         self._followers = np.flatnonzero(self.follows_position)
         self._follower_positions = self.position_of_dof[self._followers]
 
@@ -129,6 +133,8 @@ class Engine:
             data.qfrc_applied[:] = applied
         if dofs is not None:
             self.motor_force[dofs] = data.efc_force[rows]
+        if self._damped.size:
+            self._limit_damped()
         if self.records_details:
             self._record()
         mujoco.mj_step1(model, data)
@@ -206,6 +212,22 @@ class Engine:
         lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
         limit, step = self.max_velocity[dofs], self.physics.step
         self._bias[dofs] = np.clip(lacking, -limit * step, limit * step) * (self._rate / step)
+
+    def _limit_damped(self) -> None:
+        """Set the damping of joints with motors, and the force that their motors have left.
+
+        MuJoCo integrates damping implicitly: on a light wheel it slows a motor for many steps, and its reaction pushes the
+        robot back. While a motor is stronger than the damping, the damping is a part of the motor's force instead.
+        """
+        dofs, damping = self._damped, self.motor_damping[self._damped]
+        velocity, limit = self.data.qvel[dofs], self.motor_limit[dofs]
+        lost = abs(damping * velocity)
+        is_strong = lost < limit
+        brakes = abs(velocity) > abs(self._bias[dofs]) / self._rate
+        self.motor_force[dofs] += np.where(self.model.dof_damping[dofs] > 0, 0.0, damping * velocity)
+        self.model.dof_damping[dofs] = np.where(is_strong, 0.0, damping)
+        left = limit + np.where(brakes, lost, -lost)
+        self.model.dof_frictionloss[dofs] = np.where(is_strong, left, limit)
 
     def _record(self) -> None:
         """Keep the contacts and forces of the step before the next one's replace them."""

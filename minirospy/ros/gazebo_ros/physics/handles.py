@@ -311,8 +311,11 @@ class SimJoint:
         if self.dof < 0:
             return
         engine, dof = self.engine, self.dof
-        friction = max(self.axis.friction, 0.0)
+        friction, damping = max(self.axis.friction, 0.0), max(self.axis.damping, 0.0)
         engine.model.dof_frictionloss[dof] = self._max_force or friction
+        engine.motor_limit[dof] = self._max_force
+        engine.motor_damping[dof] = damping if self._max_force else 0.0
+        engine.model.dof_damping[dof] = 0.0 if self._max_force else damping
         # Without a motor the row is the joint's friction, whose target is to stand still.
         engine.target_velocity[dof] = self._velocity if self._max_force else 0.0
         engine.follows_position[dof] = self._target is not None and self._max_force > 0

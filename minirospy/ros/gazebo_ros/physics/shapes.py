@@ -30,7 +30,7 @@ from minirospy.core.sdf.model import (
     Surface,
     Visual,
 )
-from minirospy.core.sdf.poses import compose
+from minirospy.core.sdf.poses import compose, rotate
 from minirospy.ros.gazebo_ros.physics.decomposition import Decomposition
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 from minirospy.ros.gazebo_ros.physics.textures import Textures
@@ -55,10 +55,14 @@ SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with s
 # A contact begins soft and is stiff from 0.6 mm on. If it began stiff, a robot on four supports would rattle: each of them in
 # turn would lose the ground, and the wheels their grip.
 SOLIMP = (0.5, 0.99, 0.0006, 0.5, 2.0)
+# A wheel that turns in place is pulled sideways, too: it lost the ground in most steps, and a robot with four of them
+# turned too slowly. This contact begins softer.
+SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
 # A larger coefficient, such as 1e5, holds no better, and a wheel that touches the ground at two points then resists turning.
 MAX_FRICTION = 2.0
 PART = "\t"  # separates the name of a collision from the number of its geom
 MIN_SIZE = 1e-6  # m; MuJoCo refuses sizes of zero
+WALL_THICKNESS = 0.01  # m; a robot at 10 m/s does not pass it within a step of 1 ms
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 
@@ -67,10 +71,13 @@ def friction(surface: Surface) -> tuple[float, int]:
     """Return a geom's coefficient and its priority.
 
     The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo has one
-    coefficient for both directions, so the mean of ``mu`` and ``mu2`` is used.
+    coefficient for both directions. The smaller one of ``mu`` and ``mu2`` is used: with a larger one, wheels that must slip
+    sideways, as those of a robot with four of them, do not turn it. If one is zero, as of a wheel that rolls sideways, the
+    mean is used: the wheel must drive.
     """
-    mean = (min(max(surface.mu, 0.0), MAX_FRICTION) + min(max(surface.mu2, 0.0), MAX_FRICTION)) / 2
-    return mean, round((MAX_FRICTION - mean) * 1e6)
+    mu, mu2 = (min(max(value, 0.0), MAX_FRICTION) for value in (surface.mu, surface.mu2))
+    value = min(mu, mu2) or (mu + mu2) / 2
+    return value, round((MAX_FRICTION - value) * 1e6)
 
 
 @dataclass(frozen=True)
@@ -97,16 +104,46 @@ class Shapes:
         self._textures = Textures(spec, self.warnings)
         self._decomposition = Decomposition(self.warnings)
         self._assets: dict[tuple[object, ...], list[_Piece]] = {}
+        self._elements: dict[int, Any] = {}  # the spec's meshes and heightmaps by their numbers
         self._count = 0
 
+    @property
+    def last(self) -> int:
+        """Return the number of the mesh or heightmap that was added last."""
+        return self._count
+
+    def delete_after(self, last: int) -> None:
+        """Delete the meshes and heightmaps with greater numbers than ``last``; no geom may use them."""
+        numbers = [number for number in self._elements if number > last]
+        names = {self._elements[number].name for number in numbers}
+        for number in numbers:
+            self._spec.delete(self._elements.pop(number))
+        for key, pieces in list(self._assets.items()):
+            if any(piece.asset in names for piece in pieces):
+                del self._assets[key]
+
     def add_collision(
-        self, body: Any, name: str, collision: Collision, *, is_static: bool, is_wheel: bool = False
+        self,
+        body: Any,
+        name: str,
+        collision: Collision,
+        *,
+        is_static: bool,
+        turns: bool = False,
+        is_wheel: bool = False,
+        is_wall: bool = False,
     ) -> None:
-        """Add a collision's geoms. ``is_wheel``: the collision is a cylinder that turns about its axis."""
+        """Add a collision's geoms.
+
+        ``turns``: a joint without limits turns the body. ``is_wheel``: the collision is a cylinder that turns about its axis.
+        ``is_wall``: it is a plane that is not level.
+        """
         mu, priority = friction(collision.surface)
         pose = collision.pose
         if is_wheel and isinstance(collision.geometry, Cylinder):
             pieces = _wheel(collision.geometry)
+        elif is_wall and isinstance(collision.geometry, Plane):
+            pieces = [_wall(collision.geometry)]
         else:
             pieces = self._pieces(collision.geometry, is_static=is_static)
         for index, piece in enumerate(pieces):
@@ -114,7 +151,7 @@ class Shapes:
             geom.group = piece.group
             geom.friction = [mu, 0.0, 0.0]
             geom.priority = priority
-            geom.solref, geom.solimp = SOLREF, SOLIMP
+            geom.solref, geom.solimp = SOLREF, SOLIMP_WHEEL if turns else SOLIMP
             if piece.group == GROUP_RAY_ONLY:
                 geom.contype = geom.conaffinity = 0
 
@@ -162,9 +199,12 @@ class Shapes:
 
         mesh = _joined(_meshes(geometry))
         name = geometry.path if isinstance(geometry, MeshShape) else "of a polyline"
-        parts = collision_parts(
-            mesh, is_static=is_static, split=lambda part: self._decomposition.split(part, name)
-        )
+        try:
+            parts = collision_parts(
+                mesh, is_static=is_static, split=lambda part: self._decomposition.split(part, name)
+            )
+        except MeshError as error:
+            raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
         is_whole = parts.are_exact
         for part in parts.meshes:
             name = self._add_mesh(part.vertices, part.triangles if is_whole else None)
@@ -207,7 +247,7 @@ class Shapes:
     ) -> str:
         self._count += 1
         name = f"mesh{self._count}"
-        mesh = self._spec.add_mesh(name=name)
+        mesh = self._elements[self._count] = self._spec.add_mesh(name=name)
         if triangles is not None:
             used, faces = np.unique(triangles, return_inverse=True)
             vertices = vertices[used]
@@ -233,7 +273,7 @@ class Shapes:
         name = f"terrain{self._count}"
         x, y, z = shape.size
         rows, columns = heights.shape
-        self._spec.add_hfield(
+        self._elements[self._count] = self._spec.add_hfield(
             name=name,
             nrow=rows,
             ncol=columns,
@@ -269,6 +309,14 @@ def _wheel(shape: Cylinder) -> list[_Piece]:
         _Piece("ELLIPSOID", (radius, radius, half), group=GROUP_CONTACT_ONLY),
         _Piece("CYLINDER", (radius, half, 0.0), group=GROUP_RAY_ONLY),
     ]
+
+
+def _wall(shape: Plane) -> _Piece:
+    """Return a thin box of the plane's size: posters and walls end, and the ground behind them is free."""
+    x, y = (max(side / 2, MIN_SIZE) for side in shape.size)
+    turn = _turn_to(shape.normal)
+    behind = rotate(turn, (0.0, 0.0, -WALL_THICKNESS / 2))
+    return _Piece("BOX", (x, y, WALL_THICKNESS / 2), Pose(behind, turn))
 
 
 def _meshes(geometry: Geometry) -> list[Mesh]:

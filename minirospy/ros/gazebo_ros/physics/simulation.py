@@ -175,11 +175,13 @@ class Simulation:
 
         The states of the others and the time stay. Raise SimulationError if the name is taken or the model is invalid.
         """
+        last = self._builder.shapes.last
         added = self._build(model, pose or model.pose, name or model.name)
         try:
             self.engine.recompile()
         except ValueError as error:
             self._drop(added)
+            self._builder.shapes.delete_after(last)
             raise SimulationError(f"model '{added.name}': {_one_line(error)}") from error
         self._finish([added])
         return added
@@ -202,6 +204,7 @@ class Simulation:
     def _add_all(self, models: Iterable[Model]) -> None:
         """Add the world's models with one compilation; if that fails, one by one."""
         added: list[SimModel] = []
+        last = self._builder.shapes.last
         for model in models:
             try:
                 added.append(self._build(model, model.pose, model.name))
@@ -212,6 +215,8 @@ class Simulation:
         except ValueError:
             for each in added:
                 self._drop(each)
+            # An invalid mesh, if it stayed, would make every compilation fail.
+            self._builder.shapes.delete_after(last)
             for each in added:
                 try:
                     self.add_model(each.record, each.start, each.name)
