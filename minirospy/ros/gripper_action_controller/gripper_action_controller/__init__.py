@@ -29,7 +29,8 @@ _NOT_RUNNING = "Can't accept new action goals. Controller is not running."
 class GripperActionController(Controller):
     """Executes the action ``gripper_cmd``. A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`.
 
-    As in ROS it publishes no feedback.
+    As in ROS it publishes no feedback. A result has the values of the cycle that decided it; in ROS it has those of the
+    time at which it is sent, up to a period of ``action_monitor_rate`` later.
     """
 
     joint: Joint
@@ -122,7 +123,7 @@ class GripperActionController(Controller):
             rospy.logerr(text)
             raise Rejection(GripperCommandResult(), text)
         goal = MonitoredGoal()
-        self.gripper.command = GripperCommand(position, max_effort, goal)
+        self.gripper.command = GripperCommand(position, max_effort, goal, rospy.Time.now().to_nsec())
         return goal
 
 
