@@ -345,15 +345,20 @@ TWO_ROBOTS = """
 import rospy
 from controller_manager import ControlLoop
 from hardware_interface import RobotHardware
+from std_msgs.msg import Empty
 
 rospy.init_node("robots")
-for namespace in ("", "left"):
-    ControlLoop(RobotHardware(), 100.0, namespace).start()
+loops = [ControlLoop(RobotHardware(), 100.0, namespace) for namespace in ("", "left")]
+for loop in loops:
+    loop.start()
+rospy.wait_for_message("/stop", Empty)
+for loop in loops:
+    loop.stop()
 rospy.spin()
 """
 
 
-def test_diagnostics_tell_the_loops_of_a_node_apart(start: Start) -> None:
+def test_diagnostics_tell_the_loops_of_a_node_apart_and_end_with_them(start: Start) -> None:
     start("-c", TWO_ROBOTS)
     printed = call(
         "from diagnostic_msgs.msg import DiagnosticArray\n"
@@ -362,7 +367,11 @@ def test_diagnostics_tell_the_loops_of_a_node_apart(start: Start) -> None:
         "rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: names.add(message.status[0].name))\n"
         "while len(names) < 2:\n"
         "    rospy.wait_for_message('/diagnostics', DiagnosticArray)\n"
-        "print(sorted(names))"
+        "print(sorted(names))\n"
+        "from std_msgs.msg import Empty\n"
+        "rospy.Publisher('/stop', Empty, latch=True, queue_size=1).publish()\n"
+        "while any(topic == '/diagnostics' for topic, _ in rospy.get_published_topics()):\n"
+        "    rospy.sleep(0.05)\n"
     )
     assert printed == "['robots: control loop', 'robots: control loop /left']\n"
 
