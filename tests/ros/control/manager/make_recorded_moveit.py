@@ -104,15 +104,17 @@ int main(int argc, char** argv) {
     Handle jaws = manager.getControllerHandle("/hand");
 
     send("reached", arm, plan(both, 1.5, 1.4, 0.25, 4));
-    arm->sendTrajectory(plan(both, 1.4, 1.5, 0.25, 2));
+    arm->sendTrajectory(plan(both, 1.4, 1.5, 30, 2));
     ros::Duration(0.1).sleep();
-    send("continued", arm, plan(both, 1.45, 1.4, 0.25, 2));
-    arm->sendTrajectory(plan(both, 1.4, 1.5, 0.25, 2));
+    send("continued", arm, plan(both, 1.4, 1.4, 0.25, 2));
+    arm->sendTrajectory(plan(both, 1.4, 1.5, 30, 2));
     ros::Duration(0.1).sleep();
     arm->cancelExecution();
-    send("after cancel", arm, plan(both, 1.45, 1.4, 0.25, 2));
+    ros::Duration(0.2).sleep();  // so that the recorder receives the cancellation before the next goal
+    send("after cancel", arm, plan(both, 1.4, 1.4, 0.25, 2));
     send("late", arm, plan(both, 1.4, 1.5, 30, 2), 0.2);
     arm->cancelExecution();
+    ros::Duration(0.2).sleep();  // so that the recorder receives the cancellation before the next goal
     send("empty", arm, moveit_msgs::RobotTrajectory());
     send("beyond", arm, plan(both, 1.4, 1.8, 0.25, 2));  // the shoulder ends at 1.57
     send("back", arm, plan(both, 1.57, 1.5, 0.25, 2));
@@ -159,8 +161,7 @@ arm = {{"type": "position_controllers/JointTrajectoryController", "joints": ["sh
        "constraints": {{"shoulder": {{"goal": 0.02}}, "elbow": {{"goal": 0.02}}}}}}
 rospy.set_param("/arm", arm)
 rospy.set_param("/other_arm", arm)
-rospy.set_param("/hand", {{"type": "position_controllers/GripperActionController", "joint": "left", "goal_tolerance": 0.001,
-                          "stall_timeout": 0.2}})
+rospy.set_param("/hand", {{"type": "position_controllers/GripperActionController", "joint": "left", "goal_tolerance": 0.001}})
 rospy.set_param("/move_group/controller_list", [
     {{"name": "arm", "action_ns": "follow_joint_trajectory", "type": "FollowJointTrajectory", "default": True,
       "joints": ["shoulder", "elbow"], "goal_tolerance": {{"position": [0.03, 0.04], "velocity": 0.05}},
@@ -178,6 +179,7 @@ print([cm.load_controller(each) for each in ("arm", "hand", "other_arm")], cm.st
 """
 RECORDER = """
 import json
+import sys
 import rospy
 from actionlib_msgs.msg import GoalID
 from control_msgs.msg import *
@@ -187,7 +189,9 @@ def listen(name, kind):
     for topic, message_class in (("goal", globals()[kind + "ActionGoal"]), ("cancel", GoalID),
                                  ("result", globals()[kind + "ActionResult"])):
         def receive(message, topic=topic):
-            print(json.dumps([name, topic, convert(message)]), flush=True)
+            time = rospy.Time.now() if topic == "cancel" else message.header.stamp
+            sys.stdout.write(json.dumps([time.to_nsec(), name, topic, convert(message)]) + "\\n")
+            sys.stdout.flush()
         rospy.Subscriber(f"{name}/{topic}", message_class, receive)
 listen("/arm/follow_joint_trajectory", "FollowJointTrajectory")
 listen("/hand/gripper_cmd", "GripperCommand")
@@ -290,7 +294,7 @@ def _run(program: Path) -> dict[str, list[object]]:
             [program], env=environment, stdout=subprocess.PIPE, text=True, check=True
         ).stdout
         recorder.terminate()
-        messages = [json.loads(line) for line in recorder.stdout]
+        messages = [message for _, *message in sorted(json.loads(line) for line in recorder.stdout)]
         return {
             "printed": [line for line in printed.splitlines() if "INFO" not in line],
             "messages": messages,
