@@ -7,7 +7,7 @@ http://wiki.ros.org/gripper_action_controller.
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
+from contextlib import closing
 
 from control_msgs.msg import GripperCommandAction, GripperCommandGoal, GripperCommandResult
 
@@ -37,7 +37,6 @@ class GripperActionController(Controller):
     gripper: Gripper
 
     def __init__(self) -> None:
-        self.opened = ExitStack()  # closes what ``init`` has opened, in reverse
         self.is_running = False
         self._effort = 0.0  # the last one that was commanded
 
@@ -66,7 +65,7 @@ class GripperActionController(Controller):
             )
         )
         self.read_gains(context)
-        self._action = RealtimeActionServer(
+        action = RealtimeActionServer(
             f"{context.namespace}/gripper_cmd",
             GripperCommandAction,
             self._accept,
@@ -74,7 +73,7 @@ class GripperActionController(Controller):
             _result,
             max(1, round(_SECOND / monitor_rate)),
         )
-        self.opened.callback(self._action.close)
+        self._action = self.opened.enter_context(closing(action))
 
     def read_gains(self, context: ControllerContext) -> None:
         """Read the parameters that only this hardware interface needs."""
@@ -104,10 +103,6 @@ class GripperActionController(Controller):
     def aborting(self, time: Time) -> None:
         """Cancel the goal."""
         self.stopping(time)
-
-    def close(self) -> None:
-        """Close the action."""
-        self.opened.close()
 
     def _hold(self) -> None:
         position = self.joint.position
@@ -148,10 +143,7 @@ class EffortGripperActionController(GripperActionController):
 
     def read_gains(self, context: ControllerContext) -> None:
         """Read the gains, and let dynamic_reconfigure change them."""
-        gains = context.parameters.below(f"gains/{self.joint.name}")
-        self._pid = Pid.read(gains)
-        self.opened.callback(self._pid.close)
-        self._pid.serve(gains)
+        self._pid = Pid.open(context.parameters.below(f"gains/{self.joint.name}"), self.opened)
 
     def starting(self, time: Time) -> None:
         """Hold the present position, without effort until the first update."""
