@@ -6,8 +6,10 @@ A controller of the user's own is a subclass of :class:`Controller`. Source: htt
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import ClassVar
 
 from minirospy.base.errors import MinirospyError
@@ -122,6 +124,11 @@ class Controller:
     interfaces: ClassVar[tuple[Interface, ...]] = ()
     """The hardware interfaces that the controller uses; the robot must have them all."""
 
+    @cached_property
+    def opened(self) -> ExitStack:
+        """The stack of everything that ``init`` opens, for example ``self.opened.callback(subscriber.unregister)``."""
+        return ExitStack()
+
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Read the parameters, claim joints, open topics. Raise ControllerError or HardwareError if that is impossible."""
 
@@ -142,4 +149,5 @@ class Controller:
         """Note that the hardware refused the start."""
 
     def close(self) -> None:
-        """Close the topics, services and actions that ``init`` opened. It is called when the controller is unloaded."""
+        """Close what is in ``opened``, in reverse. It is called when the controller is unloaded, or if ``init`` raises."""
+        self.opened.close()

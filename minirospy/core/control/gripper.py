@@ -23,11 +23,12 @@ class GripperLimits(NamedTuple):
 
 
 class GripperCommand(NamedTuple):
-    """The position to hold, with at most this effort, and the goal that wants it."""
+    """The position to hold, with at most this effort, and the goal that wants it, with the time at which it was received."""
 
     position: float
     max_effort: float
     goal: MonitoredGoal | None = None
+    received: int = 0
 
 
 class Gripper:
@@ -48,7 +49,7 @@ class Gripper:
         command = self.command
         goal = command.goal
         if goal is not self._checked:
-            self._checked, self._moved = goal, time
+            self._checked, self._moved = goal, command.received
         if goal is None or goal.outcome is not None:
             return command
 

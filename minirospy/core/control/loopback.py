@@ -69,11 +69,15 @@ class LoopbackHardware(RobotHardware):
             position = initial.pop(name, min(max(0.0, lower), upper))
             added = self.add_joint(name, *(interfaces.get(name) or COMMAND_INTERFACES), position=position)
             self._bounds.append((added, lower, upper))
-        for name, joint in movable.items():
-            if joint.mimic and joint.mimic.joint in self.joints:
-                leader = self.joints[joint.mimic.joint]
+        mimics = {name: joint.mimic for name, joint in movable.items() if joint.mimic}
+        # A joint that mimics another mimic joint comes after that one; joints that mimic each other do not follow.
+        while ready := [
+            name for name, each in mimics.items() if each.joint in self.joints and each.joint not in mimics
+        ]:
+            for name in ready:
+                mimic = mimics.pop(name)
                 follower = self.joints.get(name) or self.add_joint(name)
-                self._mimics.append((follower, leader, joint.mimic.multiplier, joint.mimic.offset))
+                self._mimics.append((follower, self.joints[mimic.joint], mimic.multiplier, mimic.offset))
         if not self._bounds:
             raise HardwareError(f"robot '{robot.name}' has no joint that can be commanded")
         for name in initial:

@@ -75,10 +75,6 @@ class Parameters:
         value = self.get(key)
         return Parameters(f"{self.namespace}/{key}", value if isinstance(value, Mapping) else {})
 
-    def keys(self) -> list[str]:
-        """Return the names directly below this namespace."""
-        return list(self._values)
-
     def _typed(self, key: str, type_: type[_T], default: _T) -> _T:
         value = self.get(key)
         return value if isinstance(value, type_) and not isinstance(value, bool) else default

@@ -13,8 +13,6 @@ from minirospy.core.urdf.elements import Element, parse_xml
 
 __all__ = ["Transmission", "read_transmissions"]
 
-_COUPLED = ("DifferentialTransmission", "FourBarLinkageTransmission")
-
 
 class Transmission(NamedTuple):
     """A joint of a transmission, with its interfaces. ``kind``: such as ``transmission_interface/SimpleTransmission``."""
@@ -55,8 +53,6 @@ def _read(element: Element, warn_of: Callable[[str], object]) -> list[Transmissi
             f"it is skipped, because it has no {' and no '.join(key for key in missing if not missing[key])}"
         )
         return []
-    if kind.rpartition("/")[2] in _COUPLED:
-        warn(f"the joints of a {kind} are commanded directly, as if they were independent")
 
     # Older descriptions name the interface in the actuator.
     shared = [each for actuator in actuators for each in actuator.all("hardwareInterface")]

@@ -209,7 +209,9 @@ class ControlLoop:
                     rospy.logwarn("%s", status.message)
                 self._log_invalid()
         except rospy.ROSException:
-            pass  # the node shuts down
+            return  # the node shuts down
+        if not rospy.is_shutdown_requested():  # else the node unregisters all of its topics together
+            publisher.unregister()
 
     def _log_invalid(self) -> None:
         """Log the joints whose commands were not finite, if any."""

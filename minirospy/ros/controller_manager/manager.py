@@ -16,13 +16,10 @@ from controller_manager_msgs.srv import (
     ListControllerTypes,
     ListControllerTypesResponse,
     LoadController,
-    LoadControllerRequest,
     ReloadControllerLibraries,
-    ReloadControllerLibrariesRequest,
     SwitchController,
     SwitchControllerRequest,
     UnloadController,
-    UnloadControllerRequest,
 )
 
 from minirospy import client as rospy
@@ -81,10 +78,14 @@ class ControllerManager:
         handlers = (
             (ListControllers, "list_controllers", lambda _: self._list()),
             (ListControllerTypes, "list_controller_types", lambda _: self._list_types()),
-            (LoadController, "load_controller", self._on_load),
-            (UnloadController, "unload_controller", self._on_unload),
+            (LoadController, "load_controller", lambda request: self.load(request.name)),
+            (UnloadController, "unload_controller", lambda request: self.unload(request.name)),
             (SwitchController, "switch_controller", self._on_switch),
-            (ReloadControllerLibraries, "reload_controller_libraries", self._on_reload),
+            (
+                ReloadControllerLibraries,
+                "reload_controller_libraries",
+                lambda request: self._reload(request.force_kill),
+            ),
         )
         self._services = [
             rospy.Service(f"{self._below(self.namespace, 'controller_manager')}/{name}", kind, handler)
@@ -246,12 +247,6 @@ class ControllerManager:
             types = sorted(self._types())
             return ListControllerTypesResponse(types, [_BASE_CLASS] * len(types))
 
-    def _on_load(self, request: LoadControllerRequest) -> bool:
-        return self.load(request.name)
-
-    def _on_unload(self, request: UnloadControllerRequest) -> bool:
-        return self.unload(request.name)
-
     def _on_switch(self, request: SwitchControllerRequest) -> bool:
         return self.switch(
             request.start_controllers,
@@ -261,11 +256,11 @@ class ControllerManager:
             request.timeout,
         )
 
-    def _on_reload(self, request: ReloadControllerLibrariesRequest) -> bool:
+    def _reload(self, force_kill: bool) -> bool:
         with self._lock:
             cannot = "Controller manager: Cannot reload controller libraries because"
             names = [each.info.name for each in self.table.loaded]
-            if names and not request.force_kill:
+            if names and not force_kill:
                 log(ERROR, f"{cannot} there are still {len(names)} controllers running")
                 return False
             if names:

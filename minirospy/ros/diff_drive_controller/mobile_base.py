@@ -6,7 +6,7 @@ Source: http://wiki.ros.org/diff_drive_controller, http://wiki.ros.org/ackermann
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
+from contextlib import closing
 from typing import NamedTuple, TypeVar
 
 from geometry_msgs.msg import Quaternion, TransformStamped, Twist, Vector3
@@ -47,7 +47,6 @@ class MobileBase(Controller):
     """
 
     def __init__(self) -> None:
-        self.opened = ExitStack()  # what close() closes
         self._command = _STOP  # replaced by the callback of cmd_vel
         self._last = (0.0, 0.0)  # the velocities of the last cycle, linear and angular
         self._before_last = (0.0, 0.0)
@@ -109,9 +108,7 @@ class MobileBase(Controller):
 
     def open_publisher(self, topic: str, message_class: type[_M]) -> RealtimePublisher[_M]:
         """Open a topic, which ``close`` closes."""
-        publisher = RealtimePublisher(topic, message_class, queue_size=100)
-        self.opened.callback(publisher.close)
-        return publisher
+        return self.opened.enter_context(closing(RealtimePublisher(topic, message_class, queue_size=100)))
 
     def starting(self, time: Time) -> None:
         """Stand still; the odometry continues from its pose."""
@@ -156,10 +153,6 @@ class MobileBase(Controller):
 
     def driven(self, time: Time, period: Duration, linear: float, angular: float) -> None:
         """Publish the velocities that were commanded, if the base does so."""
-
-    def close(self) -> None:
-        """Close the topics."""
-        self.opened.close()
 
     def log_info(self, text: str) -> None:
         """Log a line in the name of the controller."""

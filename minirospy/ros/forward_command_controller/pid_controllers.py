@@ -5,7 +5,7 @@ Source: http://wiki.ros.org/effort_controllers, http://wiki.ros.org/velocity_con
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import closing
 
 from control_msgs.msg import JointControllerState
 
@@ -13,7 +13,6 @@ from minirospy import client as rospy
 from minirospy.base.times import Duration, Time
 from minirospy.core.control.controller import Controller, ControllerContext, ControllerError, Resources
 from minirospy.core.control.hardware import COMMAND_FIELDS, Interface, Joint
-from minirospy.core.control.parameters import Parameters
 from minirospy.core.control.position_loop import PositionLoop
 from minirospy.core.urdf.model import Robot
 from minirospy.ros.control_toolbox.control_toolbox import Pid, PidGains
@@ -31,7 +30,6 @@ class _PidController(Controller):
     _command: CommandTopic
 
     def __init__(self) -> None:
-        self._opened = ExitStack()
         self._cycle = 0
 
     @property
@@ -43,23 +41,13 @@ class _PidController(Controller):
         """Claim the joints, read the gains, open the topics."""
         self._field = COMMAND_FIELDS[self._interface]
 
-    def close(self) -> None:
-        """Close the topics."""
-        self._opened.close()
-
-    def _open_pid(self, parameters: Parameters) -> Pid:
-        pid = Pid.read(parameters)
-        self._opened.callback(pid.close)
-        pid.serve(parameters)
-        return pid
-
     def _open_command(self, context: ControllerContext, joints: int, *, is_group: bool = False) -> None:
-        self._command = CommandTopic(context, joints, is_group=is_group)
-        self._opened.callback(self._command.close)
+        command = CommandTopic(context, joints, is_group=is_group)
+        self._command = self.opened.enter_context(closing(command))
 
     def _open_state(self, context: ControllerContext) -> None:
-        self._state = RealtimePublisher(f"{context.namespace}/state", JointControllerState)
-        self._opened.callback(self._state.close)
+        state = RealtimePublisher(f"{context.namespace}/state", JointControllerState)
+        self._state = self.opened.enter_context(closing(state))
 
     def _publish_state(
         self, message: JointControllerState, time: Time, period: Duration, gains: PidGains
@@ -82,7 +70,7 @@ class PidJointPositionController(_PidController):
         """Claim the joint, read the gains in ``pid`` and the joint's limits, open the topics."""
         super().init(hardware, context)
         joint = claim_joint(hardware, context, self._interface)
-        pid = self._open_pid(context.parameters.below("pid"))
+        pid = Pid.open(context.parameters.below("pid"), self.opened)
         self._loop = _position_loop(joint, _read_robot(context), pid)
         self._open_state(context)
         self._open_command(context, 1)
@@ -117,7 +105,7 @@ class PidJointVelocityController(_PidController):
         """Claim the joint, read the gains in ``pid``, open the topics."""
         super().init(hardware, context)
         self._joint = claim_joint(hardware, context, self._interface)
-        self._pid = self._open_pid(context.parameters.below("pid"))
+        self._pid = Pid.open(context.parameters.below("pid"), self.opened)
         self._open_state(context)
         self._open_command(context, 1)
 
@@ -149,7 +137,7 @@ class PidJointGroupPositionController(_PidController):
         for joint in joints:
             gains = f"{joint.name}/pid"
             try:
-                pid = self._open_pid(context.parameters.below(gains))
+                pid = Pid.open(context.parameters.below(gains), self.opened)
             except ControllerError as error:
                 rospy.logerr("%s", error)
                 raise ControllerError(f"Failed to load PID parameters from {gains}") from error

@@ -1,6 +1,6 @@
-"""Write recorded.json: what the C++ classes of ros_controllers and control_toolbox compute for numbers drawn at random.
+"""Write recorded.json: what the C++ classes of ros_controllers, control_toolbox and ros_control compute for random numbers.
 
-    python tests/core/control/make_recorded.py ROS_CONTROLLERS.git CONTROL_TOOLBOX.git
+    python tests/core/control/make_recorded.py ROS_CONTROLLERS.git CONTROL_TOOLBOX.git ROS_CONTROL.git
 
 The arguments are git directories with the branch noetic-devel. It needs g++, and the headers of roscpp and Boost.
 """
@@ -22,8 +22,17 @@ SOURCES = {
     "ackermann_steering_controller/src/odometry.cpp": "ackermann.cpp",
     "include/control_toolbox/pid.h": "control_toolbox/pid.h",
     "src/pid.cpp": "pid.cpp",
+    **{
+        f"transmission_interface/include/transmission_interface/{name}.h": f"transmission_interface/{name}.h"
+        for name in (
+            "transmission",
+            "transmission_interface_exception",
+            "differential_transmission",
+            "four_bar_linkage_transmission",
+        )
+    },
 }
-"""Files of both repositories, and their names here."""
+"""Files of the repositories, and their names here."""
 
 # pid.cpp publishes and reconfigures; these headers replace what it needs for that.
 HEADERS = {
@@ -83,6 +92,9 @@ MAIN = r"""
 #include <diff_drive_controller/speed_limiter.h>
 #include <ackermann_steering_controller/odometry.h>
 #include <control_toolbox/pid.h>
+#include <transmission_interface/differential_transmission.h>
+#include <transmission_interface/four_bar_linkage_transmission.h>
+namespace transmission = transmission_interface;
 
 static unsigned long long state = 88172645463325252ULL;
 static const char* between = "";
@@ -109,6 +121,30 @@ static void row(std::vector<double> numbers) {
   }
   printf("]");
   between = ",";
+}
+
+static void transmit(double kind, transmission::Transmission& tested, std::vector<double> numbers) {
+  double in[6], out[6], back[6];
+  for (double& each : in) each = draw(-2, 2);
+  transmission::ActuatorData motors, backwards;
+  transmission::JointData joints, measured;
+  for (int k = 0; k < 2; k++) {
+    motors.position.push_back(in + k); joints.position.push_back(out + k);
+    motors.velocity.push_back(in + 2 + k); joints.velocity.push_back(out + 2 + k);
+    motors.effort.push_back(in + 4 + k); joints.effort.push_back(out + 4 + k);
+    measured.position.push_back(in + k); backwards.position.push_back(back + k);
+    measured.velocity.push_back(in + 2 + k); backwards.velocity.push_back(back + 2 + k);
+    measured.effort.push_back(in + 4 + k); backwards.effort.push_back(back + 4 + k);
+  }
+  tested.actuatorToJointPosition(motors, joints);
+  tested.actuatorToJointVelocity(motors, joints);
+  tested.actuatorToJointEffort(motors, joints);
+  tested.jointToActuatorPosition(measured, backwards);
+  tested.jointToActuatorVelocity(measured, backwards);
+  tested.jointToActuatorEffort(measured, backwards);
+  numbers.insert(numbers.begin(), kind);
+  for (double* all : {in, out, back}) numbers.insert(numbers.end(), all, all + 6);
+  row(numbers);
 }
 
 int main() {
@@ -190,6 +226,17 @@ int main() {
       row({p, i, d, high, low, (double)antiwindup, (double)is_reset, error, rate, (double)ns, command, integral});
     }
   }
+  begin("transmissions");
+  for (int k = 0; k < 10; k++) {
+    std::vector<double> numbers;
+    for (int n = 0; n < 6; n++) numbers.push_back(draw(0.1, 3) * (draw(0, 1) < 0.3 ? -1 : 1));
+    std::vector<double> actuators(numbers.begin(), numbers.begin() + 2), joints(numbers.begin() + 2, numbers.begin() + 4);
+    std::vector<double> offsets(numbers.begin() + 4, numbers.end());
+    transmission::DifferentialTransmission differential(actuators, joints, offsets);
+    transmission::FourBarLinkageTransmission linkage(actuators, joints, offsets);
+    transmit(0, differential, numbers);
+    transmit(1, linkage, numbers);
+  }
   printf("\n ]\n}\n");
 }
 """
@@ -200,7 +247,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for path, target in SOURCES.items():
-            repository = sys.argv[1] if path.partition("/")[0].endswith("_controller") else sys.argv[2]
+            package = path.partition("/")[0]
+            number = 1 if package.endswith("_controller") else 3 if package.endswith("_interface") else 2
+            repository = sys.argv[number]
             show = ["git", f"--git-dir={repository}", "show", f"{BRANCH}:{path}"]
             HEADERS[target] = subprocess.run(show, capture_output=True, text=True, check=True).stdout
         for path, text in {**HEADERS, "main.cpp": MAIN}.items():

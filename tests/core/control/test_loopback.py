@@ -11,7 +11,7 @@ from minirospy.base.times import Duration, Time
 from minirospy.core.control.hardware import COMMAND_INTERFACES, HardwareError, Interface
 from minirospy.core.control.loopback import LoopbackHardware
 from minirospy.core.control.transmissions import Transmission
-from minirospy.core.urdf.read import read_robot
+from minirospy.core.urdf.read import parse_robot, read_robot
 
 ROBOT = read_robot(Path(__file__).parents[1] / "urdf" / "arm.urdf")
 NOW, PERIOD = Time(5), Duration(0, 10_000_000)
@@ -57,6 +57,27 @@ def test_mimic_joint_with_a_transmission_follows_only_while_no_controller_has_it
     right.active, right.position_command = Interface.POSITION, 0.03
     robot.read(NOW, PERIOD)
     assert right.position == 0.03
+
+
+def test_mimic_of_a_mimic_follows_in_the_same_cycle() -> None:
+    joints = "".join(
+        f'<link name="{name}_link"/><joint name="{name}" type="prismatic"><parent link="base"/><child link="{name}_link"/>'
+        f'<limit lower="-9" upper="9" effort="1" velocity="1"/>{mimic}</joint>'
+        for name, mimic in (
+            ("c", '<mimic joint="b" multiplier="3" offset="0.5"/>'),
+            ("b", '<mimic joint="a" multiplier="-2"/>'),
+            ("a", ""),
+            ("x", '<mimic joint="y"/>'),
+            ("y", '<mimic joint="x"/>'),
+        )
+    )
+    robot = LoopbackHardware(parse_robot(f'<robot name="r"><link name="base"/>{joints}</robot>'), [])
+    assert {name: joint.position for name, joint in robot.joints.items()} == {"a": 0.0, "b": 0.0, "c": 0.5}
+    a = robot.joints["a"]
+    a.active, a.position_command = Interface.POSITION, 0.01
+    robot.read(NOW, PERIOD)
+    assert [robot.joints[name].position for name in "abc"] == pytest.approx([0.01, -0.02, 0.44])
+    assert [robot.joints[name].velocity for name in "abc"] == pytest.approx([1.0, -2.0, -6.0])
 
 
 def test_initial_position_without_an_effect_is_named() -> None:

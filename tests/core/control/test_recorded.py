@@ -11,6 +11,7 @@ import pytest
 from minirospy.core.control.odometry import AckermannOdometry, DiffDriveOdometry, Odometry
 from minirospy.core.control.pid import Pid
 from minirospy.core.control.speed_limiter import Range, SpeedLimiter
+from minirospy.core.control.transmission_maps import DifferentialTransmission, FourBarLinkageTransmission
 
 RECORDED: dict[str, list[list[float]]] = json.loads((Path(__file__).parent / "recorded.json").read_text())
 
@@ -63,3 +64,21 @@ def test_pid() -> None:
             pid.reset()
         seen = pid.compute(math.nan if error is None else error, rate, step * 1e-9)
         assert (seen, pid.error_integral) == pytest.approx((command, integral), rel=1e-9, abs=1e-9)
+
+
+def test_transmissions() -> None:
+    for is_linkage, *numbers in RECORDED["transmissions"]:
+        first, second, *pairs = ([numbers[at], numbers[at + 1]] for at in range(0, 24, 2))
+        kind = FourBarLinkageTransmission if is_linkage else DifferentialTransmission
+        offsets, position, velocity, effort, *expected = pairs
+        tested = kind(first, second, offsets)
+        found = (
+            tested.joint_positions(position),
+            tested.joint_velocities(velocity),
+            tested.joint_efforts(effort),
+            tested.actuator_positions(position),
+            tested.actuator_velocities(velocity),
+            tested.actuator_efforts(effort),
+        )
+        for values, right in zip(found, expected, strict=True):
+            assert values == pytest.approx(right, rel=1e-9)

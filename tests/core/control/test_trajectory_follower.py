@@ -525,10 +525,12 @@ def test_preemption_never_jumps(
         if arm.time < start or (arm.time == start and second_kind == 3):
             assert arm.follower.velocities == pytest.approx(unchanged.follower.velocities, abs=1e-9)
 
-        samples = [arm.follower.sample(arm.time - TICK * part // 20) for part in range(21)]
         for index in range(2):
-            speeds = [abs(states[index][1]) for states in samples if states]
             step = abs(arm.follower.positions[index] - before[index])
+            if step <= abs(arm.follower.velocities[index]) * TICK / SECOND * 1.1 + 1e-9:
+                continue  # the speed at the end of the cycle is high enough
+            samples = [arm.follower.sample(arm.time - TICK * part // 20) for part in range(21)]
+            speeds = [abs(states[index][1]) for states in samples if states]
             assert step <= max(speeds) * TICK / SECOND * 1.1 + 1e-9
         before = arm.follower.positions
 

@@ -85,11 +85,7 @@ def test_differential_is_read_as_independent_joints() -> None:
         "<actuator",
         f'<joint name="k">{interface("EffortJointInterface")}</joint><actuator name="n"/><actuator',
     )
-    found, warnings = read(pair)
-    assert found == {"j": (Interface.EFFORT,), "k": (Interface.EFFORT,)}
-    assert warnings == [
-        f"transmission 't': the joints of a {kind} are commanded directly, as if they were independent"
-    ]
+    assert read(pair) == ({"j": (Interface.EFFORT,), "k": (Interface.EFFORT,)}, [])
 
 
 def test_text_that_is_not_xml() -> None:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from textwrap import dedent
 from typing import Any
 from xmlrpc.client import ServerProxy
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.ros.control.forks import end_server, run_program
 
 Run = Callable[..., Any]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def server() -> Iterator[None]:
+    """End the server of programs after the last test."""
+    yield
+    end_server()
 
 
 @pytest.fixture
@@ -25,20 +29,13 @@ def run(master: str) -> Run:
     With ``is_simulated``, the node's time is that of /clock.
     """
 
-    def run_program(body: str, *, is_simulated: bool = False) -> Any:
+    def run_body(body: str, *, is_simulated: bool = False) -> Any:
         if is_simulated:
             with ServerProxy(master) as proxy:
                 proxy.setParam("/test", "/use_sim_time", True)
         program = f"from tests.ros.control.rig import *\n{dedent(body)}"
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            timeout=100,
-            check=False,
-        )
+        done = run_program(program)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout.splitlines()[-1])
 
-    return run_program
+    return run_body

@@ -88,58 +88,62 @@ show([halfway, early, arm.outcome(), arm.positions(), feedback.joint_names,
     assert (stamp, elapsed) == (100.21, 0.2)
 
 
-@pytest.mark.parametrize(
-    ("goal", "code", "text"),
-    [
-        ("make_goal(([0, 0, 0], 1), names='abc')", -2, ""),
-        ("make_goal(([0], 1), names='a')", -2, ""),
-        ("make_goal(([0, 0], 1), names='ax')", -2, ""),
-        ("make_goal(([0, 0], 1), names='aa')", -2, ""),
-        ("make_goal(names='x')", -2, ""),
-        (
-            "make_goal(([0, 0], 1), ([0, 0], 1))",
-            -1,
-            "Trajectory message contains waypoints that are not strictly increasing in time.",
-        ),
-        (
-            "make_goal(([0, 0], 1), stamp=50)",
-            -1,
-            "Dropping all 1 trajectory point(s), as they occur before the current time.\n"
-            "Last point is 49.110000s in the past.",
-        ),
-        (
-            "make_goal(([math.nan, 0], 1))",
-            -1,
-            "Invalid trajectory point at index: 0. The position of joint 'a' is nan, which is not a usable number.",
-        ),
-        (
-            "make_goal(([0], 1))",
-            -1,
-            "Invalid trajectory point at index: 0. "
-            "Size mismatch in joint names, position, velocity or acceleration data.",
-        ),
-    ],
-)
-def test_a_wrong_goal_is_rejected_and_the_running_one_goes_on(
-    run: Run, goal: str, code: int, text: str
-) -> None:
+WRONG_GOALS = [
+    ("make_goal(([0, 0, 0], 1), names='abc')", -2, ""),
+    ("make_goal(([0], 1), names='a')", -2, ""),
+    ("make_goal(([0, 0], 1), names='ax')", -2, ""),
+    ("make_goal(([0, 0], 1), names='aa')", -2, ""),
+    ("make_goal(names='x')", -2, ""),
+    (
+        "make_goal(([0, 0], 1), ([0, 0], 1))",
+        -1,
+        "Trajectory message contains waypoints that are not strictly increasing in time.",
+    ),
+    (
+        "make_goal(([0, 0], 1), stamp=50)",
+        -1,
+        "Dropping all 1 trajectory point(s), as they occur before the current time.\n"
+        "Last point is 49.110000s in the past.",
+    ),
+    (
+        "make_goal(([math.nan, 0], 1))",
+        -1,
+        "Invalid trajectory point at index: 0. The position of joint 'a' is nan, which is not a usable number.",
+    ),
+    (
+        "make_goal(([0], 1))",
+        -1,
+        "Invalid trajectory point at index: 0. "
+        "Size mismatch in joint names, position, velocity or acceleration data.",
+    ),
+]
+
+
+def test_wrong_goals_are_rejected_and_the_running_one_goes_on(run: Run) -> None:
+    goals = ", ".join(goal for goal, _, _ in WRONG_GOALS)
     shown = run(f"""
 arm = Arm()
 arm.send(([1.0, -1.0], 0.5))
 arm.run(10)
 other = actionlib.SimpleActionClient("/c/follow_joint_trajectory", FollowJointTrajectoryAction)
 assert other.wait_for_server(rospy.Duration(30))
-logged = Logged()
-other.send_goal({goal})
-assert other.wait_for_result(rospy.Duration(30))
+logged, outcomes = Logged(), []
+for goal in [{goals}]:
+    other.send_goal(goal)
+    assert other.wait_for_result(rospy.Duration(30))
+    result = other.get_result()
+    lines = [line for line in logged.lines if line.startswith(("ERROR", "WARN"))]
+    outcomes.append([other.get_state(), result.error_code, result.error_string, lines])
+    logged.lines.clear()
 arm.run(55)
-result = other.get_result()
-lines = [line for line in logged.lines if line.startswith(("ERROR", "WARN"))]
-show([other.get_state(), result.error_code, result.error_string, arm.outcome(), arm.positions(), lines])
+show([outcomes, arm.outcome(), arm.positions()])
 """)
+    outcomes, outcome, positions = shown
     joints = "Joints on incoming goal don't match the controller joints."
-    level = "WARNING" if "Dropping" in text else "ERROR"
-    assert shown == [5, code, text, [3, 0, ""], [1.0, -1.0], [f"{level}: {text or joints}"]]
+    for found, (_, code, text) in zip(outcomes, WRONG_GOALS, strict=True):
+        level = "WARNING" if "Dropping" in text else "ERROR"
+        assert found == [5, code, text, [f"{level}: {text or joints}"]]
+    assert (outcome, positions) == ([3, 0, ""], [1.0, -1.0])
 
 
 def test_goals_and_commands_are_refused_unless_it_runs(run: Run) -> None:
@@ -356,34 +360,34 @@ show([arm.positions(), [line for line in logged.lines if line.startswith("WARN")
     ]
 
 
-@pytest.mark.parametrize(
-    ("interface", "more", "commands"),
-    [
-        ("position", "{}", [[0.064, 0, 0, 0], [0.064, 0, 0, 0]]),
-        ("pos_vel", "{}", [[0.064, 0.48, 0, 0], [0.064, 0.48, 0, 0]]),
-        ("pos_vel_acc", "{}", [[0.064, 0.48, 2.4, 0], [0.064, 0.48, 2.4, 0]]),
-        ("velocity", "GAINS", [[0, 2 * 0.064 + 0.48, 0, 0], [0, 3 * 0.064 + 0.1 * 0.48, 0, 0]]),
-        ("effort", "GAINS", [[0, 0, 0, 2 * 0.064 + 0.48], [0, 0, 0, 3 * 0.064 + 0.1 * 0.48]]),
-    ],
-)
-def test_each_interface_gets_its_commands(
-    run: Run, interface: str, more: str, commands: list[list[float]]
-) -> None:
+COMMANDS = {
+    "position": [[0.064, 0, 0, 0], [0.064, 0, 0, 0]],
+    "pos_vel": [[0.064, 0.48, 0, 0], [0.064, 0.48, 0, 0]],
+    "pos_vel_acc": [[0.064, 0.48, 2.4, 0], [0.064, 0.48, 2.4, 0]],
+    "velocity": [[0, 2 * 0.064 + 0.48, 0, 0], [0, 3 * 0.064 + 0.1 * 0.48, 0, 0]],
+    "effort": [[0, 0, 0, 2 * 0.064 + 0.48], [0, 0, 0, 3 * 0.064 + 0.1 * 0.48]],
+}
+
+
+def test_each_interface_gets_its_commands(run: Run) -> None:
     """Both joints stay at 0; the desired position is the third power of the time."""
     shown = run(f"""
 GAINS = {{"gains": {{"a": {{"p": 2}}, "b": {{"p": 3.0, "d": 0.1}}}}, "velocity_ff": {{"a": 1}}}}
-arm = Arm({more}, "{interface}_controllers/JointTrajectoryController")
 goal = make_goal(([1.0, 1.0], 1.0))
 goal.trajectory.points[0].velocities = [3.0, 3.0]
 goal.trajectory.points[0].accelerations = [6.0, 6.0]
-arm.client.send_goal(goal)
-wait_until(lambda: len(arm.controller.follower._requests) == 1)
-arm.cycle(41)
-show([[[round(value, 9) for value in (joint.position_command, joint.velocity_command, joint.acceleration_command,
-                                      joint.effort_command)] for joint in arm.hardware.joints.values()],
-      [[list(each.resources) for each in arm.resources.claimed(type(arm.controller).interfaces)]]])
+def commands(interface):
+    arm = Arm(GAINS, f"{{interface}}_controllers/JointTrajectoryController")
+    arm.client.send_goal(goal)
+    wait_until(lambda: len(arm.controller.follower._requests) == 1)
+    arm.cycle(41)
+    arm.controller.close()
+    return [[[round(value, 9) for value in (joint.position_command, joint.velocity_command, joint.acceleration_command,
+                                            joint.effort_command)] for joint in arm.hardware.joints.values()],
+            [list(each.resources) for each in arm.resources.claimed(type(arm.controller).interfaces)]]
+show([commands(interface) for interface in {list(COMMANDS)}])
 """)
-    assert shown == [commands, [[["a", "b"]]]]
+    assert shown == [[commands, [["a", "b"]]] for commands in COMMANDS.values()]
 
 
 def test_a_closed_loop_needs_gains(run: Run) -> None:

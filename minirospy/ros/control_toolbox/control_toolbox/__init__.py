@@ -6,6 +6,7 @@ ROS's package has this class in C++ only. Source: http://wiki.ros.org/control_to
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 
 from control_msgs.msg import PidState
 
@@ -35,6 +36,14 @@ class Pid(pid.Pid):
         Raise ControllerError if ``p`` is missing, ValueError if a gain is not finite.
         """
         return cls(*PidGains.read(parameters))
+
+    @classmethod
+    def open(cls, parameters: Parameters, opened: ExitStack) -> Pid:
+        """Return what :meth:`read` returns, after :meth:`serve`; ``opened`` closes it."""
+        found = cls.read(parameters)
+        opened.callback(found.close)
+        found.serve(parameters)
+        return found
 
     def serve(self, parameters: Parameters) -> None:
         """Offer dynamic_reconfigure in the namespace; publish its topic ``state`` if its parameter ``publish_state`` is true."""

@@ -30,6 +30,7 @@ class ForceTorqueSensorController(Controller):
         for name in hardware.names(Interface.FORCE_TORQUE):
             topic = f"{context.root.rstrip('/')}/{name}"
             publisher = RealtimePublisher(topic, WrenchStamped, queue_size=4)
+            self.opened.callback(publisher.close)
             self._topics.append((hardware.force_torque_sensor(name), publisher))
 
     def starting(self, time: Time) -> None:
@@ -46,8 +47,3 @@ class ForceTorqueSensorController(Controller):
                 message.wrench.force = Vector3(*sensor.force)
                 message.wrench.torque = Vector3(*sensor.torque)
                 publisher.publish(message)
-
-    def close(self) -> None:
-        """Close the topics."""
-        for _, publisher in self._topics:
-            publisher.close()

@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/forward_command_controller.
 from __future__ import annotations
 
 import math
+from contextlib import closing
 from typing import ClassVar
 
 from minirospy.base.times import Duration, Time
@@ -25,7 +26,6 @@ class ForwardCommandController(Controller):
     is_group: ClassVar[bool] = False  # several joints, whose commands are in one message
 
     _joints: list[Joint]
-    _command: CommandTopic | None = None
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Claim the joints, open the topic."""
@@ -35,11 +35,11 @@ class ForwardCommandController(Controller):
             self._joints = claim_group(hardware, context, interface)
         else:
             self._joints = [claim_joint(hardware, context, interface)]
-        self._command = CommandTopic(context, len(self._joints), is_group=self.is_group)
+        command = CommandTopic(context, len(self._joints), is_group=self.is_group)
+        self._command = self.opened.enter_context(closing(command))
 
     def starting(self, time: Time) -> None:
         """Hold the position, or command 0."""
-        assert self._command
         if self.interfaces == (Interface.POSITION,):
             self._command.values = [
                 each.position if math.isfinite(each.position) else each.position_command
@@ -50,15 +50,9 @@ class ForwardCommandController(Controller):
 
     def update(self, time: Time, period: Duration) -> None:
         """Command the joints."""
-        assert self._command
         field = self._field
         for joint, value in zip(self._joints, self._command.values, strict=True):
             setattr(joint, field, value)
-
-    def close(self) -> None:
-        """Close the topic."""
-        if self._command:
-            self._command.close()
 
 
 class ForwardJointGroupCommandController(ForwardCommandController):

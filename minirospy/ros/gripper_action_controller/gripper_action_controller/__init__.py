@@ -7,7 +7,7 @@ http://wiki.ros.org/gripper_action_controller.
 from __future__ import annotations
 
 import math
-from contextlib import ExitStack
+from contextlib import closing
 
 from control_msgs.msg import GripperCommandAction, GripperCommandGoal, GripperCommandResult
 
@@ -29,14 +29,14 @@ _NOT_RUNNING = "Can't accept new action goals. Controller is not running."
 class GripperActionController(Controller):
     """Executes the action ``gripper_cmd``. A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`.
 
-    As in ROS it publishes no feedback.
+    As in ROS it publishes no feedback. A result has the values of the cycle that decided it; in ROS it has those of the
+    time at which it is sent, up to a period of ``action_monitor_rate`` later.
     """
 
     joint: Joint
     gripper: Gripper
 
     def __init__(self) -> None:
-        self.opened = ExitStack()  # closes what ``init`` has opened, in reverse
         self.is_running = False
         self._effort = 0.0  # the last one that was commanded
 
@@ -65,7 +65,7 @@ class GripperActionController(Controller):
             )
         )
         self.read_gains(context)
-        self._action = RealtimeActionServer(
+        action = RealtimeActionServer(
             f"{context.namespace}/gripper_cmd",
             GripperCommandAction,
             self._accept,
@@ -73,7 +73,7 @@ class GripperActionController(Controller):
             _result,
             max(1, round(_SECOND / monitor_rate)),
         )
-        self.opened.callback(self._action.close)
+        self._action = self.opened.enter_context(closing(action))
 
     def read_gains(self, context: ControllerContext) -> None:
         """Read the parameters that only this hardware interface needs."""
@@ -104,10 +104,6 @@ class GripperActionController(Controller):
         """Cancel the goal."""
         self.stopping(time)
 
-    def close(self) -> None:
-        """Close the action."""
-        self.opened.close()
-
     def _hold(self) -> None:
         position = self.joint.position
         self.gripper.hold(position if math.isfinite(position) else self.joint.position_command)
@@ -122,7 +118,7 @@ class GripperActionController(Controller):
             rospy.logerr(text)
             raise Rejection(GripperCommandResult(), text)
         goal = MonitoredGoal()
-        self.gripper.command = GripperCommand(position, max_effort, goal)
+        self.gripper.command = GripperCommand(position, max_effort, goal, rospy.Time.now().to_nsec())
         return goal
 
 
@@ -147,10 +143,7 @@ class EffortGripperActionController(GripperActionController):
 
     def read_gains(self, context: ControllerContext) -> None:
         """Read the gains, and let dynamic_reconfigure change them."""
-        gains = context.parameters.below(f"gains/{self.joint.name}")
-        self._pid = Pid.read(gains)
-        self.opened.callback(self._pid.close)
-        self._pid.serve(gains)
+        self._pid = Pid.open(context.parameters.below(f"gains/{self.joint.name}"), self.opened)
 
     def starting(self, time: Time) -> None:
         """Hold the present position, without effort until the first update."""

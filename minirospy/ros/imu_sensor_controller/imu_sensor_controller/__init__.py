@@ -35,6 +35,7 @@ class ImuSensorController(Controller):
         self._rate = PublishRate.read(context.parameters)
         for name in hardware.names(Interface.IMU):
             publisher = RealtimePublisher(f"{context.root.rstrip('/')}/{name}", Imu, queue_size=4)
+            self.opened.callback(publisher.close)
             self._topics.append((hardware.imu(name), publisher))
 
     def starting(self, time: Time) -> None:
@@ -46,11 +47,6 @@ class ImuSensorController(Controller):
         if self._rate.is_due(time):
             for sensor, publisher in self._topics:
                 publisher.publish(_message(sensor, time))
-
-    def close(self) -> None:
-        """Close the topics."""
-        for _, publisher in self._topics:
-            publisher.close()
 
 
 def _message(sensor: ImuSensor, time: Time) -> Imu:

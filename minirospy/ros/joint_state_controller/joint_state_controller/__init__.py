@@ -34,7 +34,6 @@ class JointStateController(Controller):
 
     interfaces = (Interface.JOINT_STATE,)
 
-    _publisher: RealtimePublisher[JointState] | None = None
     _has_started = False
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
@@ -49,9 +48,9 @@ class JointStateController(Controller):
         extra = list(_extra_joints(context.parameters, names))
         self._names = names + [name for name, _ in extra]
         self._extra = tuple([values[each] for _, values in extra] for each in _STATE)
-        self._publisher = RealtimePublisher(
-            f"{context.root.rstrip('/')}/joint_states", JointState, queue_size=4
-        )
+        topic = f"{context.root.rstrip('/')}/joint_states"
+        self._publisher = RealtimePublisher(topic, JointState, queue_size=4)
+        self.opened.callback(self._publisher.close)
 
     def starting(self, time: Time) -> None:
         """Publish in the next cycle. The rate continues if the controller is started again."""
@@ -71,13 +70,7 @@ class JointStateController(Controller):
             effort=[joint.effort for joint in joints] + efforts,
         )
         message.header.stamp = time
-        assert self._publisher
         self._publisher.publish(message)
-
-    def close(self) -> None:
-        """Close the topic."""
-        if self._publisher:
-            self._publisher.close()
 
 
 def _extra_joints(parameters: Parameters, names: list[str]) -> Iterator[tuple[str, dict[str, float]]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import closing
 from typing import ClassVar, TypeVar
 
 from control_msgs.msg import (
@@ -68,9 +68,6 @@ class JointTrajectoryController(Controller):
     joints: Sequence[Joint]
     follower: TrajectoryFollower
 
-    def __init__(self) -> None:
-        self.opened = ExitStack()  # closes what ``init`` has opened, in reverse
-
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Read the parameters, claim the joints, and open the topics, the action and the service."""
         parameters = context.parameters
@@ -93,9 +90,9 @@ class JointTrajectoryController(Controller):
 
         self._state_period = max(1, round(_SECOND / state_rate))  # ns
         self._state_due = 0  # ns of the uptime
-        self._state = RealtimePublisher(f"{context.namespace}/state", JointTrajectoryControllerState)
-        self.opened.callback(self._state.close)
-        self._action = RealtimeActionServer(
+        state = RealtimePublisher(f"{context.namespace}/state", JointTrajectoryControllerState)
+        self._state = self.opened.enter_context(closing(state))
+        action = RealtimeActionServer(
             f"{context.namespace}/follow_joint_trajectory",
             FollowJointTrajectoryAction,
             self._accept,
@@ -103,7 +100,7 @@ class JointTrajectoryController(Controller):
             _result,
             max(1, round(_SECOND / monitor_rate)),
         )
-        self.opened.callback(self._action.close)
+        self._action = self.opened.enter_context(closing(action))
         command = rospy.Subscriber(
             f"{context.namespace}/command", JointTrajectory, self._receive_command, queue_size=1
         )
@@ -153,10 +150,6 @@ class JointTrajectoryController(Controller):
     def aborting(self, time: Time) -> None:
         """Cancel the goal."""
         self.stopping(time)
-
-    def close(self) -> None:
-        """Close the topics, the action and the service."""
-        self.opened.close()
 
     def send(self, dt: float) -> None:
         """Set the joints' commands from the follower's desired states and errors. ``dt``: s since the last cycle."""
@@ -298,12 +291,8 @@ class _ClosedLoopController(JointTrajectoryController):
     def read_gains(self, context: ControllerContext) -> None:
         """Read the gains, and let dynamic_reconfigure change them."""
         parameters = context.parameters
-        gains = [parameters.below(f"gains/{name}") for name in self._names]
-        self._pids = [Pid.read(each) for each in gains]
         self._velocity_ff = [parameters.finite(f"velocity_ff/{name}", 0.0) for name in self._names]
-        for pid, each in zip(self._pids, gains, strict=True):
-            self.opened.callback(pid.close)
-            pid.serve(each)
+        self._pids = [Pid.open(parameters.below(f"gains/{name}"), self.opened) for name in self._names]
 
     def reset(self) -> None:
         """Reset the PIDs, and command 0."""

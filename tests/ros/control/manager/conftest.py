@@ -12,6 +12,7 @@ import pytest
 
 from minirospy.workspace.packages import Packages
 from tests.conftest import write_files
+from tests.ros.control.forks import run_program
 
 SECONDS = 100.0
 
@@ -178,6 +179,6 @@ def _end(process: subprocess.Popen[str]) -> None:
 def call(code: str) -> str:
     """Return the output of a program that has the functions of controller_manager_interface, as ``cm``, and ``rospy``."""
     head = "import rospy\nfrom controller_manager import controller_manager_interface as cm\n"
-    return subprocess.run(
-        [sys.executable, "-c", head + code], check=True, capture_output=True, text=True, timeout=SECONDS
-    ).stdout
+    done = run_program(head + code, Path.cwd())
+    assert done.returncode == 0, done.stderr
+    return done.stdout

@@ -132,7 +132,7 @@ def test_controller_that_raises_is_stopped_and_the_loop_goes_on(start: Start, wo
     assert line.endswith(f"Controller 'faulty' is stopped: update raised RuntimeError: no oil {place}")
 
 
-def test_start_that_fails_is_not_reported_as_success(start: Start, workspace: Path) -> None:
+def test_start_that_fails_and_a_reload_of_changed_files(start: Start, workspace: Path) -> None:
     file = workspace / "src" / "my_controllers" / "hold.py"
     text = file.read_text()
     file.write_text(
@@ -141,19 +141,16 @@ def test_start_that_fails_is_not_reported_as_success(start: Start, workspace: Pa
             "    def starting(self, time):\n        raise",
         )
     )
-    start("-c", ROBOT)
+    robot = start("-c", ROBOT)
     assert call(LOADS + 'cm.load_controller("faulty"), cm.start_controller("faulty")').splitlines() == [
         "Loaded 'faulty'",
         "Error when starting ['faulty'] and stopping []",
     ]
 
-
-def test_reload_reads_changed_files(start: Start, workspace: Path) -> None:
-    robot = start("-c", ROBOT)
+    # A reload reads changed files.
     loads = LOADS + 'cm.load_controller("one"), cm.start_controller("one")'
     call(loads)
     robot.read_until("one starts")
-    file = workspace / "src" / "my_controllers" / "hold.py"
     file.write_text(file.read_text().replace('"starts"', '"begins"') + "# of another size\n")
     call("cm.reload_libraries(True)\n" + loads)
     robot.read_until("one begins")
@@ -326,45 +323,43 @@ def test_controllers_are_started_again_if_the_computers_time_is_set_back(
     assert "the controllers are started again" in robot.end()[2]
 
 
-def test_diagnostics_have_the_loops_times(start: Start) -> None:
-    start("-c", ROBOT)
-    status = call(
-        "from diagnostic_msgs.msg import DiagnosticArray\n"
-        "rospy.init_node('reader')\n"
-        "message = rospy.wait_for_message('/diagnostics', DiagnosticArray)\n"
-        "print(message.status[0].name, [pair.key for pair in message.status[0].values])"
-    )
-    keys = ["jitter mean", "jitter p99", "jitter max", "cycle mean", "cycle p99", "cycle max"]
-    assert (
-        status
-        == f"robot: control loop {['rate (Hz)', 'cycles', 'overruns', *(f'{key} (us)' for key in keys)]}\n"
-    )
-
-
 TWO_ROBOTS = """
 import rospy
 from controller_manager import ControlLoop
 from hardware_interface import RobotHardware
+from std_msgs.msg import Empty
 
 rospy.init_node("robots")
-for namespace in ("", "left"):
-    ControlLoop(RobotHardware(), 100.0, namespace).start()
+loops = [ControlLoop(RobotHardware(), 100.0, namespace) for namespace in ("", "left")]
+for loop in loops:
+    loop.start()
+rospy.wait_for_message("/stop", Empty)
+for loop in loops:
+    loop.stop()
 rospy.spin()
 """
 
 
-def test_diagnostics_tell_the_loops_of_a_node_apart(start: Start) -> None:
+def test_diagnostics_have_the_times_of_each_loop_and_end_with_it(start: Start) -> None:
     start("-c", TWO_ROBOTS)
     printed = call(
         "from diagnostic_msgs.msg import DiagnosticArray\n"
         "rospy.init_node('reader')\n"
-        "names = set()\n"
-        "rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: names.add(message.status[0].name))\n"
-        "while len(names) < 2:\n"
+        "found = {}\n"
+        "def receive(message):\n"
+        "    found[message.status[0].name] = [pair.key for pair in message.status[0].values]\n"
+        "rospy.Subscriber('/diagnostics', DiagnosticArray, receive)\n"
+        "while len(found) < 2:\n"
         "    rospy.wait_for_message('/diagnostics', DiagnosticArray)\n"
-        "print(sorted(names))"
+        "for name in sorted(found): print(name, found[name])\n"
+        "from std_msgs.msg import Empty\n"
+        "rospy.Publisher('/stop', Empty, latch=True, queue_size=1).publish()\n"
+        "while any(topic == '/diagnostics' for topic, _ in rospy.get_published_topics()):\n"
+        "    rospy.sleep(0.05)\n"
     )
-    assert printed == "['robots: control loop', 'robots: control loop /left']\n"
+    keys = ["jitter mean", "jitter p99", "jitter max", "cycle mean", "cycle p99", "cycle max"]
+    shown = ["rate (Hz)", "cycles", "overruns", *(f"{key} (us)" for key in keys)]
+    assert printed == f"robots: control loop {shown}\nrobots: control loop /left {shown}\n"
 
 
 def test_commands_are_limited_by_parameters(start: Start) -> None:

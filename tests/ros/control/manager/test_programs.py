@@ -30,9 +30,10 @@ def interrupt(program: Program) -> tuple[int, list[str], list[str]]:
     return status, texts("\n".join(program.lines)), texts(errors)
 
 
-def test_spawner_starts_controllers_and_takes_them_down(start: Start) -> None:
+def test_spawner_starts_controllers_and_takes_them_down(start: Start, tmp_path: Path) -> None:
     start("-c", ROBOT)
     call(HOLD % ("one", "a") + HOLD % ("two", "b"))
+    (tmp_path / "src" / "one").mkdir()  # in the spawner's folder: not a file of controllers
     spawner = start("controller_manager", "spawner", "one", "nope", "two")
     spawner.read_until("Started controllers: one, two")
     assert call("cm.list_controllers()").count("( running )") == 2
@@ -57,9 +58,7 @@ def test_spawner_starts_controllers_and_takes_them_down(start: Start) -> None:
     ]
     assert call("cm.list_controllers()") == "No controllers are loaded in mechanism control\n"
 
-
-def test_spawner_loads_a_file_and_waits_for_a_topic(start: Start, tmp_path: Path) -> None:
-    start("-c", ROBOT)
+    # A file, after a message on a topic.
     file = tmp_path / "controllers.yaml"
     file.write_text(
         "one: {type: my_controllers/Hold, joint: a}\ntwo: {type: my_controllers/Hold, joint: b}\n"
@@ -100,14 +99,6 @@ def test_spawner_ends_while_the_manager_is_busy_with_its_controller(start: Start
         "Shutting down spawner. Stopping and unloading controllers...",
         "Stopping all controllers...",
     ]
-
-
-def test_spawner_takes_the_name_of_a_folder_for_a_controller(start: Start, workspace: Path) -> None:
-    start("-c", ROBOT)
-    call(HOLD % ("one", "a"))
-    (workspace.parent / "one").mkdir()
-    spawner = start("controller_manager", "spawner", "one")
-    spawner.read_until("Started controllers: one")
 
 
 def test_unspawner_goes_on_without_the_manager(start: Start) -> None:

@@ -1,0 +1,213 @@
+"""What a transmission does between actuators and joints: maps of positions, velocities and efforts, in both directions.
+
+A driver that commands the motors of a coupled mechanism uses them in ``read`` and ``write``. Source: the documentation of ROS's
+transmission_interface.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from minirospy.core.control.hardware import HardwareError
+from minirospy.core.urdf.elements import Element, parse_xml
+
+__all__ = [
+    "DifferentialTransmission",
+    "FourBarLinkageTransmission",
+    "SimpleTransmission",
+    "TransmissionMap",
+    "load_transmissions",
+]
+
+_Matrix = tuple[tuple[float, ...], ...]
+
+
+class TransmissionMap:
+    """The base of all transmissions. Values are in the order of ``actuators`` and ``joints``, which are names, if known."""
+
+    actuators: Sequence[str] = ()
+    joints: Sequence[str] = ()
+
+    def __init__(self, motion: _Matrix, effort: _Matrix, offsets: Sequence[float]) -> None:
+        """Set the matrices that turn actuators' velocities and efforts into those of joints, and the joints' zeros."""
+        self._motion, self._effort, self._offsets = motion, effort, tuple(offsets)
+        self._inverse_motion, self._inverse_effort = _inverse(motion), _inverse(effort)
+
+    def joint_positions(self, actuators: Sequence[float]) -> list[float]:
+        """Return the joints' positions for those of the actuators."""
+        moved = _product(self._motion, actuators)
+        return [position + offset for position, offset in zip(moved, self._offsets, strict=True)]
+
+    def joint_velocities(self, actuators: Sequence[float]) -> list[float]:
+        """Return the joints' velocities for those of the actuators."""
+        return _product(self._motion, actuators)
+
+    def joint_efforts(self, actuators: Sequence[float]) -> list[float]:
+        """Return the joints' efforts for those of the actuators."""
+        return _product(self._effort, actuators)
+
+    def actuator_positions(self, joints: Sequence[float]) -> list[float]:
+        """Return the actuators' positions for those of the joints."""
+        moved = [position - offset for position, offset in zip(joints, self._offsets, strict=True)]
+        return _product(self._inverse_motion, moved)
+
+    def actuator_velocities(self, joints: Sequence[float]) -> list[float]:
+        """Return the actuators' velocities for those of the joints."""
+        return _product(self._inverse_motion, joints)
+
+    def actuator_efforts(self, joints: Sequence[float]) -> list[float]:
+        """Return the actuators' efforts for those of the joints."""
+        return _product(self._inverse_effort, joints)
+
+
+class SimpleTransmission(TransmissionMap):
+    """One actuator and one joint. Raise HardwareError if the reduction is 0."""
+
+    def __init__(self, reduction: float, joint_offset: float = 0.0) -> None:
+        if not reduction:
+            raise HardwareError("Transmission reduction ratio cannot be zero.")
+        super().__init__(((1 / reduction,),), ((reduction,),), (joint_offset,))
+
+
+class DifferentialTransmission(TransmissionMap):
+    """Two actuators turn joint 1 together, and joint 2 against each other. Raise HardwareError if a reduction is 0."""
+
+    def __init__(
+        self,
+        actuator_reduction: Sequence[float],
+        joint_reduction: Sequence[float] = (1.0, 1.0),
+        joint_offset: Sequence[float] = (0.0, 0.0),
+    ) -> None:
+        a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "differential")
+        motion = ((1 / (2 * a * c), 1 / (2 * b * c)), (1 / (2 * a * d), -1 / (2 * b * d)))
+        super().__init__(motion, ((a * c, b * c), (a * d, -b * d)), joint_offset)
+
+
+class FourBarLinkageTransmission(TransmissionMap):
+    """Actuator 1 turns joint 1; joint 2 is actuator 2 less the motion of joint 1. Raise HardwareError if a reduction is 0."""
+
+    def __init__(
+        self,
+        actuator_reduction: Sequence[float],
+        joint_reduction: Sequence[float] = (1.0, 1.0),
+        joint_offset: Sequence[float] = (0.0, 0.0),
+    ) -> None:
+        a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "four-bar linkage")
+        motion = ((1 / (a * c), 0.0), (-1 / (a * c * d), 1 / (b * d)))
+        # These efforts are ROS's; the power of actuators and joints is not equal.
+        super().__init__(motion, ((a * c, 0.0), (-a * c * d, b * d)), joint_offset)
+
+
+def load_transmissions(text: str | bytes, file: str = "robot_description") -> dict[str, TransmissionMap]:
+    """Return the simple, differential and four-bar linkage transmissions of a description, by name.
+
+    Raise UrdfError if the text is not XML, HardwareError with ROS's text if a transmission is invalid.
+    """
+    found: dict[str, TransmissionMap] = {}
+    for element in parse_xml(text, file).all("transmission"):
+        name = element.attributes.get("name", "")
+        kind = (_text(element, "type") or "").rpartition("/")[2]
+        if kind == "SimpleTransmission":
+            ((actuator, reduction, _),), ((joint, _, offset),) = _sides(element, name, 1)
+            found[name] = SimpleTransmission(reduction, offset)
+            found[name].actuators, found[name].joints = (actuator,), (joint,)
+        elif coupled := _COUPLED.get(kind):
+            actuators, joints = _sides(element, name, 2)
+            names, reductions, _ = zip(*actuators, strict=True)
+            joint_names, joint_reductions, offsets = zip(*joints, strict=True)
+            found[name] = coupled(reductions, joint_reductions, offsets)
+            found[name].actuators, found[name].joints = names, joint_names
+    return found
+
+
+_COUPLED = {
+    "DifferentialTransmission": DifferentialTransmission,
+    "FourBarLinkageTransmission": FourBarLinkageTransmission,
+}
+
+_Part = tuple[str, float, float]  # an actuator or a joint: name, reduction, offset
+
+
+def _sides(transmission: Element, name: str, count: int) -> tuple[list[_Part], list[_Part]]:
+    """Return the actuators and the joints of a transmission, in the order of their roles."""
+    sides = []
+    for tag in ("actuator", "joint"):
+        elements = list(transmission.all(tag))
+        if len(elements) != count:
+            raise HardwareError(
+                f"Invalid description for transmission '{name}' of type '{_text(transmission, 'type')}'. "
+                f"Expected {count} {tag}s, got {len(elements)}."
+            )
+        parts = []
+        for element in elements:
+            named = f"{tag.title()} '{element.attributes.get('name', '')}' of transmission '{name}'"
+            default = None if tag == "actuator" else 1.0
+            part = (
+                element.attributes.get("name", ""),
+                _number(element, "mechanicalReduction", default, named),
+                _number(element, "offset", 0.0, named) if tag == "joint" else 0.0,
+            )
+            parts.append((_role(element, tag, named) if count > 1 else "", part))
+        if count > 1 and parts[0][0] == parts[1][0]:
+            first, second = (part[0] for _, part in parts)
+            raise HardwareError(
+                f"{tag.title()}s '{first}' and '{second}' of transmission '{name}' must have different roles. "
+                f"Both specify '{parts[0][0]}'."
+            )
+        sides.append([part for _, part in sorted(parts)])
+    return sides[0], sides[1]
+
+
+def _role(element: Element, tag: str, named: str) -> str:
+    role = _text(element, "role")
+    if role is None:
+        raise HardwareError(f"{named} does not specify the required <role> element.")
+    if role not in (f"{tag}1", f"{tag}2"):
+        raise HardwareError(
+            f"{named} does not specify a valid <role> element. Got '{role}', expected '{tag}1' or '{tag}2'."
+        )
+    return role
+
+
+def _number(element: Element, tag: str, default: float | None, named: str) -> float:
+    text = _text(element, tag)
+    if text is None:
+        if default is None:
+            raise HardwareError(f"{named} does not specify the required <{tag}> element.")
+        return default
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise HardwareError(f"{named} specifies the <{tag}> element, but is not a number.")
+    return value
+
+
+def _text(element: Element, tag: str) -> str | None:
+    found = element.first(tag)
+    return None if found is None else found.text.strip()
+
+
+def _reductions(
+    actuators: Sequence[float], joints: Sequence[float], offsets: Sequence[float], kind: str
+) -> Sequence[float]:
+    if not len(actuators) == len(joints) == len(offsets) == 2:
+        raise HardwareError(f"Reduction and offset vectors of a {kind} transmission must have size 2.")
+    if not all((*actuators, *joints)):
+        raise HardwareError("Transmission reduction ratios cannot be zero.")
+    return (*actuators, *joints)
+
+
+def _product(matrix: _Matrix, values: Sequence[float]) -> list[float]:
+    return [sum(factor * value for factor, value in zip(row, values, strict=True)) for row in matrix]
+
+
+def _inverse(matrix: _Matrix) -> _Matrix:
+    """Return the inverse of a matrix of size 1 or 2."""
+    if len(matrix) == 1:
+        return ((1 / matrix[0][0],),)
+    (a, b), (c, d) = matrix
+    determinant = a * d - b * c
+    return (d / determinant, -b / determinant), (-c / determinant, a / determinant)

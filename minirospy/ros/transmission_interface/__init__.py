@@ -1,0 +1,1 @@
+"""Maps between actuators and joints."""

@@ -1,0 +1,20 @@
+"""Maps between actuators and joints: ``from transmission_interface import DifferentialTransmission``.
+
+ROS's package has them in C++ only. Source: http://wiki.ros.org/transmission_interface.
+"""
+
+from minirospy.core.control.transmission_maps import (
+    DifferentialTransmission,
+    FourBarLinkageTransmission,
+    SimpleTransmission,
+    TransmissionMap,
+    load_transmissions,
+)
+
+__all__ = [
+    "DifferentialTransmission",
+    "FourBarLinkageTransmission",
+    "SimpleTransmission",
+    "TransmissionMap",
+    "load_transmissions",
+]
