@@ -80,6 +80,31 @@ test("XML is read with the line of its faults", () => {
   assert.throws(() => parseXml("<a>".repeat(600)), XmlError);
 });
 
+test("xml is read as leniently as TinyXML reads it, with one note for each kind of fault", () => {
+  const declared = '<?xml version="1.0"?>\n';
+  for (const [text, value, note] of [
+    [`${declared}<!-- a -- b --->\n<r n="x"/>`, "x", "line 2: '--' is not allowed inside a comment"],
+    [`\n${declared}<r n="x"/>`, "x", "line 2: the XML declaration has to be at the start of the text"],
+    ['<r n="a & b"/>', "a  b", "line 1: '&' is not allowed alone"],
+    ['<r n="a&nbsp;b"/>', "anbsp;b", "line 1: '&' is not allowed alone"],
+    ['<r n="x">\na & b & c</r>', "x", "line 1: '&' is not allowed alone"],
+    ['<r n="x"/>\n<!-- -->\n\nmore <', "x", "line 4: everything after the end of <r> is ignored"],
+    ['<r n="x"/><r n="y"/>', "x", "line 1: everything after the end of <r> is ignored"],
+    ['<?xml?><r n="x"/>', "x", "line 1: the XML declaration has to begin with"],
+    ["<r n=x/>", "x", "line 1: the value of an attribute is not in quotes"],
+    ['<r n="a<b"/>', "a<b", "line 1: '<' is not allowed in an attribute"],
+    ['<r n="x"m="y"/>', "x", "line 1: a space is missing between two attributes"],
+  ]) {
+    const { attributes, notes } = parseXml(text);
+    assert.equal(attributes.n, value, text);
+    assert.deepEqual([notes.length, notes[0]?.startsWith(note)], [1, true], `${text}: ${notes}`);
+  }
+  for (const text of ['<?xml version="1"?><r/>', "\ufeff<r/>", `${declared}<r n="&amp;"><![CDATA[&]]></r>\n<!-- -->`])
+    assert.deepEqual(parseXml(text).notes, []);
+  for (const text of ["", "hello <r/>", "<r></s>", "<r n/>", "<r><!-- </r>", "< r/>"])
+    assert.throws(() => parseXml(text), XmlError);
+});
+
 test("a robot needs one root link", () => {
   const joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>';
   assert.equal(parseUrdf(`<robot name="r"><link name="a"/><link name="b"/>${joint}</robot>`).root, "a");

@@ -869,6 +869,17 @@ export const GERMAN = {
   "</{name}>, where {wanted} is expected": "</{name}>, wo {wanted} erwartet wird",
   "the end": "das Ende",
   "elements are nested too deeply": "die Elemente sind zu tief verschachtelt",
+  "'&' is not allowed alone, and was ignored: write &amp;":
+    "„&“ allein ist nicht erlaubt und wurde übergangen: &amp; schreiben",
+  "everything after the end of <{name}> is ignored": "alles nach dem Ende von <{name}> wird übergangen",
+  "the XML declaration has to be at the start of the text: delete what precedes it":
+    "die XML-Deklaration muss am Anfang des Textes stehen: davor alles löschen",
+  'the XML declaration has to begin with <?xml version="1.0"':
+    'die XML-Deklaration muss mit <?xml version="1.0" beginnen',
+  "'--' is not allowed inside a comment": "„--“ ist in einem Kommentar nicht erlaubt",
+  "a space is missing between two attributes": "zwischen zwei Attributen fehlt ein Leerzeichen",
+  "the value of an attribute is not in quotes": "der Wert eines Attributs steht nicht in Anführungszeichen",
+  "'<' is not allowed in an attribute: write &lt;": "„<“ ist in einem Attribut nicht erlaubt: &lt; schreiben",
   "</{name}> is missing": "</{name}> fehlt",
   "there is not one element around all others": "es gibt nicht ein Element um alle anderen",
   "{count} controls, more than {most}": "{count} Griffe, mehr als {most}",

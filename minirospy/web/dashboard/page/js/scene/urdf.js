@@ -8,7 +8,8 @@ import { parseXml } from "./xml.js";
 export class UrdfError extends Error {}
 
 /**
- * Return {name, root, links: Map of name -> {name, visuals, collisions}, joints: Map of name -> joint}.
+ * Return {name, root, links: Map of name -> {name, visuals, collisions}, joints: Map of name -> joint, notes: faults of
+ * the text that were passed over}.
  * Throws UrdfError or XmlError.
  *
  * A visual is {origin, geometry: {kind, size | radius, length | uri, scale}, color: [r, g, b, a] | null}; a joint
@@ -58,7 +59,7 @@ export function parseUrdf(text) {
     throw new UrdfError(
       roots.length ? t("two root links: {names}", { names: roots.join(", ") }) : t("there is no root link"),
     );
-  return { name: robot.attributes.name ?? "", root: roots[0], links, joints };
+  return { name: robot.attributes.name ?? "", root: roots[0], links, joints, notes: robot.notes };
 }
 
 /**

@@ -58,7 +58,8 @@ export class RobotModel extends Display {
       this.setStatus("URDF", 2, t("URDF failed Model parse: {why}", { why: error.message }));
       return;
     }
-    this.setStatus("URDF", 0, t("URDF parsed OK"));
+    const { notes } = this.robot;
+    this.setStatus("URDF", notes.length ? 1 : 0, [t("URDF parsed OK"), ...notes].join("; "));
     this.poses = null;
     this.isLoading = 0;
     this.failed = [];
