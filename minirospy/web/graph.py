@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
 from minirospy.aio.tasks import ErrorReporter, keep_running
-from minirospy.aio.topics import Publisher
+from minirospy.aio.topics import JOIN_SECONDS, Publisher
 from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
 from minirospy.base.name_filter import NameFilter
 from minirospy.core.idl.protocols import Message
@@ -78,6 +78,7 @@ class SharedTopic:
         # The last message of each publisher, keyed by the id of its connection header, which is one object per connection.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
+        self._has_connected = asyncio.Event()  # set when a publisher has connected; a wait clears it
 
     @property
     def headers(self) -> list[Header]:
@@ -92,7 +93,10 @@ class SharedTopic:
     def add(self, listener: TopicListener) -> None:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
-            self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
+            self._subscription = self._graph.node.subscribe_raw(
+                self.topic, self._deliver, on_change=self._has_connected.set
+            )
+            self._graph.subscribed_own(self.topic)
         # While an unsubscription is in progress, the connections are open, and would not deliver the latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
@@ -103,6 +107,17 @@ class SharedTopic:
         """Stop calling ``listener``."""
         with contextlib.suppress(ValueError):
             self._listeners.remove(listener)
+
+    async def wait_for_publisher(self, name: str) -> None:
+        """Wait until the node ``name`` has connected as a publisher, or the topic has no listeners. At most a second."""
+
+        async def connected() -> None:
+            while self.is_wanted and not any(header.get("callerid") == name for header in self.headers):
+                self._has_connected.clear()
+                await self._has_connected.wait()
+
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(connected(), JOIN_SECONDS)
 
     async def close(self) -> None:
         """Unsubscribe."""
@@ -370,13 +385,32 @@ class SharedGraph:
             if known not in (None, ANY, type_.name):
                 raise BridgeError(f"topic [{topic}] is of type [{known}], not [{type_.name}]")
             publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
-            joining = self.spawn(publisher.wait_for_expected())
-            shared = self.publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
+            shared = self.publishers[topic] = _SharedPublisher(type_, latch, publisher)
+            shared.joining = self.spawn(self._join(topic, shared))
             self.refresh_soon()
         elif shared.type.md5sum != type_.md5sum:
             raise BridgeError(f"topic [{topic}] is published as [{shared.type.name}] by another client")
         shared.clients += 1
         return Publication(self, topic, shared)
+
+    def subscribed_own(self, topic: str) -> None:
+        """Let the messages of this node's publisher wait for this node's own subscription, which was just created."""
+        shared = self.publishers.get(topic)
+        if shared:
+            shared.joining = self.spawn(self._join_own(topic, shared.joining))
+
+    async def _join(self, topic: str, shared: _SharedPublisher) -> None:
+        """Wait until the subscribers that the master listed, and this node's own subscription, are connected."""
+        await shared.publisher.wait_for_expected()
+        await self._join_own(topic)
+
+    async def _join_own(self, topic: str, before: asyncio.Task[None] | None = None) -> None:
+        """Wait for ``before``, then until this node's own subscription is connected."""
+        if before:
+            await asyncio.wait([before])
+        own = self.topics.get(topic)
+        if own and own.is_wanted:
+            await own.wait_for_publisher(self.node.name)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
         """Unadvertise a topic after the last client that publishes it has left."""

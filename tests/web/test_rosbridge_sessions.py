@@ -445,6 +445,22 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
     bridge.run(asyncio.wait_for(unadvertised(), 30))
 
 
+@pytest.mark.parametrize("first", ["advertise", "subscribe"])
+def test_a_clients_first_message_reaches_its_own_subscription(bridge: Running, first: str) -> None:
+    """The topic is used before, so that its publisher or its connection may still exist."""
+    client = bridge.rosbridge()
+    second = "subscribe" if first == "advertise" else "advertise"
+    for number in range(12):
+        for op in (first, second):
+            client.send(op=op, topic="/own", type="std_msgs/Int32", id="a")
+        client.send(op="publish", topic="/own", msg={"data": number})
+        client.send(op="publish", topic="/own", msg={"data": -number})
+        assert client.next("publish")["msg"] == {"data": number}
+        assert client.next("publish")["msg"] == {"data": -number}
+        client.send(op="unsubscribe", topic="/own", id="a")
+        client.send(op="unadvertise", topic="/own", id="a")
+
+
 # --- refusals
 
 
