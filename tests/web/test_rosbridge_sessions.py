@@ -624,6 +624,16 @@ def test_service_is_called_with_a_dict_or_a_list(bridge: Running) -> None:
     )
 
 
+def test_nanoseconds_above_a_second_are_carried(bridge: Running) -> None:
+    messages = received(bridge, bridge.node("listener"), "/pose", PoseStamped)
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/pose", type="geometry_msgs/PoseStamped")
+    stamp = {"secs": 5, "nsecs": 1_500_000_000}
+    client.send(op="publish", topic="/pose", msg={"header": {"stamp": stamp}})
+    [message] = messages()
+    assert (message.header.stamp.secs, message.header.stamp.nsecs) == (6, 500_000_000)
+
+
 def test_client_offers_a_service(bridge: Running) -> None:
     client = bridge.rosbridge()
     client.send(op="set_level", level="info")
