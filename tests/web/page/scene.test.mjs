@@ -3,6 +3,8 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { fromHex, hexOf, palette, rgbOf } from "../../../minirospy/web/dashboard/page/js/scene/colors.js";
+import { readMaterials, readObj } from "../../../minirospy/web/dashboard/page/js/scene/obj.js";
+import { pointsOfScan } from "../../../minirospy/web/dashboard/page/js/scene/points.js";
 import {
   apply,
   compose,
@@ -109,4 +111,71 @@ test("a robot needs one root link", () => {
   const joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>';
   assert.equal(parseUrdf(`<robot name="r"><link name="a"/><link name="b"/>${joint}</robot>`).root, "a");
   assert.throws(() => parseUrdf('<robot name="r"><link name="a"/><link name="b"/></robot>'), UrdfError);
+});
+
+test("a shape that cannot be read costs that shape, with a line", () => {
+  const box = "<geometry><box size='1 1 1'/></geometry>";
+  const mesh = (attributes) => `<geometry><mesh filename='package://a/b.stl' ${attributes}/></geometry>`;
+  const shapes = [
+    ["<geometry><capsule radius='1' length='2'/></geometry>", "the shape <capsule> is not known"],
+    [mesh("scale='0.001'"), '"0.001", where 3 numbers are expected'],
+    [`<origin xyz='0,0,1'/>${box}`, '"0,0,1", where 3 numbers are expected'],
+    [`<origin rpy='nan 0 0'/>${box}`, '"nan 0 0", where 3 numbers are expected'],
+    ["<geometry><sphere/></geometry>", "<sphere> without radius or length"],
+    ["<geometry><cylinder radius='x' length='1'/></geometry>", '"x", where 1 numbers are expected'],
+  ];
+  for (const [shape, why] of shapes) {
+    for (const kind of ["visual", "collision"]) {
+      const good = `<visual>${box}</visual>`;
+      const { links, notes } = parseUrdf(
+        `<robot name="r"><link name="a"><${kind}>${shape}</${kind}>${good}</link></robot>`,
+      );
+      assert.deepEqual([links.get("a").visuals.length, links.get("a").collisions.length], [1, 0]);
+      assert.deepEqual(notes, [`link "a": a shape is left out: ${why}`]);
+    }
+  }
+});
+
+test("materials have colors and textures, by name for all links", () => {
+  const visual = (material) => `<visual><geometry><box size='1 1 1'/></geometry>${material}</visual>`;
+  const { links, notes } = parseUrdf(
+    `<robot name="r"><material name="m"><texture filename="package://a/b.png"/></material><link name="a">
+    ${visual('<material name="m"/>')}${visual('<material name="n"><color rgba="1 0 0 1"/></material>')}
+    ${visual('<material name="n"/>')}${visual('<material name="bad"><color rgba="1 0 0"/></material>')}${visual("")}
+    </link></robot>`,
+  );
+  assert.deepEqual(
+    links.get("a").visuals.map(({ color, texture }) => [color, texture]),
+    [
+      [null, "package://a/b.png"],
+      [[1, 0, 0, 1], ""],
+      [[1, 0, 0, 1], ""],
+      [null, ""],
+      [null, ""],
+    ],
+  );
+  assert.deepEqual(notes, []);
+});
+
+test("a range that equals the largest one is left out, as in RViz", () => {
+  const scan = { angle_min: 0, angle_increment: 1, range_min: 1, range_max: 5, intensities: [] };
+  assert.equal(pointsOfScan({ ...scan, ranges: [0.5, 1, 4.999, 5, 6, Infinity, NaN] }).count, 2);
+});
+
+test("files of Wavefront's format have triangles by material, with normals where each corner has one", () => {
+  const text = `mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1
+usemtl red one\nf 1//1 2//1 3//1 4//1\nusemtl blue\nf -4 -3 -2\nf 1/1 2/2 \\\n3/3`;
+  const { parts, libraries } = readObj(text);
+  assert.deepEqual(libraries, ["a.mtl"]);
+  assert.deepEqual(
+    parts.map(({ material, positions, normals }) => [material, positions.length, normals?.length ?? null]),
+    [
+      ["red one", 18, 18],
+      ["blue", 18, null],
+    ],
+  );
+  assert.throws(() => readObj("v 0 0 0\nf 1 2 3"));
+  const found = readMaterials("newmtl red one\nKd 1 0.5 0\nd 0.25\nnewmtl b\nTr 0.25\nnewmtl c\nd -halo 0.5");
+  assert.deepEqual(found.get("red one"), { rgb: [255, 127.5, 0], alpha: 0.25 });
+  assert.deepEqual([found.get("b").alpha, found.get("c").alpha], [0.75, 0.5]);
 });

@@ -44,7 +44,8 @@ export function pointsOfScan({
   let count = 0;
   for (let index = 0; index < ranges.length; index++) {
     const range = ranges[index];
-    if (!(range >= least && range <= most)) continue;
+    // As in laser_geometry, which RViz uses: a range that equals the largest one was not measured.
+    if (!(range >= least && range < most)) continue;
     const angle = first + index * step;
     positions[count * 3] = range * Math.cos(angle);
     positions[count * 3 + 1] = range * Math.sin(angle);
