@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from minirospy.web.dashboard.rviz_file import parse_rviz
 from tests.interop import robot_scene, rviz_pictures
 from tests.interop.browser import PATIENCE, Page
-from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher
 from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
@@ -436,6 +436,31 @@ def test_meshes_keep_their_materials_without_lamps_and_a_bad_shape_is_named(
     end = time.monotonic() + PATIENCE
     while not is_near(colors(page), (204, 26, 26), 3):
         assert time.monotonic() < end
+
+
+def test_display_of_a_topic_that_vanishes_fades_until_it_comes_again(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    publish(served, {"/tf_static": robot_scene.frames()})
+    cube = robot_scene.marker(Marker.CUBE, 0, 0)
+    cube.scale.x = cube.scale.y = cube.scale.z = 3.0
+    cube.color.r, cube.color.g, cube.color.b, cube.color.a = 1.0, 0.0, 1.0, 1.0
+    sender = publisher(served, "/cube", Marker, latch=True)
+    served.run(sender.publish(cube))
+    page = browse(address(served, "3d"))
+    status(page, "Marker /cube", "Messages received")
+    wait_hue(page, (True, False, True))
+
+    served.run(sender.close())
+    status(page, "Marker /cube", "Nothing publishes this topic any more")
+    row = ".display[data-name='Marker /cube']"
+    page.wait(f"return document.querySelector({row!r}).classList.contains('gone')")
+    end = time.monotonic() + PATIENCE
+    while any(min(red, blue) > 150 and green < 60 for red, green, blue in colors(page)):
+        assert time.monotonic() < end
+
+    served.run(publisher(served, "/cube", Marker, latch=True).publish(cube))
+    wait_hue(page, (True, False, True))
+    page.wait(f"return !document.querySelector({row!r}).classList.contains('gone')")
 
 
 RVIZ = """Visualization Manager:

@@ -854,6 +854,7 @@ export const GERMAN = {
   "there is no root link": "es gibt keine Wurzel",
   '"{text}", where {count} numbers are expected': '"{text}", wo {count} Zahlen erwartet werden',
   'link "{link}": a shape is left out: {why}': 'Glied "{link}": eine Form fehlt: {why}',
+  "Nothing publishes this topic any more": "Niemand sendet dieses Topic mehr",
   "the shape <{name}> is not known": "die Form <{name}> ist nicht bekannt",
   "<{name}> without radius or length": "<{name}> ohne Radius oder Länge",
   "{name}: only files of package:// and file:// can be loaded":
