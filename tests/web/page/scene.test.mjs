@@ -4,6 +4,8 @@ import { test } from "node:test";
 
 import { fromHex, hexOf, palette, rgbOf } from "../../../minirospy/web/dashboard/page/js/scene/colors.js";
 import { readMaterials, readObj } from "../../../minirospy/web/dashboard/page/js/scene/obj.js";
+import { Config, readView, writeView } from "../../../minirospy/web/dashboard/page/js/scene/config.js";
+import { classOf, getSetting, setSetting, topicKeyOf } from "../../../minirospy/web/dashboard/page/js/scene/classes.js";
 import { pointsOfScan } from "../../../minirospy/web/dashboard/page/js/scene/points.js";
 import {
   apply,
@@ -178,4 +180,46 @@ usemtl red one\nf 1//1 2//1 3//1 4//1\nusemtl blue\nf -4 -3 -2\nf 1/1 2/2 \\\n3/
   const found = readMaterials("newmtl red one\nKd 1 0.5 0\nd 0.25\nnewmtl b\nTr 0.25\nnewmtl c\nd -halo 0.5");
   assert.deepEqual(found.get("red one"), { rgb: [255, 127.5, 0], alpha: 0.25 });
   assert.deepEqual([found.get("b").alpha, found.get("c").alpha], [0.75, 0.5]);
+});
+
+test("a file of RViz 2 is read, and keeps its names", () => {
+  const topic = (name) => ({
+    Depth: 5,
+    "Durability Policy": "Volatile",
+    "Reliability Policy": "Best Effort",
+    Value: name,
+  });
+  const raw = {
+    "Visualization Manager": {
+      Displays: [
+        { Class: "rviz_default_plugins/LaserScan", Name: "scan", Enabled: true, Topic: topic("/scan") },
+        { Class: "rviz_default_plugins/MarkerArray", Name: "m", Enabled: true, Topic: topic("/markers") },
+        { Class: "rviz_default_plugins/Image", Name: "i", Enabled: true, Topic: topic("/image") },
+        {
+          Class: "rviz_default_plugins/InteractiveMarkers",
+          Name: "im",
+          Enabled: true,
+          "Interactive Markers Namespace": "/marker",
+        },
+        { Class: "rviz_common/Group", Name: "g", Displays: [{ Class: "rviz_default_plugins/Grid", Name: "grid" }] },
+        { Class: "nav2_rviz_plugins/ParticleCloud", Name: "p", Topic: topic("/p") },
+      ],
+      Tools: [{ Class: "rviz_default_plugins/SetGoal", Topic: topic("/goal_pose") }],
+      Views: { Current: { Class: "rviz_default_plugins/TopDownOrtho", Scale: 40, X: 1, Y: 2 } },
+    },
+  };
+  const config = new Config(structuredClone(raw));
+  const [scan, markers, image, interactive] = config.displays().map(({ settings }) => settings);
+  const topicOf = (settings) => getSetting(settings, topicKeyOf(classOf(settings)));
+  assert.deepEqual([scan, markers, image, interactive].map(topicOf), ["/scan", "/markers", "/image", "/marker/update"]);
+  assert.equal("Marker Topic" in markers, false);
+  setSetting(markers, "Marker Topic", "/other");
+  setSetting(interactive, "Update Topic", "/box/update");
+  assert.equal(markers.Topic.Value, "/other");
+  assert.equal(interactive["Interactive Markers Namespace"], "/box");
+  assert.deepEqual(config.unknown(), ["p (nav2_rviz_plugins/ParticleCloud)"]);
+  assert.equal(config.toolTopic("SetGoal", "/x"), "/goal_pose");
+  assert.deepEqual([readView(config.view).kind, readView(config.view).scale], ["top", 40]);
+  writeView(config.view, { ...readView(config.view), kind: "orbit" });
+  assert.equal(config.view.Class, "rviz_default_plugins/Orbit");
 });
