@@ -6,7 +6,7 @@ import { fromHex, hexOf, palette, rgbOf } from "../../../minirospy/web/dashboard
 import { readMaterials, readObj } from "../../../minirospy/web/dashboard/page/js/scene/obj.js";
 import { Config, readView, writeView } from "../../../minirospy/web/dashboard/page/js/scene/config.js";
 import { classOf, getSetting, setSetting, topicKeyOf } from "../../../minirospy/web/dashboard/page/js/scene/classes.js";
-import { pointsOfScan } from "../../../minirospy/web/dashboard/page/js/scene/points.js";
+import { pointsOfCloud, pointsOfScan } from "../../../minirospy/web/dashboard/page/js/scene/points.js";
 import {
   apply,
   compose,
@@ -180,6 +180,20 @@ usemtl red one\nf 1//1 2//1 3//1 4//1\nusemtl blue\nf -4 -3 -2\nf 1/1 2/2 \\\n3/
   const found = readMaterials("newmtl red one\nKd 1 0.5 0\nd 0.25\nnewmtl b\nTr 0.25\nnewmtl c\nd -halo 0.5");
   assert.deepEqual(found.get("red one"), { rgb: [255, 127.5, 0], alpha: 0.25 });
   assert.deepEqual([found.get("b").alpha, found.get("c").alpha], [0.75, 0.5]);
+});
+
+test("an empty cloud is empty, also without fields", () => {
+  const cloud = {
+    width: 0,
+    height: 1,
+    point_step: 0,
+    row_step: 0,
+    fields: [],
+    data: new Uint8Array(),
+    is_bigendian: 0,
+  };
+  assert.equal(pointsOfCloud(cloud, ["rgb"]).count, 0);
+  assert.throws(() => pointsOfCloud({ ...cloud, width: 1 }));
 });
 
 test("a file of RViz 2 is read, and keeps its names", () => {

@@ -78,6 +78,8 @@ export function pointsOfOldCloud({ points, channels }) {
  */
 export function pointsOfCloud(message, wanted = [], stride = 1) {
   const { width, height, point_step: step, data } = message;
+  // Programs leave the fields of an empty cloud out.
+  if (width * height === 0) return { count: 0, total: 0, positions: new Float32Array(), channels: new Map() };
   const fields = new Map(message.fields.map((field) => [field.name, field]));
   for (const name of ["x", "y", "z"]) {
     if (!fields.has(name))
