@@ -295,11 +295,15 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
         # With a certificate this cannot happen, because it identifies the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
-    print(f"Foxglove protocol at {found.websocket[0]}", flush=True)
-    rosbridge = bridge.listeners.get("rosbridge")
-    if rosbridge:
-        found_too = links(addresses, rosbridge.port, encrypted=rosbridge.is_encrypted)
-        print(f"rosbridge at {found_too.websocket[0]}", flush=True)
+    served = {"Foxglove protocol": listener}
+    if rosbridge := bridge.listeners.get("rosbridge"):
+        served["rosbridge"] = rosbridge
+    own = ""
+    if options.access.requires_token:
+        own = f"/?token={options.access.write_token or tokens.read}"
+    for name, each in served.items():
+        [here, *_] = links(addresses, each.port, encrypted=each.is_encrypted).websocket
+        print(f"{name} at {here}{own}", flush=True)
     if not options.access.requires_token:
         print(f"open in Foxglove:   {found.foxglove}")
         print(f"open in Lichtblick: {found.lichtblick}", flush=True)
@@ -308,9 +312,9 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     reached = own_addresses() if is_any else addresses
     remote = links(reached or addresses, listener.port, encrypted=listener.is_encrypted)
     for rights, token in (("read-only", tokens.read), ("read-write", options.access.write_token)):
-        if token:
-            print(f"{rights}: give the front end this address (it has the token in it)")
-            for address in remote.websocket:
+        for name, each in served.items() if token else ():
+            print(f"{rights}, {name}: give the front end this address (it has the token in it)")
+            for address in links(reached or addresses, each.port, encrypted=each.is_encrypted).websocket:
                 print(f"  {address}/?token={token}")
     shown = tokens.read or options.access.write_token
     if sys.stdout.isatty():

@@ -83,6 +83,16 @@ class NodeQueries(Generic[_Key, _Found]):
         finally:
             is_late = True
 
+    def refresh(self, key: _Key) -> None:
+        """Query a key again, whose node may respond otherwise now. Its result is kept until the node has responded.
+
+        ``arrived_late`` is called if the new result differs.
+        """
+        if key in self.found and key not in self.tasks:
+            task = asyncio.ensure_future(self._refresh(key))
+            self.tasks[key] = task
+            task.add_done_callback(partial(self._ended, key))
+
     async def close(self) -> None:
         """Cancel the queries. Idempotent."""
         tasks = list(self.tasks.values())
@@ -109,6 +119,19 @@ class NodeQueries(Generic[_Key, _Found]):
                 self.found[key] = found
                 return True
         return False
+
+    async def _refresh(self, key: _Key) -> None:
+        async with self._again:
+            try:
+                found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
+            except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
+                return  # the master removes the key if the node is gone
+            except Exception as error:  # noqa: BLE001 - of one node: its result is kept
+                self._reporter.report(error)
+                return
+            if key in self._present and self.found.get(key) != found:
+                self.found[key] = found
+                self._arrived_late()
 
     def _ended(self, key: _Key, _: object) -> None:
         self.tasks.pop(key, None)

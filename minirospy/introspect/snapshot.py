@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Changes", "Snapshot", "compare", "fetch"]
+__all__ = ["Changes", "Snapshot", "compare", "fetch", "moved"]
 
 Table = Mapping[str, tuple[str, ...]]
 
@@ -74,6 +74,20 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
         tuple(sorted(left)),
         tuple(sorted(before.services.keys() - after.services.keys())),
     )
+
+
+def moved(before: Table, after: Table) -> list[str]:
+    """Return names in both tables that have moved behind others. The master appends what is registered again."""
+    found: dict[str, None] = {}
+    rest = iter(name for name in before if name in after)
+    for name in after:
+        if name not in before or name in found:
+            continue
+        for other in rest:
+            if other == name:
+                break
+            found[other] = None
+    return [*found]
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:

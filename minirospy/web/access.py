@@ -56,10 +56,14 @@ class Grant(Enum):
 
 
 class Refusal(NamedTuple):
-    """The reason why a request is refused: the HTTP status, and one line for the user."""
+    """The reason why a request is refused: the HTTP status, and one line for the user.
+
+    ``names_option``: the text names an option for the owner of the bridge, who reads it only in the bridge's terminal.
+    """
 
     status: int
     text: str
+    names_option: bool = False
 
 
 class Credentials(NamedTuple):
@@ -91,6 +95,7 @@ class Access:
     ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns for pages that may
     connect in addition to those from this machine and the front ends. A token is "" if there is none. ``requires_token``
     is set for a listener that is not on loopback. ``default_is_read``: clients that need no token have read-only access.
+    ``file_option``: the option that lets pages of files connect, for the text of the refusal.
     """
 
     hosts: tuple[str, ...] = ()
@@ -99,6 +104,7 @@ class Access:
     write_token: str = ""
     requires_token: bool = False
     default_is_read: bool = False
+    file_option: str = "--origin null"
 
     def __post_init__(self) -> None:
         for token in (self.read_token, self.write_token):
@@ -121,10 +127,7 @@ class Access:
         if self.requires_token:
             return Refusal(401, "a token is required: the bridge prints it when it starts")
         if not self._knows_origin(request.origin, request.host):
-            return Refusal(
-                403,
-                f"pages of '{(request.origin or '')[:100]}' may not connect: start the bridge with --origin PATTERN",
-            )
+            return Refusal(403, self._origin_text(request.origin or ""), names_option=True)
         return Grant.READ if self.default_is_read else Grant.WRITE
 
     def check_host(self, host: str) -> Refusal | None:
@@ -135,7 +138,16 @@ class Access:
             403,
             f"Host '{host[:100]}' is not a name of this server: use its address, or start the bridge with "
             "--host-name NAME",
+            names_option=True,
         )
+
+    def _origin_text(self, origin: str) -> str:
+        if origin == "null":
+            return (
+                "a page that was opened from a file (Origin: null) may not connect: start the bridge with "
+                f"{self.file_option}"
+            )
+        return f"pages of '{origin[:100]}' may not connect: start the bridge with --origin PATTERN"
 
     def _grant_of(self, token: str) -> Grant | None:
         given = token.encode()

@@ -17,6 +17,7 @@ from minirospy.base.closing import close_all
 from minirospy.base.environment import DISTRO
 from minirospy.base.errors import BridgeError, ROSInterruptException
 from minirospy.introspect.snapshot import fetch
+from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.web.access import Access
 from minirospy.web.foxglove.assets import ALLOWED, Assets
 from minirospy.web.foxglove.endpoint import CAPABILITIES, FoxgloveEndpoint, FoxgloveOptions
@@ -124,6 +125,7 @@ class Bridge:
             self._beside.append(client_topics)
         self._extras = extras or Extras()
         self._account = Account(self.options.limits.memory)
+        self._refusals = RateLimitedLogger(node.log)  # refused clients that an option would admit
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -163,6 +165,7 @@ class Bridge:
             public_pages=public,
             tls=tls,
             account=self._account,
+            warn=lambda text: self._refusals.warning("refused: %s", text),
         )
         while True:
             try:

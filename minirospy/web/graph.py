@@ -15,15 +15,21 @@ from dataclasses import dataclass, field
 from minirospy.aio.node import Node
 from minirospy.aio.raw import RawSubscription, call_raw, raw_class, service_header
 from minirospy.aio.tasks import ErrorReporter, keep_running
-from minirospy.aio.topics import Publisher
-from minirospy.base.errors import BridgeError, MasterUnreachableError, RpcError, ServiceException
+from minirospy.aio.topics import JOIN_SECONDS, Publisher
+from minirospy.base.errors import (
+    BridgeError,
+    HandshakeRefused,
+    MasterUnreachableError,
+    RpcError,
+    ServiceException,
+)
 from minirospy.base.name_filter import NameFilter
 from minirospy.core.idl.protocols import Message
 from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.introspect.node_queries import NodeQueries
-from minirospy.introspect.snapshot import Changes, Snapshot, compare, fetch
+from minirospy.introspect.snapshot import Changes, Snapshot, compare, fetch, moved
 from minirospy.introspect.type_texts import ServiceInfo, TypeTexts, described
 
 __all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", "TopicListener"]
@@ -39,6 +45,7 @@ _MAX_WAITING = 32_000_000
 Above this limit, only the newest message per topic is queued.
 """
 
+CHECK_SECONDS = 2.0  # between checks of a known service's type; a check is one connection
 _QUERY_SECONDS = 2.0
 """Seconds to wait for service types; after that, report the graph without the types that are still unknown."""
 
@@ -62,6 +69,8 @@ class Arrival:
     nanoseconds: int
 
 
+ServiceKey = tuple[str, tuple[str, ...]]
+"""A service's name, and the nodes that offer it."""
 TopicListener = Callable[[Arrival], object]
 GraphListener = Callable[[Changes], object]
 
@@ -78,6 +87,7 @@ class SharedTopic:
         # The last message of each publisher, keyed by the id of its connection header, which is one object per connection.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
+        self._has_connected = asyncio.Event()  # set when a publisher has connected; a wait clears it
 
     @property
     def headers(self) -> list[Header]:
@@ -92,7 +102,10 @@ class SharedTopic:
     def add(self, listener: TopicListener) -> None:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
-            self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
+            self._subscription = self._graph.node.subscribe_raw(
+                self.topic, self._deliver, on_change=self._has_connected.set
+            )
+            self._graph.subscribed_own(self.topic)
         # While an unsubscription is in progress, the connections are open, and would not deliver the latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
@@ -103,6 +116,17 @@ class SharedTopic:
         """Stop calling ``listener``."""
         with contextlib.suppress(ValueError):
             self._listeners.remove(listener)
+
+    async def wait_for_publisher(self, name: str) -> None:
+        """Wait until the node ``name`` has connected as a publisher, or the topic has no listeners. At most a second."""
+
+        async def connected() -> None:
+            while self.is_wanted and not any(header.get("callerid") == name for header in self.headers):
+                self._has_connected.clear()
+                await self._has_connected.wait()
+
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(connected(), JOIN_SECONDS)
 
     async def close(self) -> None:
         """Unsubscribe."""
@@ -230,7 +254,12 @@ class SharedGraph:
         self._reporter = ErrorReporter(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
         self.tasks: set[asyncio.Task[None]] = set()
-        self._has_new_types = False
+        self._service_infos: dict[ServiceKey, ServiceInfo] = {}  # the types at the last refresh
+        self._service_order: tuple[
+            ServiceKey, ...
+        ] = ()  # the services at the last refresh, in the master's order
+        self._check_after = 0.0  # time of the loop at which the type of another known service is checked
+        self._unchecked: list[ServiceKey] = []  # services whose types are still to be checked in this round
         self._service_types = NodeQueries(
             self._service_type,
             ErrorReporter(_log, "the query for a service's type"),
@@ -287,7 +316,9 @@ class SharedGraph:
             before, self.snapshot = self.snapshot, after
             changes = compare(before, after)
             is_first, self._is_first_look = self._is_first_look, False
-            has_types, self._has_new_types = self._has_new_types, False
+            infos = dict(self._service_types.found)
+            has_types = infos != self._service_infos
+            self._service_infos = infos
             if changes or is_first or has_types or before.types != after.types:
                 for listener in tuple(self._listeners):
                     try:
@@ -326,12 +357,34 @@ class SharedGraph:
     async def _look_up_services(self, found: Snapshot) -> None:
         """Query the nodes of new services for the services' types, because the master does not store them."""
         wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
+        self._check_known_services(dict(wanted))
         await self._service_types.look(wanted, _QUERY_SECONDS)
 
-    async def _service_type(self, key: tuple[str, tuple[str, ...]]) -> ServiceInfo:
-        found = described(key[0], await service_header(self.node, key[0]))
-        self._has_new_types = True
-        return found
+    def _check_known_services(self, wanted: dict[ServiceKey, None]) -> None:
+        """Query types again that may have changed: a node can offer a service again with another type between two refreshes.
+
+        The master then appends the service to its list, which shows unless it is the last one. So one service is also
+        checked every few seconds, in turn.
+        """
+        for name in moved(dict(self._service_order), dict(wanted)):
+            self._service_types.refresh((name, self.snapshot.services.get(name, ())))
+        self._service_order = (*wanted,)
+
+        now = asyncio.get_running_loop().time()
+        if now < self._check_after:
+            return
+        self._check_after = now + CHECK_SECONDS
+        self._unchecked = [key for key in self._unchecked if key in wanted] or [*wanted]
+        if self._unchecked:
+            # The last service in the master's list first: a change of the others shows.
+            self._service_types.refresh(self._unchecked.pop())
+
+    def check_service(self, service: str) -> None:
+        """Query a service's type again, because a call shows that it has changed."""
+        self._service_types.refresh((service, self.snapshot.services.get(service, ())))
+
+    async def _service_type(self, key: ServiceKey) -> ServiceInfo:
+        return described(key[0], await service_header(self.node, key[0]))
 
     # --- topics
 
@@ -370,13 +423,32 @@ class SharedGraph:
             if known not in (None, ANY, type_.name):
                 raise BridgeError(f"topic [{topic}] is of type [{known}], not [{type_.name}]")
             publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
-            joining = self.spawn(publisher.wait_for_expected())
-            shared = self.publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
+            shared = self.publishers[topic] = _SharedPublisher(type_, latch, publisher)
+            shared.joining = self.spawn(self._join(topic, shared))
             self.refresh_soon()
         elif shared.type.md5sum != type_.md5sum:
             raise BridgeError(f"topic [{topic}] is published as [{shared.type.name}] by another client")
         shared.clients += 1
         return Publication(self, topic, shared)
+
+    def subscribed_own(self, topic: str) -> None:
+        """Let the messages of this node's publisher wait for this node's own subscription, which was just created."""
+        shared = self.publishers.get(topic)
+        if shared:
+            shared.joining = self.spawn(self._join_own(topic, shared.joining))
+
+    async def _join(self, topic: str, shared: _SharedPublisher) -> None:
+        """Wait until the subscribers that the master listed, and this node's own subscription, are connected."""
+        await shared.publisher.wait_for_expected()
+        await self._join_own(topic)
+
+    async def _join_own(self, topic: str, before: asyncio.Task[None] | None = None) -> None:
+        """Wait for ``before``, then until this node's own subscription is connected."""
+        if before:
+            await asyncio.wait([before])
+        own = self.topics.get(topic)
+        if own and own.is_wanted:
+            await own.wait_for_publisher(self.node.name)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
         """Unadvertise a topic after the last client that publishes it has left."""
@@ -395,7 +467,12 @@ class SharedGraph:
         """
         if not self.filters.services(service):
             raise BridgeError(f"service [{service}] may not be called by clients")
-        return await call_raw(self.node, service, md5sum, request)
+        try:
+            return await call_raw(self.node, service, md5sum, request)
+        except ServiceException as error:
+            if isinstance(error.__cause__, HandshakeRefused):
+                self.check_service(service)
+            raise
 
     def spawn(self, work: Coroutine[object, object, object]) -> asyncio.Task[None]:
         """Run a coroutine as a task until :meth:`close`; log its exception."""

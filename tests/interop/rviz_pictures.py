@@ -50,6 +50,84 @@ for _a, _b, _c in ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)):
     STL += struct.pack("<12f", 0, 0, 0, *_CORNERS[_a], *_CORNERS[_b], *_CORNERS[_c]) + b"\0\0"
 """A pyramid, 0.4 m high."""
 
+_SIDES = (
+    ((1, 0, 0), ((1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1))),
+    ((-1, 0, 0), ((-1, 1, -1), (-1, -1, -1), (-1, -1, 1), (-1, 1, 1))),
+    ((0, 1, 0), ((1, 1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, 1))),
+    ((0, -1, 0), ((-1, -1, -1), (1, -1, -1), (1, -1, 1), (-1, -1, 1))),
+    ((0, 0, 1), ((-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1))),
+    ((0, 0, -1), ((-1, 1, -1), (1, 1, -1), (1, -1, -1), (-1, -1, -1))),
+)
+"""Normals and corners of the sides of a box, against the clock."""
+
+
+def _box(x: float, half: float) -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
+    """Yield the corners and normals of the triangles of a box on the ground."""
+    for normal, corners in _SIDES:
+        for at in (0, 1, 2, 0, 2, 3):
+            corner = corners[at]
+            yield (x + corner[0] * half, corner[1] * half, (corner[2] + 1) * half), normal
+
+
+def collada(materials: tuple[str, str] = ("red", "")) -> str:
+    """Return a Collada file: two boxes, by default a red one and one without a material, a lamp and a camera."""
+    geometries, nodes = [], []
+    for name, x, material in (("a", -0.2, materials[0]), ("b", 0.2, materials[1])):
+        triangles = [*_box(x, 0.15)]
+        sources = "".join(
+            f'<source id="{name}{kind}"><float_array id="{name}{kind}a" count="{len(values) * 3}">'
+            f"{' '.join(f'{part:g}' for value in values for part in value)}</float_array><technique_common>"
+            f'<accessor source="#{name}{kind}a" count="{len(values)}" stride="3"><param name="X" type="float"/>'
+            '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
+            for kind, values in (("p", [c for c, _ in triangles]), ("n", [n for _, n in triangles]))
+        )
+        symbol = f' material="{material}"' if material else ""
+        numbers = " ".join(f"{at} {at}" for at in range(len(triangles)))
+        geometries.append(
+            f'<geometry id="{name}"><mesh>{sources}<vertices id="{name}v"><input semantic="POSITION" source="#{name}p"/>'
+            f'</vertices><triangles count="{len(triangles) // 3}"{symbol}><input semantic="VERTEX" source="#{name}v" offset="0"/>'
+            f'<input semantic="NORMAL" source="#{name}n" offset="1"/><p>{numbers}</p></triangles></mesh></geometry>'
+        )
+        bound = (
+            f'<bind_material><technique_common><instance_material symbol="{material}" target="#{material}"/>'
+            "</technique_common></bind_material>"
+            if material
+            else ""
+        )
+        nodes.append(
+            f'<node id="n{name}"><instance_geometry url="#{name}">{bound}</instance_geometry></node>'
+        )
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>'
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+        '<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>'
+        '<library_lights><light id="lamp"><technique_common><point><color>9 9 9</color></point></technique_common></light>'
+        '</library_lights><library_cameras><camera id="eye"><optics><technique_common><perspective><xfov>50</xfov>'
+        "<znear>0.1</znear><zfar>10</zfar></perspective></technique_common></optics></camera></library_cameras>"
+        + (
+            '<library_effects><effect id="e"><profile_COMMON><technique sid="t"><lambert><diffuse><color>0.8 0.1 0.1 1</color>'
+            "</diffuse></lambert></technique></profile_COMMON></effect></library_effects>"
+            if any(materials)
+            else ""
+        )
+        + (
+            '<library_materials><material id="red"><instance_effect url="#e"/></material></library_materials>'
+            if any(materials)
+            else ""
+        )
+        + f"<library_geometries>{''.join(geometries)}</library_geometries>"
+        f'<library_visual_scenes><visual_scene id="vs">{"".join(nodes)}<node id="l"><translate>0 0 1</translate>'
+        '<instance_light url="#lamp"/></node><node id="c"><instance_camera url="#eye"/></node></visual_scene>'
+        '</library_visual_scenes><scene><instance_visual_scene url="#vs"/></scene></COLLADA>'
+    )
+
+
+OBJ = "mtllib part.mtl\nusemtl leaf\n" + "".join(
+    f"v {' '.join(map(str, corner))}\nvn {' '.join(map(str, normal))}\n" for corner, normal in _box(0, 0.15)
+)
+OBJ += "".join(f"f {at}//{at} {at + 1}//{at + 1} {at + 2}//{at + 2}\n" for at in range(1, 37, 3))
+MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.7 0.2\nKs 0 0 0\nd 1\n"
+
 
 def display(cls: str, topic: str = "", **settings: object) -> Settings:
     """Return a display. Settings that are not given keep each program's default."""
@@ -169,10 +247,64 @@ def messages() -> dict[str, Any]:
         **found,
         **depth_camera(),
         "/shapes": shapes(),
+        "/mesh_markers": mesh_markers(),
         "/old_cloud": _old_cloud(),
         "/posed": _posed_path(),
         "/cells": _cells(),
     }
+
+
+def mesh_markers() -> MarkerArray:
+    """Return markers of one mesh: in their own color, in the mesh's colors, in both, and transparent."""
+    found = []
+    for index, (own, color) in enumerate(
+        (
+            (False, (0.2, 0.4, 0.9, 1.0)),
+            (True, (0.0, 0.0, 0.0, 0.0)),
+            (True, (0.2, 0.4, 0.9, 1.0)),
+            (True, (1.0, 1.0, 1.0, 0.5)),
+            (True, (1.0, 1.0, 1.0, 0.2)),
+            (False, (0.2, 0.9, 0.4, 0.5)),
+        )
+    ):
+        each = mesh(-2.4 + 0.9 * index, 1.2, "two.dae", mesh_use_embedded_materials=own)
+        each.id, each.ns = 200 + index, "meshes"
+        each.color.r, each.color.g, each.color.b, each.color.a = color
+        found.append(each)
+    return MarkerArray(found)
+
+
+def mesh_robot() -> str:
+    """Return a robot of meshes, with and without materials, and a textured box."""
+    blue = '<material name="blue"><color rgba="0.2 0.4 0.9 1"/></material>'
+    files = "".join(
+        f'<visual><origin xyz="{x} {y} 0"/><geometry><mesh filename="package://rviz_meshes/{uri}"/></geometry>{material}</visual>'
+        for x, y, uri, material in (
+            (-2, -0.6, "two.dae", ""),
+            (-1, -0.6, "two.dae", blue),
+            (0, -0.6, "leaf.obj", blue),
+            (1, -0.6, "part.stl", blue),
+            (-2, -1.6, "none.dae", ""),
+            (-1, -1.6, "none.dae", blue),
+            (0, -1.6, "bare.obj", blue),
+            (0.6, -1.6, "bare.obj", ""),
+        )
+    )
+    texture = '<material name="squares"><texture filename="package://rviz_meshes/squares.png"/></material>'
+    box = '<box size="0.3 0.3 0.3"/>'
+    stl = '<mesh filename="package://rviz_meshes/part.stl"/>'
+    links, joints = [f'<link name="map">{files}</link>'], []
+    for frame, shape, material in (
+        ("odom", box, ""),
+        ("base_link", stl, ""),
+        ("mast", box, texture),
+        ("laser", box, blue),
+    ):
+        links.append(f'<link name="{frame}"><visual><geometry>{shape}</geometry>{material}</visual></link>')
+        joints.append(
+            f'<joint name="to_{frame}" type="fixed"><parent link="map"/><child link="{frame}"/></joint>'
+        )
+    return f'<robot name="meshes">{"".join(links + joints)}</robot>'
 
 
 def description() -> str:
@@ -231,6 +363,10 @@ SCENES: dict[str, tuple[list[Settings], Settings]] = {
             {**display("Path", "/posed", Pose_Style="Axes"), "Name": "axes"},
         ],
         orbit(8, x=-0.5, y=0.5, yaw=-1.2, pitch=0.8),
+    ),
+    "meshes": (
+        [display("RobotModel", Robot_Description="mesh_robot"), display("MarkerArray", "/mesh_markers")],
+        orbit(4.4, x=0, y=0.1, yaw=-1.2, pitch=0.7),
     ),
     "depth": (
         [
@@ -387,6 +523,15 @@ def prepare(folder: Path) -> None:
         encoding="utf-8",
     )
     (package / "part.stl").write_bytes(STL)
+    (package / "two.dae").write_text(collada(), encoding="utf-8")
+    squares = Image.new("RGB", (4, 4), (240, 220, 40))
+    squares.paste((30, 160, 60), (0, 0, 2, 2))
+    squares.paste((160, 40, 160), (2, 2, 4, 4))
+    squares.resize((64, 64), Image.Resampling.NEAREST).save(package / "squares.png")
+    (package / "none.dae").write_text(collada(("", "")), encoding="utf-8")
+    (package / "bare.obj").write_text(OBJ.partition("v ")[1] + OBJ.partition("v ")[2], encoding="utf-8")
+    (package / "leaf.obj").write_text(OBJ, encoding="utf-8")
+    (package / "part.mtl").write_text(MTL, encoding="utf-8")
 
 
 def publish(served: Served, all_messages: Mapping[str, Any]) -> None:
@@ -395,6 +540,7 @@ def publish(served: Served, all_messages: Mapping[str, Any]) -> None:
 
     async def run() -> None:
         await node.set_param("/robot_description", description())
+        await node.set_param("/mesh_robot", mesh_robot())
         for topic, message in all_messages.items():
             publisher = await node.advertise(topic, type(message), latch=True)
             await publisher.publish(message)

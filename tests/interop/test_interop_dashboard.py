@@ -1228,6 +1228,44 @@ def test_image_is_zoomed_and_its_depths_are_scaled(
 
 
 @needs_chromium
+def test_compressed_depths_are_shown_in_the_colors_of_a_map(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    import numpy as np
+    from sensor_msgs.msg import CompressedImage, Image
+
+    from minirospy.ros.cv_bridge.cv_bridge.core import CvBridge
+    from minirospy.ros.image_transport.codecs import Settings, compressed, compressed_depth
+
+    served = serve()
+    bridge = CvBridge()
+    metres = bridge.cv2_to_imgmsg(np.array([[1.0, 2.0, np.nan, 5.0]], np.float32), "32FC1")
+    deep = bridge.cv2_to_imgmsg(np.array([[1, 300, 40_000, 65_535]], np.uint16), "16UC1")
+    yuyv = Image(height=1, width=2, encoding="yuv422_yuy2", step=4, data=bytes([81, 90, 81, 240]))
+    for topic, message in (
+        ("/metres/compressedDepth", compressed_depth(metres, Settings())),
+        ("/deep/compressed", compressed(deep, Settings(format="png"))),
+        ("/yuyv", yuyv),
+    ):
+        class_ = Image if topic == "/yuyv" else CompressedImage
+        served.run(publisher(served, topic, class_, latch=True).publish(message))
+
+    page = browse(address(served, "image?topic=/metres/compressedDepth&colors=turbo&low=1&high=5"))
+    colors = "[...document.querySelector('canvas').getContext('2d').getImageData(0, 0, 4, 1).data]"
+    page.wait(
+        f"return {colors}.slice(0, 3).join() === '48,18,59' && {colors}.slice(12, 15).join() === '122,4,3'"
+    )
+    assert page.evaluate(f"{colors}.slice(8, 11)") == [20, 24, 60]  # nothing is measured there
+    page.choose("select[aria-label='Colors of the numbers']", "gray")
+    page.wait(f"return {colors}.slice(0, 3).join() === '0,0,0' && {colors}[12] === 255")
+
+    page.open(address(served, "image?topic=/deep/compressed"))
+    page.wait(f"return {colors}[0] === 0 && {colors}[4] === 1 && {colors}[8] === 156 && {colors}[12] === 255")
+    page.open(address(served, "image?topic=/yuyv"))
+    page.wait(f"const c = {colors}; return c[0] > 250 && c[1] < 5 && c[2] < 5")
+
+
+@needs_chromium
 def test_markers_are_drawn_over_the_image(serve: Callable[..., Served], browse: Callable[..., Page]) -> None:
     import rospy
     from geometry_msgs.msg import Point

@@ -16,9 +16,9 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy.web.dashboard.rviz_file import parse_rviz
-from tests.interop import robot_scene
+from tests.interop import robot_scene, rviz_pictures
 from tests.interop.browser import PATIENCE, Page
-from tests.interop.test_interop_dashboard import address, browse, needs_chromium
+from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher
 from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
@@ -411,6 +411,56 @@ def test_collada_meshes_have_their_colors_and_unit(
     page.click(".tools button", "Focus")
     drag(page, (-0.7 * metre, 0), (-0.7 * metre, 0))
     page.wait_text("[role=status]", "(-0.70, 0.00, 0.70)")
+
+
+def test_meshes_keep_their_materials_without_lamps_and_a_bad_shape_is_named(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rviz_pictures.prepare(tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    uri = (tmp_path / "rviz_meshes" / "two.dae").as_uri()
+    visual = (
+        f'<visual><geometry><mesh filename="{uri}" scale="4 4 4"/></geometry>'
+        '<material name="blue"><color rgba="0 0 1 1"/></material></visual>'
+        '<visual><geometry><capsule radius="1" length="1"/></geometry></visual>'
+    )
+    text = f'<robot name="r"><!-- a -- b --><link name="map">{visual}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+    publish(served, {"/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    status(page, "RobotModel", "a shape is left out: the shape <capsule> is not known")
+    status(page, "RobotModel", "'--' is not allowed inside a comment")
+    look_down(page)
+    # The color of the file is 0.8 0.1 0.1, seen from above: neither that of the description, nor that in the lamp's light.
+    end = time.monotonic() + PATIENCE
+    while not is_near(colors(page), (204, 26, 26), 3):
+        assert time.monotonic() < end
+
+
+def test_display_of_a_topic_that_vanishes_fades_until_it_comes_again(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    publish(served, {"/tf_static": robot_scene.frames()})
+    cube = robot_scene.marker(Marker.CUBE, 0, 0)
+    cube.scale.x = cube.scale.y = cube.scale.z = 3.0
+    cube.color.r, cube.color.g, cube.color.b, cube.color.a = 1.0, 0.0, 1.0, 1.0
+    sender = publisher(served, "/cube", Marker, latch=True)
+    served.run(sender.publish(cube))
+    page = browse(address(served, "3d"))
+    status(page, "Marker /cube", "Messages received")
+    wait_hue(page, (True, False, True))
+
+    served.run(sender.close())
+    status(page, "Marker /cube", "Nothing publishes this topic any more")
+    row = ".display[data-name='Marker /cube']"
+    page.wait(f"return document.querySelector({row!r}).classList.contains('gone')")
+    end = time.monotonic() + PATIENCE
+    while any(min(red, blue) > 150 and green < 60 for red, green, blue in colors(page)):
+        assert time.monotonic() < end
+
+    served.run(publisher(served, "/cube", Marker, latch=True).publish(cube))
+    wait_hue(page, (True, False, True))
+    page.wait(f"return !document.querySelector({row!r}).classList.contains('gone')")
 
 
 RVIZ = """Visualization Manager:

@@ -50,7 +50,9 @@ def share_of_others(one: Image.Image, other: Image.Image) -> float:
     return sum(any(abs(a - b) > ALIKE for a, b in zip(*pair, strict=True)) for pair in pairs) / len(pairs)  # type: ignore[arg-type]
 
 
-def test_markers_have_the_places_sizes_and_colors_of_rviz(
+@pytest.mark.parametrize("scene", ["markers", "meshes"])
+def test_bodies_have_the_places_sizes_and_colors_of_rviz(
+    scene: str,
     serve: Callable[..., Served],
     browse: Callable[..., Page],
     tmp_path: Path,
@@ -64,7 +66,7 @@ def test_markers_have_the_places_sizes_and_colors_of_rviz(
     assert served.dashboard
     rviz_pictures.publish(served, rviz_pictures.messages())
     file = tmp_path / "scene.rviz"
-    rviz_pictures.write_file(file, "markers")
+    rviz_pictures.write_file(file, scene)
     rviz = Rviz(file, tmp_path)
     request.addfinalizer(rviz.close)
     served.dashboard.rviz.file = file

@@ -239,3 +239,26 @@ def test_a_service_that_cannot_be_reached_is_not_reported(caplog: pytest.LogCapt
 
     asyncio.run(asyncio.wait_for(run(), LIMIT))
     assert not caplog.text
+
+
+def test_a_refreshed_key_keeps_its_result_until_a_new_one_arrives() -> None:
+    async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
+        await queries.look(["a"], LIMIT)
+        queries.refresh("unknown")
+        queries.refresh("a")
+        await until(lambda: not queries.tasks)
+        assert not nodes.came_late.is_set()  # nothing has changed
+
+        nodes.dead.add("a")
+        queries.refresh("a")
+        await until(lambda: not queries.tasks)
+        assert queries.found == {"a": "A"}
+
+        nodes.dead.clear()
+        queries.found["a"] = "old"
+        queries.refresh("a")
+        assert queries.found == {"a": "old"}
+        await nodes.came_late.wait()
+        assert queries.found == {"a": "A"}
+
+    queried(scene)

@@ -85,14 +85,15 @@ def test_page_of_the_server_itself_is_accepted(scheme: str) -> None:
 
 def test_refusals_name_the_reason_in_one_line() -> None:
     assert Access().check(request(origin="https://" + "x" * 200)) == Refusal(
-        403, f"pages of 'https://{'x' * 92}' may not connect: start the bridge with --origin PATTERN"
+        403, f"pages of 'https://{'x' * 92}' may not connect: start the bridge with --origin PATTERN", True
     )
     assert Access().check(request(origin="")) == Refusal(
-        403, "pages of '' may not connect: start the bridge with --origin PATTERN"
+        403, "pages of '' may not connect: start the bridge with --origin PATTERN", True
     )
     assert Access().check(request("y" * 200)) == Refusal(
         403,
         f"Host '{'y' * 100}' is not a name of this server: use its address, or start the bridge with --host-name NAME",
+        True,
     )
     assert GUARDED.check(request()) == Refusal(
         401, "a token is required: the bridge prints it when it starts"
@@ -140,6 +141,15 @@ def test_tokens_are_random_and_have_their_form() -> None:
 def test_list_in_a_header_has_its_items() -> None:
     assert header_items({"x": "a, b ,,c"}, "x") == ["a", "b", "c"]
     assert header_items({}, "x") == []
+
+
+def test_page_of_a_file_is_refused_with_the_option_that_admits_it() -> None:
+    text = "a page that was opened from a file (Origin: null) may not connect: start the bridge with --origin null"
+    assert Access().check(request(origin="null")) == Refusal(403, text, True)
+    assert Access(origins=("null",)).check(request(origin="null")) is Grant.WRITE
+    refusal = Access(file_option="websocket_null_origin:=true").check(request(origin="null"))
+    assert isinstance(refusal, Refusal)
+    assert refusal.text.endswith("start the bridge with websocket_null_origin:=true")
 
 
 def test_configured_origins_are_accepted() -> None:

@@ -100,9 +100,12 @@ def test_listening_bridge_requires_the_token_that_it_prints(
     port = process.port
     with pytest.raises(InvalidStatus):
         Client(port)
-    process.line("read-write:")
-    process.line("read-only:")
-    for line in [process.lines[process.lines.index(process.line(kind)) + 1] for kind in ("read-only:",)]:
+    process.line("read-write, rosbridge:")
+    # Every address that is printed has its token, also those of rosbridge.
+    printed = [line for line in process.lines if "ws://" in line]
+    assert len(printed) == 5
+    assert all("/?token=" in line for line in printed)
+    for line in [process.lines[process.lines.index(process.line("read-only, Foxglove protocol:")) + 1]]:
         found = re.search(r"ws://\S+/\?token=(\S+)$", line)
         assert found
         client = Client(port, path=f"/?token={found[1]}")
@@ -278,7 +281,12 @@ def test_links_with_a_token_do_not_name_localhost(
     if not words:
         monkeypatch.setenv("MINIROSPY_BRIDGE_TOKEN", "right-token-000")
     process = start("bridge", "--port", "0", *words)
-    assert process.line("/?token=") == f"  ws://127.0.0.1:{process.port}/?token=right-token-000"
+    process.line("read-write, rosbridge:")
+    local = f"ws://127.0.0.1:{process.port}/?token=right-token-000"
+    assert [line for line in process.lines if str(process.port) in line][:2] == [
+        f"Foxglove protocol at {local}",
+        f"  {local}",
+    ]
     assert not [line for line in process.lines if "localhost" in line]
 
 

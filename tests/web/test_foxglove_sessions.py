@@ -332,6 +332,9 @@ def test_assets_are_read_from_known_packages_alone(
     client = run_bridge().client()
     client.send(op="fetchAsset", uri="package://arm/meshes/a%20b.stl", requestId=1)
     assert client.next_binary(4) == struct.pack("<BIBI", 4, 1, 0, 0) + b"solid"
+    # What xacro makes of file://$(find arm)/meshes.
+    client.send(op="fetchAsset", uri=(package / "meshes" / "a b.stl").as_uri(), requestId=2)
+    assert client.next_binary(4) == struct.pack("<BIBI", 4, 2, 0, 0) + b"solid"
     for number, uri in enumerate(
         (
             "package://arm/../secret.stl",
@@ -341,6 +344,13 @@ def test_assets_are_read_from_known_packages_alone(
             "package://arm/none.stl",
             "package://no_such_package/a.stl",
             "file:///etc/passwd",
+            (tmp_path / "secret.stl").as_uri(),
+            (package / "meshes" / "link.stl").as_uri(),
+            (package / "run.sh").as_uri(),
+            f"{package.as_uri()}/../../secret.stl",
+            f"{package.as_uri()}/%2e%2e/%2e%2e/secret.stl",
+            "file://arm/meshes/a.stl",
+            "file://",
             "https://example.org/a.stl",
         )
     ):

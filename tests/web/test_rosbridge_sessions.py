@@ -16,6 +16,7 @@ from unittest.mock import Mock
 
 import cbor2
 import pytest
+from actionlib_tutorials.msg import FibonacciAction
 from geometry_msgs.msg import PoseStamped
 from rosbridge_msgs.msg import ConnectedClients
 from sensor_msgs.msg import Image, LaserScan
@@ -29,9 +30,10 @@ from minirospy.aio.services import Service
 from minirospy.base.errors import ServiceException
 from minirospy.base.name_filter import NameFilter
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.ros.actionlib.actionlib.aio import ActionServer, GoalError
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
-from minirospy.web.rosbridge import png, protocol, shared
+from minirospy.web.rosbridge import client_actions, png, protocol, shared
 from minirospy.web.rosbridge.shared import RosbridgeOptions
 from tests.waiting import until, wait_until
 
@@ -445,6 +447,22 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
     bridge.run(asyncio.wait_for(unadvertised(), 30))
 
 
+@pytest.mark.parametrize("first", ["advertise", "subscribe"])
+def test_a_clients_first_message_reaches_its_own_subscription(bridge: Running, first: str) -> None:
+    """The topic is used before, so that its publisher or its connection may still exist."""
+    client = bridge.rosbridge()
+    second = "subscribe" if first == "advertise" else "advertise"
+    for number in range(12):
+        for op in (first, second):
+            client.send(op=op, topic="/own", type="std_msgs/Int32", id="a")
+        client.send(op="publish", topic="/own", msg={"data": number})
+        client.send(op="publish", topic="/own", msg={"data": -number})
+        assert client.next("publish")["msg"] == {"data": number}
+        assert client.next("publish")["msg"] == {"data": -number}
+        client.send(op="unsubscribe", topic="/own", id="a")
+        client.send(op="unadvertise", topic="/own", id="a")
+
+
 # --- refusals
 
 
@@ -606,6 +624,105 @@ def test_service_is_called_with_a_dict_or_a_list(bridge: Running) -> None:
     assert wrong["values"] == (
         "std_srvs/SetBoolRequest message requires a bool for field data, but got a <class 'int'>"
     )
+
+
+def fibonacci_server(bridge: Running) -> Any:
+    """Start an action server that adds the numbers up to the goal's order; it aborts orders above 20."""
+
+    async def execute(goal: Any) -> dict[str, Any]:
+        if goal.request.order > 20:
+            raise GoalError("too large", {"sequence": [1]})
+        await goal.publish_feedback(sequence=[0])
+        if not goal.request.order:
+            await asyncio.Event().wait()
+        return {"sequence": [*range(goal.request.order)]}
+
+    async def serve() -> Any:
+        node = Node("actions", rosout=False)
+        await node.start()
+        bridge.nodes.append(node)
+        server: Any = ActionServer(node, "/fibonacci", FibonacciAction, execute)
+        await server
+        return server
+
+    return bridge.run(serve())
+
+
+FIBONACCI = {
+    "op": "send_action_goal",
+    "action": "/fibonacci",
+    "action_type": "actionlib_tutorials/FibonacciAction",
+}
+
+
+@pytest.mark.parametrize("watches", [False, True])
+def test_a_goal_is_sent_and_its_result_and_feedback_come_back(bridge: Running, watches: bool) -> None:
+    server = fibonacci_server(bridge)
+    client = bridge.rosbridge()
+    if watches:  # the node then has a subscription of any type, too
+        for topic in ("result", "feedback", "status"):
+            client.send(op="subscribe", topic=f"/fibonacci/{topic}")
+    client.send(**FIBONACCI, id="g1", args={"order": 3}, feedback=True)
+    assert client.next("action_feedback") == {
+        "op": "action_feedback",
+        "action": "/fibonacci",
+        "values": {"sequence": [0]},
+        "id": "g1",
+    }
+    expected = {"op": "action_result", "action": "/fibonacci", "status": 4, "result": True}
+    assert client.next("action_result") == {**expected, "values": {"sequence": [0, 1, 2]}, "id": "g1"}
+    names = {"action_type": "actionlib_tutorials/action/Fibonacci"}  # as in ROS 2
+    client.send(**{**FIBONACCI, **names}, args=[2])
+    assert client.next("action_result") == {**expected, "values": {"sequence": [0, 1]}}
+    bridge.run(server.close())
+
+
+def test_goals_that_are_not_reached_say_so(bridge: Running) -> None:
+    server = fibonacci_server(bridge)
+    client = bridge.rosbridge()
+    client.send(**FIBONACCI, id="a", args={"order": 21})
+    found = client.next("action_result")
+    assert (found["status"], found["values"], found["result"]) == (6, {"sequence": [1]}, True)
+    client.send(**FIBONACCI, id="b", args={"order": 0}, feedback=True)
+    client.next("action_feedback")
+    client.send(op="cancel_action_goal", action="/fibonacci", id="b")
+    client.send(**FIBONACCI, id="f", args={"order": 0})
+    client.send(op="cancel_action_goal", action="/fibonacci", id="f")  # before it is sent
+    client.send(**FIBONACCI, id="c", args={"order": "x"})
+    client.send(**{**FIBONACCI, "action_type": "std_msgs/String"}, id="d")
+    client.send(**{**FIBONACCI, "action_type": "nowhere/NoAction"}, id="e")
+    results = {each["id"]: each for each in (client.next("action_result") for _ in range(5))}
+    assert results["b"]["status"] == results["f"]["status"] == 5
+    assert "requires a int32 for field order" in results["c"]["values"]
+    assert "is not installed" in results["d"]["values"]
+    assert "nowhere" in results["e"]["values"]
+    bridge.run(server.close())
+
+
+def test_a_goal_without_a_server_ends(bridge: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client_actions, "SERVER_SECONDS", 0.2)
+    client = bridge.rosbridge()
+    client.send(**FIBONACCI, id="a", args={"order": 1})
+    found = client.next("action_result")
+    assert (found["result"], found["status"], found["id"]) == (False, 0, "a")
+    assert "action server /fibonacci" in found["values"]
+
+
+def test_a_reader_sends_no_goals(run_bridge: Callable[..., Running]) -> None:
+    bridge = run_bridge(access=Access(default_is_read=True))
+    client = bridge.rosbridge()
+    client.send(**FIBONACCI, args={"order": 1})
+    assert client.next("action_result")["values"] == "sending goals is not allowed: this token is read-only"
+
+
+def test_nanoseconds_above_a_second_are_carried(bridge: Running) -> None:
+    messages = received(bridge, bridge.node("listener"), "/pose", PoseStamped)
+    client = bridge.rosbridge()
+    client.send(op="advertise", topic="/pose", type="geometry_msgs/PoseStamped")
+    stamp = {"secs": 5, "nsecs": 1_500_000_000}
+    client.send(op="publish", topic="/pose", msg={"header": {"stamp": stamp}})
+    [message] = messages()
+    assert (message.header.stamp.secs, message.header.stamp.nsecs) == (6, 500_000_000)
 
 
 def test_client_offers_a_service(bridge: Running) -> None:

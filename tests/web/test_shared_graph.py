@@ -7,15 +7,16 @@ import contextlib
 import socket
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from std_msgs.msg import String
-from std_srvs.srv import Empty
+from std_srvs.srv import Empty, EmptyResponse, SetBool
 
 from minirospy.core.wire.header import serialize_header
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot
+from minirospy.web import graph as shared_graph
 from minirospy.web.graph import SharedGraph
 
 if TYPE_CHECKING:
@@ -143,3 +144,39 @@ def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns
         await asyncio.wait_for(graph.close(), 60)
 
     bridge.run(look_and_close())
+
+
+@pytest.mark.parametrize("seen_by", ["check", "call"])
+def test_service_offered_again_with_another_type_is_shown_and_called_with_it(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch, seen_by: str
+) -> None:
+    """The node offers it again at once, so no refresh sees the graph without it."""
+    monkeypatch.setattr(shared_graph, "CHECK_SECONDS", 0.0 if seen_by == "check" else 1000.0)
+    node = bridge.node("again")
+
+    async def offer() -> Any:
+        return await node.serve("/switch", Empty, lambda _: EmptyResponse())
+
+    service = bridge.run(offer())
+    client, caller = bridge.client(), bridge.rosbridge()
+    first = client.service("/switch")
+    assert client.services["/switch"]["type"] == "std_srvs/Empty"
+    caller.send(op="call_service", service="/switch", id="a")
+    assert caller.next("service_response")["result"]
+
+    async def offer_again() -> None:
+        await service.close()
+        await node.serve("/switch", SetBool, lambda request: (request.data, "new"))
+
+    bridge.run(offer_again())
+
+    def call() -> None:
+        caller.send(op="call_service", service="/switch", args={"data": True})
+        assert caller.next("service_response")["values"] == {"success": True, "message": "new"}
+
+    if seen_by == "call":
+        call()
+    while client.services["/switch"]["id"] == first:
+        client.next("advertiseServices")
+    assert client.services["/switch"]["type"] == "std_srvs/SetBool"
+    call()

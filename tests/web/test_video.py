@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import http.client
+import json
+import struct
 import sys
 from collections.abc import Callable
 from io import BytesIO
+from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 from unittest.mock import Mock
@@ -22,6 +26,7 @@ from minirospy.base.errors import BridgeError
 from minirospy.base.name_filter import NameFilter
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
+from minirospy.web.video import pictures
 from minirospy.web.video.options import Picture, VideoRequest, request_of
 from minirospy.web.video.pictures import encoded
 
@@ -106,6 +111,47 @@ def test_color_stays_the_same_in_png_and_about_so_in_jpeg() -> None:
 )
 def test_encoding_becomes_a_picture(encoding: str, array: np.ndarray[Any, Any], expected: object) -> None:
     assert opened(image(encoding, array), Picture("png")).getpixel((0, 0)) == expected
+
+
+RECORDED = json.loads(
+    (Path(__file__).parents[1] / "core" / "images" / "colors.json").read_text(encoding="utf-8")
+)
+"""Conversions by OpenCV, recorded by tests/core/images/record_colors.py."""
+
+
+@pytest.mark.parametrize("has_opencv", [False, True])
+@pytest.mark.parametrize("encoding", RECORDED["encodings"])
+def test_colors_are_those_of_opencv(encoding: str, has_opencv: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if has_opencv:
+        pytest.importorskip("cv2", exc_type=ImportError)
+    else:
+        monkeypatch.setattr(pictures, "opencv", lambda: None)
+    case = RECORDED["encodings"][encoding]
+    array = np.array(case["data"], np.uint16 if "16" in encoding else np.uint8)
+    found = np.asarray(opened(image(encoding, array), Picture("png")).convert("RGB"))
+    assert found[..., ::-1].tolist() == case["bgr"]
+
+
+def test_compressed_images_of_16_bits_keep_their_order_and_range() -> None:
+    gray = RECORDED["png"]["gray"]
+    values = np.array(gray["values"])
+    message = CompressedImage(format="16UC1; png compressed ", data=base64.b64decode(gray["file"]))
+    expected = (values * (255 / values.max())).astype(np.uint8)
+    assert np.asarray(opened(message, Picture("png"))).tolist() == expected.tolist()
+    message.format = "mono16; png compressed "
+    assert np.asarray(opened(message, Picture("png"))).tolist() == np.rint(values / 257).tolist()
+
+
+@pytest.mark.parametrize(("encoding", "a", "b"), [("16UC1", 0.0, 0.0), ("32FC1", 10100.0, -1009.0)])
+def test_compressed_depths_are_decoded_behind_their_header(encoding: str, a: float, b: float) -> None:
+    gray = RECORDED["png"]["gray"]
+    data = struct.pack("<iff", 0, a, b) + base64.b64decode(gray["file"])
+    message = CompressedImage(format=f"{encoding}; compressedDepth png", data=data)
+    depths = np.array(gray["values"], np.float64)
+    if a:
+        depths = (a / (depths - b)).astype(np.float32).astype(np.float64)
+    expected = (depths * (255 / depths.max())).astype(np.uint8)
+    assert np.asarray(opened(message, Picture("png"))).tolist() == expected.tolist()
 
 
 def test_picture_is_resized_and_inverted() -> None:

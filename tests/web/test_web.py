@@ -106,6 +106,20 @@ def test_both_sub_protocols_are_served_and_the_newer_is_preferred(bridge: Runnin
         client.next("serverInfo")
 
 
+def test_page_that_an_option_would_admit_is_named_in_the_terminal(
+    run_bridge: Callable[..., Running], caplog: pytest.LogCaptureFixture
+) -> None:
+    bridge = run_bridge()
+    for origin in ("null", "https://other.example"):
+        with pytest.raises(InvalidStatus) as caught:
+            bridge.client(additional_headers={"Origin": origin})
+        assert caught.value.response.status_code == 403
+    warnings = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
+    assert warnings == [
+        "refused: a page that was opened from a file (Origin: null) may not connect: start the bridge with --origin null"
+    ]  # the second one within ten seconds is only counted
+
+
 def test_wrong_token_is_refused_and_never_logged(
     run_bridge: Callable[..., Running], caplog: pytest.LogCaptureFixture
 ) -> None:

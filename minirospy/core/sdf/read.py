@@ -26,15 +26,16 @@ def parse_urdf(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "robot_description", name: str = ""
 ) -> Model:
     """Return the model of a robot description; ``name`` replaces the robot's. Raise SdfError if it cannot be used."""
-    return read_urdf(parse_document(text, file), new_source(file, resolve), name)
+    source = new_source(file, resolve)
+    return read_urdf(parse_document(text, file, source.warnings), source, name)
 
 
 def parse_model(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "model", name: str = ""
 ) -> Model:
     """Return the first model in SDF or URDF text; ``name`` replaces its own. Raise SdfError if there is none that can be used."""
-    root = parse_document(text, file)
     source = new_source(file, resolve)
+    root = parse_document(text, file, source.warnings)
     if root.tag == "robot":
         return read_urdf(root, source, name)
     if root.tag not in ("sdf", "gazebo", "model"):
@@ -59,8 +60,8 @@ def parse_world(
     Models that cannot be used, or that exceed ``max_parts`` links, joints and models, are left out, and named in
     ``warnings``. Raise SdfError if the text is not SDF.
     """
-    root = parse_document(text, file)
     source = new_source(file, resolve, max_parts)
+    root = parse_document(text, file, source.warnings)
     if root.tag not in ("sdf", "gazebo", "world"):
         raise source.error(root, f"the root is <{root.tag}>: <sdf> is expected")
     world = root if root.tag == "world" else root.first("world")

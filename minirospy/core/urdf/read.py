@@ -8,10 +8,11 @@ Source: http://wiki.ros.org/urdf/XML/model, and the output of Debian's `check_ur
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from minirospy.base.errors import UrdfError
-from minirospy.core.urdf.elements import Element, parse_xml
+from minirospy.core.urdf.elements import Element, parse_noted
 from minirospy.core.urdf.joints import read_joint
 from minirospy.core.urdf.links import ElementError, read_link, read_material
 from minirospy.core.urdf.model import Joint, Link, Material, Problem, Robot
@@ -29,7 +30,10 @@ def read_robot(path: str | Path) -> Robot:
 
 def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
     """Parse a robot description. ``file`` is its name in errors. Raise UrdfError if the description is invalid."""
-    return robot_from_element(parse_xml(text, file), file)
+    parsed = parse_noted(text, file)
+    robot = robot_from_element(parsed.root, file)
+    notes = [Problem(note.line, (note.text,), is_warning=True) for note in parsed.notes]
+    return replace(robot, problems=(*notes, *robot.problems))
 
 
 def robot_from_element(root: Element, file: str = "robot_description") -> Robot:

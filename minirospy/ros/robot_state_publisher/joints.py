@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from minirospy.base.errors import MinirospyError, UrdfError
-from minirospy.core.urdf.elements import Element, parse_xml
+from minirospy.core.urdf.elements import Element, parse_noted
 from minirospy.core.urdf.values import NotANumberError, as_float
 
 __all__ = [
@@ -173,12 +173,14 @@ class JointStates:
 
 
 def read_joints(text: str, options: JointOptions, warn: Callable[[str], object]) -> JointStates:
-    """Return a description's joints; call ``warn`` with a line for each omitted joint.
+    """Return a description's joints; call ``warn`` with a line for each omitted joint and each fault in the XML.
 
     Raise JointError if the description is invalid.
     """
     try:
-        root = parse_xml(text, "robot_description")
+        root, notes = parse_noted(text, "robot_description")
+        for note in notes:
+            warn(f"{note.text} (line {note.line})")
         if root.tag == "COLLADA":
             found = _collada_joints(root, warn)
             return JointStates([*found], found, options.dependent_joints)

@@ -7,9 +7,10 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
-from urllib.parse import unquote
+from urllib.parse import quote, unquote
 
 from minirospy.base.errors import BridgeError, NotFoundError
+from minirospy.workspace.packages import package_name
 
 if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages
@@ -23,7 +24,7 @@ MAX_BYTES = 100_000_000  # maximum size of a file
 
 
 class Assets:
-    """Reads files by ``package://`` URIs. Methods block."""
+    """Reads files by ``package://`` URIs, and by ``file://`` URIs of files inside packages. Methods block."""
 
     def __init__(
         self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), max_bytes: int = MAX_BYTES
@@ -53,6 +54,8 @@ class Assets:
         return file, size
 
     def _path(self, uri: str) -> Path:
+        if uri.lower().startswith("file://"):
+            uri = self._package_uri(uri)
         if not any(each.fullmatch(uri) for each in self._allowed):
             raise BridgeError(f"Asset URI not allowed: {uri[:200]}")
         package, _, name = unquote(uri.removeprefix("package://")).partition("/")
@@ -71,3 +74,22 @@ class Assets:
         if not path.is_file():
             raise BridgeError(f"{uri}: there is no such file in {folder}")
         return path
+
+    def _package_uri(self, uri: str) -> str:
+        """Return the ``package://`` URI of a file inside a known package. Raise BridgeError if it is in none.
+
+        xacro replaces ``$(find pkg)`` by the package's folder, so descriptions contain such URIs.
+        """
+        text = unquote(uri[len("file://") :])
+        path = Path(text.lstrip("/") if os.name == "nt" else text)  # file:///C:/folder
+        for folder in path.parents if path.is_absolute() and ".." not in path.parts else ():
+            name = package_name(folder)
+            if name is None:
+                continue
+            try:
+                if self._packages.find(name).resolve() == folder.resolve():
+                    return f"package://{name}/{quote(path.relative_to(folder).as_posix())}"
+            except NotFoundError:
+                pass
+            break
+        raise BridgeError(f"Asset URI not allowed: {uri[:200]} is not a file of a package")

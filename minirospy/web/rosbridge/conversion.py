@@ -222,6 +222,8 @@ def _from_time(
         if type(part) is not int:
             raise _mismatch(root, (*path, name), "int32", part)
         setattr(present, name, part)
+    # Clients may send more than a second of nanoseconds. C++ nodes do not normalize received times.
+    present.canon()  # type: ignore[attr-defined]
     return present
 
 

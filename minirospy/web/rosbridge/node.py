@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from minirospy.aio.node import Node
 from minirospy.base.errors import BridgeError
@@ -71,8 +72,11 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
         address=address_of(private),
         foxglove_port=None,
         rosbridge_port=value(private, "port", int, ROSBRIDGE_PORT),
-        access=access_of(
-            private, environ, origins=["null"] if private.get("websocket_null_origin") is True else []
+        access=replace(
+            access_of(
+                private, environ, origins=["null"] if private.get("websocket_null_origin") is True else []
+            ),
+            file_option="websocket_null_origin:=true",
         ),
         limits=limits,
         filters=Filters(

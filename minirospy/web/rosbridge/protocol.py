@@ -31,10 +31,12 @@ __all__ = [
     "AdvertiseService",
     "Auth",
     "CallService",
+    "CancelActionGoal",
     "Event",
     "Fragment",
     "OperationError",
     "Publish",
+    "SendActionGoal",
     "ServiceResponse",
     "SetLevel",
     "StatusLevel",
@@ -168,6 +170,25 @@ class AdvertiseService(ServiceEvent):
 
 class UnadvertiseService(ServiceEvent):
     """Stop offering a service."""
+
+
+@dataclass(frozen=True)
+class SendActionGoal(Event):
+    """Send a goal to an action server. ``arguments``: the goal's fields, or a list of their values."""
+
+    action: str
+    type: str
+    arguments: object
+    feedback: bool
+    fragment_size: int | None
+    compression: Compression
+
+
+@dataclass(frozen=True)
+class CancelActionGoal(Event):
+    """Cancel the goal that the client sent with the same id."""
+
+    action: str
 
 
 @dataclass(frozen=True)
@@ -419,6 +440,31 @@ def _call_service(fields: Fields, id_: Id) -> Event:
     )
 
 
+def _send_action_goal(fields: Fields, id_: Id) -> Event:
+    name, old_id = _action(fields)
+    return SendActionGoal(
+        old_id if id_ is None else id_,
+        name,
+        _text(fields, "action_type"),
+        fields.get("args", []),
+        bool(fields.get("feedback")),
+        _fragment_size(fields),
+        _compression(fields),
+    )
+
+
+def _cancel_action_goal(fields: Fields, id_: Id) -> Event:
+    name, old_id = _action(fields)
+    return CancelActionGoal(old_id if id_ is None else id_, name)
+
+
+def _action(fields: Fields) -> tuple[str, Id]:
+    """Return an action's name, and the id that may be appended to it."""
+    action: str = _text(fields, "action")
+    name, _, old_id = action.partition("#")
+    return name, old_id or None
+
+
 def _fragment(fields: Fields, id_: Id) -> Event:
     number, total, data = (fields.get(name) for name in ("num", "total", "data"))
     if (
@@ -451,6 +497,8 @@ def _set_level(fields: Fields, id_: Id) -> Event:
 
 _READERS: Mapping[str, Callable[[Fields, Id], Event]] = {
     "call_service": _call_service,
+    "send_action_goal": _send_action_goal,
+    "cancel_action_goal": _cancel_action_goal,
     "fragment": _fragment,
     "png": _png,
     "set_level": _set_level,
@@ -458,6 +506,7 @@ _READERS: Mapping[str, Callable[[Fields, Id], Event]] = {
 OPERATIONS = (
     *("call_service", "advertise", "unadvertise", "publish", "subscribe", "unsubscribe", "fragment"),
     *("advertise_service", "service_response", "unadvertise_service", "png", "set_level", "auth"),
+    *("send_action_goal", "cancel_action_goal"),
 )
 """The operations that clients may send, in the order used in error messages."""
 

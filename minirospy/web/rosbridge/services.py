@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 from minirospy.aio.handle import serialized
 from minirospy.aio.raw import service_header
-from minirospy.base.errors import BridgeError, ServiceException
+from minirospy.base.errors import BridgeError, HandshakeRefused, ServiceException
 from minirospy.core.idl.protocols import Message
 from minirospy.web.graph import SharedGraph
 from minirospy.web.rosbridge import conversion, protocol
@@ -53,14 +53,32 @@ async def call(
     service = graph.node.resolve(name)
     info = graph.service_info(service)
     if info:
-        type_ = info.type
-    else:
         try:
-            type_ = (await service_header(graph.node, service)).get("type", "")
-        except ServiceException as error:
-            if str(error).endswith("unavailable"):
-                raise BridgeError(f"Service {service} does not exist") from error
-            raise
+            return await _call(graph, service, info.type, arguments, in_thread)
+        except (BridgeError, ServiceException) as error:
+            # The node may have offered the service again with another type. The call was not executed in these cases.
+            is_other = isinstance(error, BridgeError) or isinstance(error.__cause__, HandshakeRefused)
+            if not is_other or (type_ := await _type_of(graph, service)) == info.type:
+                raise
+            graph.check_service(service)
+    else:
+        type_ = await _type_of(graph, service)
+    return await _call(graph, service, type_, arguments, in_thread)
+
+
+async def _type_of(graph: SharedGraph, service: str) -> str:
+    """Query a service's type. Raise BridgeError if the service does not exist, ServiceException if it cannot be reached."""
+    try:
+        return (await service_header(graph.node, service)).get("type", "")
+    except ServiceException as error:
+        if str(error).endswith("unavailable"):
+            raise BridgeError(f"Service {service} does not exist") from error
+        raise
+
+
+async def _call(
+    graph: SharedGraph, service: str, type_: str, arguments: object, in_thread: InThread | None
+) -> Response:
     found = service_class(type_)
 
     def body() -> bytes:

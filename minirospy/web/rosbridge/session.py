@@ -16,6 +16,7 @@ from minirospy.base.errors import BridgeError
 from minirospy.core.wire.tcpros import ANY
 from minirospy.web.rosbridge import protocol
 from minirospy.web.rosbridge.authentication import authenticate
+from minirospy.web.rosbridge.client_actions import ClientActions
 from minirospy.web.rosbridge.client_publications import ClientPublications
 from minirospy.web.rosbridge.client_services import ClientServices
 from minirospy.web.rosbridge.client_subscriptions import ClientSubscriptions
@@ -75,6 +76,7 @@ class RosbridgeSession:
         self._publications = ClientPublications(self)
         self._subscriptions = ClientSubscriptions(self)
         self._services = ClientServices(self)
+        self._actions = ClientActions(self)
         # waiting operations, and calls; cancelled when the session ends
         self._tasks: set[asyncio.Task[None]] = set()
         self._inbox: deque[str | bytes] = deque()  # messages queued behind a waiting operation
@@ -91,6 +93,8 @@ class RosbridgeSession:
             protocol.ServiceResponse: self._services.service_response,
             protocol.AdvertiseService: self._services.advertise_service,
             protocol.UnadvertiseService: self._services.unadvertise_service,
+            protocol.SendActionGoal: self._actions.send_goal,
+            protocol.CancelActionGoal: self._actions.cancel_goal,
             protocol.Fragment: self._fragment,
             protocol.SetLevel: self._set_level,
             protocol.Auth: self._auth,
@@ -114,6 +118,7 @@ class RosbridgeSession:
         self._subscriptions.close()
         self._publications.close()
         self._services.close()
+        self._actions.close()
         # The session is part of reference cycles: release its memory now instead of when the garbage collector runs.
         self._inbox.clear()
         self._fragments.clear()
@@ -324,6 +329,8 @@ _OPERATIONS: Mapping[type[Event], str] = {
     protocol.ServiceResponse: "service_response",
     protocol.AdvertiseService: "advertise_service",
     protocol.UnadvertiseService: "unadvertise_service",
+    protocol.SendActionGoal: "send_action_goal",
+    protocol.CancelActionGoal: "cancel_action_goal",
     protocol.Fragment: "fragment",
     protocol.SetLevel: "set_level",
     protocol.Auth: "auth",

@@ -61,10 +61,11 @@ class Listener:
         tls: ssl.SSLContext | None = None,
         account: Account | None = None,
         on_change: Callable[[int], object] = lambda _: None,
+        warn: Callable[[str], object] = lambda _: None,
     ) -> None:
         """Create the listener. ``pages`` is a dict from path to handler; ``public_pages`` need no token.
 
-        ``on_change`` is called with the number of connections.
+        ``on_change`` is called with the number of connections, ``warn`` with a refusal that names an option for the owner.
         """
         self.endpoints = endpoints
         self.limits = limits or Limits()
@@ -85,6 +86,7 @@ class Listener:
         self._pages = {**(pages or {}), **self._public_pages}
         self._tls = tls
         self._on_change = on_change
+        self._warn = warn
         self._socks: list[socket.socket] = []
         self._server: asyncio.Server | None = None
 
@@ -143,9 +145,14 @@ class Listener:
 
     def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal:
         """Return the rights of a request's sender, or the reason for refusing the request."""
+        found: Grant | Refusal
         if is_page and unquote(urlsplit(credentials.target).path) in self._public_pages:
-            return self._access.check_host(credentials.host) or Grant.READ
-        return self._access.check(credentials)
+            found = self._access.check_host(credentials.host) or Grant.READ
+        else:
+            found = self._access.check(credentials)
+        if isinstance(found, Refusal) and found.names_option:
+            self._warn(found.text)
+        return found
 
     def page(self, path: str) -> HttpHandler | None:
         """Return the handler for a path, or None if there is none."""

@@ -6,8 +6,9 @@ import struct
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import BridgeError
+from minirospy.core.images.colors import debayered, eight_bits, yuv_to_bgr
 from minirospy.core.images.compressed import Options, decode, encode, opencv
-from minirospy.core.images.encodings import converted, is_converted_by_opencv
+from minirospy.core.images.encodings import converted
 from minirospy.core.images.sizes import size_of
 from minirospy.core.images.view import pixels
 from minirospy.web.video.options import Picture
@@ -23,6 +24,13 @@ COMPRESSED = "sensor_msgs/CompressedImage"
 _FASTEST_PNG = 1
 MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarged image
 _LENGTH = struct.Struct("<I")
+_DEPTH_HEADER = struct.Struct(
+    "<iff"
+)  # of compressedDepth: an enum, and the floats that make depths of inverse depths
+_ALIASES = {"uyvy": "yuv422"}  # names of ROS 2 for encodings of ROS 1
+_YUYV = ("yuv422_yuy2", "yuyv")
+# cv_bridge shows numbers of three or four channels as colors in OpenCV's order
+_AS_COLORS = {"8UC4": "bgr8", "16UC3": "bgr16", "16UC4": "bgr16"}
 _STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
 # Number of leading bytes of a file in which to search for the image's size; other data, such as a preview, may precede it.
 _HEAD_BYTES = 100_000
@@ -45,11 +53,13 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
             data = bytes(message.data)
             if _is_as_wanted(data, picture):
                 return data, _content_type(data)
-            image = decode(data, MAX_PIXELS)
+            image = _decompressed(data, message.format)
         elif type_ == IMAGE:
             raw = Image()
             raw.deserialize(body)
-            image = _colors(pixels(raw), raw.encoding)
+            encoding = _ALIASES.get(raw.encoding, raw.encoding)
+            raw.encoding = "8UC2" if encoding in _YUYV else encoding
+            image = _colors(pixels(raw), encoding)
         else:
             raise BridgeError(f"messages of [{type_}] are not images: {IMAGE} and {COMPRESSED} are")
         image = _changed(image, picture)
@@ -72,23 +82,62 @@ def _is_as_wanted(data: bytes, picture: Picture) -> bool:
     """Return whether a compressed image can be sent to the client unchanged."""
     is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
     found = _content_type(data)
+    if found == "image/png" and data[24:25] == b"\x10" and picture.format:
+        return False  # 16 bits per channel: browsers show only the upper ones
     return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
+
+
+def _decompressed(data: bytes, format_: str) -> Pixels:
+    """Return a compressed image as 8-bit gray or BGR. ``format_`` is the message's, such as ``16UC1; png compressed``.
+
+    Raise ValueError if it is not an image.
+    """
+    encoding, _, rest = format_.partition(";")
+    if "compressedDepth" in rest:
+        return _scaled(_depths(data, encoding))
+    image = decode(data, MAX_PIXELS)
+    if image.dtype != "uint16":
+        return image
+    if image.ndim == 2:
+        return (
+            _colors(image, encoding) if encoding == "mono16" or encoding[:6] == "bayer_" else _scaled(image)
+        )
+    return eight_bits(image)
+
+
+def _depths(data: bytes, encoding: str) -> Pixels:
+    """Return the depths of a compressed depth image: in millimetres, or in metres if ``encoding`` is 32FC1.
+
+    Raise ValueError if it is not one.
+    """
+    import numpy as np
+
+    if len(data) <= _DEPTH_HEADER.size:
+        raise ValueError(f"{len(data)} bytes are not a compressed depth image")
+    _, a, b = _DEPTH_HEADER.unpack_from(data)
+    image = decode(data[_DEPTH_HEADER.size :], MAX_PIXELS)
+    if image.ndim != 2:
+        raise ValueError(f"a depth image has one channel, not {image.shape[2]}")
+    if encoding != "32FC1":
+        return image
+    with np.errstate(all="ignore"):
+        return np.where(image == 0, np.nan, a / (image - b)).astype(np.float32)
 
 
 def _colors(image: Pixels, encoding: str) -> Pixels:
     """Return an image as 8-bit gray or BGR; a numeric image is scaled to its largest value."""
-
     if encoding in ("mono8", "bgr8", "8UC1", "8UC3"):
         return image
-    if encoding.startswith(("32F", "64F", "16S", "32S")) or encoding in ("16UC1", "8S", "8SC1"):
+    if encoding in _AS_COLORS:
+        image, encoding = image[..., :3], _AS_COLORS[encoding]
+    if encoding in _YUYV or encoding == "yuv422":
+        return _of_yuv(image, encoding)
+    if encoding.startswith("bayer"):
+        found = _of_bayer(image, encoding[6:10])
+        return eight_bits(found) if encoding.endswith("16") else found
+    if encoding.startswith(("32F", "64F", "16S", "32S", "16U", "8S", "8U")):
         return _scaled(image[..., 0] if image.ndim == 3 else image)
-    if encoding.startswith("bayer") and opencv() is None:
-        return _debayered(image, encoding)
-    if encoding in ("mono16",):
-        return converted(image, encoding, "mono8")
-    if is_converted_by_opencv(encoding, "bgr8"):
-        return _by_opencv(image, encoding)
-    return converted(image, encoding, "bgr8")
+    return converted(image, encoding, "mono8" if encoding == "mono16" else "bgr8")
 
 
 def _scaled(image: Pixels) -> Pixels:
@@ -122,39 +171,25 @@ def work_of(type_: str, body: bytes | memoryview) -> int:
     return min(size[0] * size[1], MAX_PIXELS) if size else MAX_PIXELS
 
 
-def _by_opencv(image: Pixels, encoding: str) -> Pixels:
-    """Convert a YUV or Bayer image to colors with OpenCV; without OpenCV, YUV becomes gray."""
+def _of_yuv(image: Pixels, encoding: str) -> Pixels:
     cv2 = opencv()
     if cv2 is None:
-        return converted(image, encoding, "mono8")
-    if encoding == "yuv422":
-        return cv2.cvtColor(image, cv2.COLOR_YUV2BGR_UYVY)  # type: ignore[no-any-return]
+        return yuv_to_bgr(image, has_luma_first=encoding in _YUYV)
+    code = cv2.COLOR_YUV2BGR_YUY2 if encoding in _YUYV else cv2.COLOR_YUV2BGR_UYVY
+    return cv2.cvtColor(image, code)  # type: ignore[no-any-return]
+
+
+def _of_bayer(image: Pixels, pattern: str) -> Pixels:
+    cv2 = opencv()
+    if cv2 is None or min(image.shape) < 3:
+        return debayered(image, pattern)
     # OpenCV names a Bayer pattern by the pixels in its second row and column.
-    name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[encoding[6:10]]
-    found: Pixels = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
-    return converted(found, "bgr16", "bgr8") if encoding.endswith("16") else found
-
-
-def _debayered(image: Pixels, encoding: str) -> Pixels:
-    """Return the colors of a Bayer pattern; each cell of four pixels becomes one pixel."""
-    import numpy as np
-
-    eight = converted(image, "mono16", "mono8") if encoding.endswith("16") else image
-    height, width = (size // 2 * 2 for size in eight.shape[:2])
-    cells = [eight[at // 2 : height : 2, at % 2 : width : 2].astype(np.uint16) for at in range(4)]
-    colors = {
-        color: [cell for cell, name in zip(cells, encoding[6:10], strict=True) if name == color]
-        for color in "bgr"
-    }
-    planes = [sum(found[1:], found[0]) // len(found) for found in colors.values()]
-    return np.stack(planes, axis=-1).astype(np.uint8)
+    name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[pattern]
+    return cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))  # type: ignore[no-any-return]
 
 
 def _changed(image: Pixels, picture: Picture) -> Pixels:
     """Return an image scaled to the requested size, rotated by 180 degrees if requested."""
-    if image.dtype != "uint8":
-        # A compressed image may have 16 bits per channel.
-        image = (image >> 8).astype("uint8")
     if picture.is_inverted:
         image = image[::-1, ::-1]
     height, width = image.shape[:2]

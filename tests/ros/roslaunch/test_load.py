@@ -56,6 +56,28 @@ def test_param_values(packages: Packages, attributes: str, value: object) -> Non
     assert load(packages, f'<param name="p" {attributes}/>').params == {"/p": value}
 
 
+@pytest.mark.parametrize(
+    ("declaration", "encoding"), [("", "Latin-1"), ('<?xml version="1.0" encoding="cp1252"?>', "cp1252")]
+)
+def test_a_description_that_is_not_utf_8_is_read_with_a_warning(
+    packages: Packages, tmp_path: Path, declaration: str, encoding: str
+) -> None:
+    text = f'{declaration}<robot name="caf\xe9"/>'
+    file = tmp_path / "robot.urdf"
+    file.write_bytes(text.encode(encoding))
+    spec = load(packages, f'<param name="robot_description" textfile="{file}"/>')
+    assert spec.params == {"/robot_description": text}
+    [warning] = spec.warnings
+    assert (warning.line, f"is not UTF-8 text: it was read as {encoding}" in str(warning)) == (2, True)
+
+
+def test_other_text_that_is_not_utf_8_is_refused(packages: Packages, tmp_path: Path) -> None:
+    file = tmp_path / "text"
+    file.write_bytes(b"caf\xe9")
+    with pytest.raises(LaunchError, match="is not UTF-8 text"):
+        load(packages, f'<param name="p" textfile="{file}"/>')
+
+
 def test_args_defaults_and_overrides(packages: Packages) -> None:
     body = '<arg name="a" default="1"/><arg name="b" value="$(arg a)2"/><param name="p" value="$(arg b)"/>'
     assert load(packages, body).params == {"/p": 12}

@@ -372,7 +372,7 @@ class _File:
     def _value(self, tag: Tag) -> object:
         if tag.has("command"):
             self._spec.runs_command(tag.required("command", may_be_empty=True))
-        return param_value(tag)
+        return param_value(tag, self._spec.add_warning)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
         """Store a parameter set inside a ``<node>`` as private, even if the name starts with a slash or tilde."""

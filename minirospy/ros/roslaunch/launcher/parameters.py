@@ -12,11 +12,12 @@ import shlex
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from minirospy.base import names
-from minirospy.base.errors import ValueTextError
+from minirospy.base.errors import LaunchError, ValueTextError
+from minirospy.base.tinyxml import decode_xml
 from minirospy.introspect.parameters import flatten
 from minirospy.introspect.values import check_parameter, parse_value
 from minirospy.ros.roslaunch.launcher.document import Tag
@@ -37,8 +38,11 @@ _MAX_VALUE = 64 * 1024 * 1024
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
-def param_value(tag: Tag) -> object:
-    """Return a ``<param>``'s value. Raise LaunchError if the tag is invalid, or its file or command fails."""
+def param_value(tag: Tag, warn: Callable[[LaunchError], object]) -> object:
+    """Return a ``<param>``'s value; call ``warn`` if it was read in spite of a fault.
+
+    Raise LaunchError if the tag is invalid, or its file or command fails.
+    """
     ways = [way for way in _WAYS if tag.has(way)]
     if len(ways) != 1:
         raise tag.error(f"<param> tag must have one and only one of {'/'.join(_WAYS)}")
@@ -48,9 +52,9 @@ def param_value(tag: Tag) -> object:
     if ways[0] == "value":
         text = text.strip()
     elif ways[0] == "textfile":
-        text = _decoded(tag, text, _read(tag, text))
+        text = _description(tag, text, _read(tag, text), warn)
     else:
-        text = _output_of(tag, text)
+        text = _description(tag, text, _output_of(tag, text), warn)
 
     name = tag.element.attributes["name"]
     try:
@@ -105,7 +109,17 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
         raise tag.error(f"[{file}] is not UTF-8 text: {error.reason} at byte {error.start}") from None
 
 
-def _output_of(tag: Tag, command: str) -> str:
+def _description(tag: Tag, origin: str, data: bytes, warn: Callable[[LaunchError], object]) -> str:
+    """Return the text of a file or a command. A robot description, or other XML, may have another encoding than UTF-8."""
+    if not data.lstrip().startswith(b"<"):
+        return _decoded(tag, origin, data)
+    text, encoding = decode_xml(data)
+    if encoding != "UTF-8":
+        warn(tag.error(f"[{origin}] is not UTF-8 text: it was read as {encoding}"))
+    return text
+
+
+def _output_of(tag: Tag, command: str) -> bytes:
     """Run a command without a shell; return its output. Raise LaunchError if the command fails."""
     try:
         status, output, reason = _run(_command_words(shlex.split(command)))
@@ -118,7 +132,7 @@ def _output_of(tag: Tag, command: str) -> str:
     if status:
         why = f": {reason}" if reason else ""
         raise tag.error(f"command [{command}] returned with code [{status}]{why}")
-    return _decoded(tag, command, output)
+    return output
 
 
 def _run(words: list[str]) -> tuple[int, bytes, str]:

@@ -291,10 +291,16 @@ export const CLASSES = {
 CLASSES.Wrench = CLASSES.WrenchStamped;
 const OFFERED_ONCE = new Set(["Camera", "DepthCloud", "Wrench"]);
 
-export const classOf = (settings) =>
-  String(settings.Class ?? "")
-    .replace(/^rviz\//, "")
-    .replace(/^rviz_plugin_tutorials\//, "");
+const PREFIX_2 = /^rviz_(default_plugins|common)\//; // of classes in files of RViz 2
+const NAMES_2 = { "Marker Topic": "Topic", "Image Topic": "Topic", "Update Topic": "Interactive Markers Namespace" };
+
+/** Return a class without its package, of RViz or RViz 2. */
+export const plainClass = (name) =>
+  String(name ?? "")
+    .replace(PREFIX_2, "")
+    .replace(/^rviz(_plugin_tutorials)?\//, "");
+export const classOf = (settings) => plainClass(settings.Class);
+export const isOfRviz2 = ({ Class }) => PREFIX_2.test(String(Class ?? ""));
 export const topicKeyOf = (name) => CLASSES[name]?.topicKey ?? "Topic";
 
 /** Return the class that shows topics of a type, "" for none. */
@@ -307,13 +313,15 @@ export function classForType(type) {
 /** Return a setting by its path, "Offset/X". A value that RViz writes as a group has it as its "Value". */
 export function getSetting(settings, path) {
   let found = settings;
-  for (const name of path.split("/")) found = found?.[name];
+  for (const name of nameIn(settings, path).split("/")) found = found?.[name];
+  if (path === "Update Topic" && isOfRviz2(settings)) return found ? `${found}/update` : found;
   return found !== null && typeof found === "object" && !Array.isArray(found) && "Value" in found ? found.Value : found;
 }
 
 /** Set a setting by its path. */
 export function setSetting(settings, path, value) {
-  const names = path.split("/");
+  if (path === "Update Topic" && isOfRviz2(settings)) value = String(value).replace(/\/update$/, "");
+  const names = nameIn(settings, path).split("/");
   const last = names.pop();
   let place = settings;
   for (const name of names) {
@@ -324,6 +332,9 @@ export function setSetting(settings, path, value) {
   if (old !== null && typeof old === "object" && "Value" in old) old.Value = value;
   else place[last] = value;
 }
+
+/** Return the name that a setting has in this display: some are others in RViz 2. */
+const nameIn = (settings, path) => (isOfRviz2(settings) && NAMES_2[path]) || path;
 
 /** Return new settings of a class with RViz's defaults. */
 export function newSettings(name, topicName = "") {

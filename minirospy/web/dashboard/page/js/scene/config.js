@@ -1,9 +1,9 @@
 // The contents of a .rviz file as an object: its displays, fixed frame, view and tools, read and changed; all else is
 // kept as it is. Pure.
-// Source: files that RViz of ROS Noetic saves.
+// Source: files that RViz of ROS Noetic saves; those of RViz 2 have other names of classes, and topics with their QoS.
 
 import { t } from "../texts.js";
-import { CLASSES, classOf, complete, newSettings } from "./classes.js";
+import { CLASSES, classOf, complete, isOfRviz2, newSettings, plainClass } from "./classes.js";
 
 const MANAGER = "Visualization Manager";
 export const BACKGROUND = "48; 48; 48";
@@ -16,7 +16,7 @@ export const USUAL_VIEW = {
   Yaw: 0.785398,
   "Target Frame": "<Fixed Frame>",
 };
-const KNOWN_VIEWS = ["rviz/Orbit", "rviz/XYOrbit", "rviz/TopDownOrtho", "rviz/ThirdPersonFollower"];
+const KNOWN_VIEWS = ["Orbit", "XYOrbit", "TopDownOrtho", "ThirdPersonFollower"];
 
 /** Return the contents that RViz starts with, and TF. */
 export function newConfig() {
@@ -100,7 +100,7 @@ export class Config {
     const found = this.displays()
       .filter(({ settings }) => !CLASSES[classOf(settings)] && classOf(settings) !== "Group")
       .map(({ settings }) => `${settings.Name ?? "?"} (${settings.Class ?? "no class"})`);
-    if (this.view.Class && !KNOWN_VIEWS.includes(this.view.Class)) found.push(`view ${this.view.Class}`);
+    if (this.view.Class && !KNOWN_VIEWS.includes(plainClass(this.view.Class))) found.push(`view ${this.view.Class}`);
     return found;
   }
 
@@ -122,7 +122,8 @@ export class Config {
   /** Return the topic of a tool's class ("SetGoal"). */
   toolTopic(name, usual) {
     const tools = Array.isArray(this.manager.Tools) ? this.manager.Tools : [];
-    return String(tools.find((tool) => tool?.Class === `rviz/${name}`)?.Topic || usual);
+    const topic = tools.find((tool) => plainClass(tool?.Class) === name)?.Topic;
+    return String((isObject(topic) ? topic.Value : topic) || usual);
   }
 }
 
@@ -131,9 +132,10 @@ export function readView(view) {
   const numeric = (value, usual) =>
     Number.isFinite(Number(value)) && value !== null && value !== "" ? Number(value) : usual;
   const focus = view["Focal Point"] ?? {};
-  const isFlat = view.Class === "rviz/TopDownOrtho";
+  const name = plainClass(view.Class);
+  const isFlat = name === "TopDownOrtho";
   return {
-    kind: isFlat ? "top" : view.Class === "rviz/ThirdPersonFollower" ? "follow" : "orbit",
+    kind: isFlat ? "top" : name === "ThirdPersonFollower" ? "follow" : "orbit",
     distance: Math.max(0.01, numeric(view.Distance, 10)),
     focus: isFlat
       ? [numeric(view.X, 0), numeric(view.Y, 0), 0]
@@ -149,7 +151,8 @@ export function readView(view) {
 /** Write a view into its settings, in RViz's names. */
 export function writeView(view, { kind, distance, focus, pitch, yaw, scale, angle, target }) {
   const rounded = (value) => Number(value.toPrecision(7));
-  view.Class = { top: "rviz/TopDownOrtho", follow: "rviz/ThirdPersonFollower", orbit: "rviz/Orbit" }[kind];
+  const name = { top: "TopDownOrtho", follow: "ThirdPersonFollower", orbit: "Orbit" }[kind];
+  view.Class = `${isOfRviz2(view) ? "rviz_default_plugins" : "rviz"}/${name}`;
   view["Target Frame"] = target;
   if (kind === "top")
     Object.assign(view, { X: rounded(focus[0]), Y: rounded(focus[1]), Scale: rounded(scale), Angle: rounded(angle) });

@@ -1,43 +1,45 @@
-// Meshes of package://: fetched through the bridge once, read by their kind, copied for each use.
+// Meshes of packages: fetched through the bridge once, read by their kind, copied for each use. Their colors were
+// measured in RViz: tests/interop/rviz_pictures.py, scene "meshes".
 
 import {
   BufferAttribute,
+  BufferGeometry,
   ColladaLoader,
+  DataTexture,
   Group,
   LoadingManager,
   Mesh,
   MeshLambertMaterial,
+  RGBAFormat,
   STLLoader,
+  UnsignedByteType,
 } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
+import { readMaterials, readObj } from "./obj.js";
 import { bodyMaterial } from "./shapes.js";
 
 const cache = new WeakMap(); // link -> Map of uri -> promise of an object
 const EMPTY_PICTURE = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=";
+const GRAY = [153, 153, 153]; // of a file without any material
+const REPEATED = 1000; // three's RepeatWrapping
 
 /**
- * Return a promise of an object: a copy with its own materials. `paint` {rgb, alpha} is for meshes without colors, or
- * instead of them.
+ * Return a promise of an object: a copy with its own materials.
+ *
+ * `paint` {rgb, alpha, map} is for meshes whose kind has no materials (STL), or instead of them (`isForced`). Of
+ * others, `alpha` is their opacity, and `tint` a color that is mixed with theirs, as RViz does for markers.
  */
 export async function loadMesh(link, uri, paint) {
-  if (!cache.has(link)) cache.set(link, new Map());
-  const known = cache.get(link);
-  if (!known.has(uri)) {
-    const loading = read(link, uri);
-    known.set(uri, loading);
-    // Not kept: the package may come later.
-    loading.catch(() => known.delete(uri));
-  }
-  const { object, hasColors } = await known.get(uri);
+  const { object } = await cached(link, uri, () => read(link, uri));
   const copy = object.clone(true);
   copy.traverse((each) => {
     if (!each.isMesh) return;
     const materials = [each.material]
       .flat()
       .map((material) =>
-        paint && (paint.isForced || !hasColors)
-          ? bodyMaterial(paint.rgb, paint.alpha)
-          : faded(material, paint?.alpha ?? 1),
+        paint?.rgb && (paint.isForced || material.userData.isPlain)
+          ? bodyMaterial(paint.rgb, paint.alpha, paint.map ? { map: paint.map } : {})
+          : own(material, paint),
       );
     each.material = Array.isArray(each.material) ? materials : materials[0];
     each.geometry = each.geometry.clone();
@@ -45,26 +47,85 @@ export async function loadMesh(link, uri, paint) {
   return copy;
 }
 
-function faded(material, alpha) {
+/** Return a promise of the texture of a picture. */
+export async function loadTexture(link, uri) {
+  return cached(link, uri, async () => {
+    const bitmap = await createImageBitmap(new Blob([await link.asset(checked(uri))]));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    const texture = new DataTexture(data, bitmap.width, bitmap.height, RGBAFormat, UnsignedByteType);
+    return Object.assign(texture, { flipY: true, wrapS: REPEATED, wrapT: REPEATED, needsUpdate: true });
+  });
+}
+
+/** Return what was read of a file, which is read again if that fails: the package may come later. */
+function cached(link, uri, load) {
+  if (!cache.has(link)) cache.set(link, new Map());
+  const known = cache.get(link);
+  if (!known.has(uri)) {
+    const loading = load();
+    known.set(uri, loading);
+    loading.catch(() => known.delete(uri));
+  }
+  return known.get(uri);
+}
+
+/** Return a mesh's own material, mixed with a tint. */
+function own(material, paint) {
   const copy = new MeshLambertMaterial({
     map: material.map ?? null,
     side: material.side,
     vertexColors: material.vertexColors,
   });
   if (material.color) copy.color.copy(material.color);
+  let alpha = paint?.alpha ?? 1;
+  if (paint?.tint) {
+    // RViz draws the tint over the mesh: at most half of it.
+    const over = Math.min(alpha, 0.5);
+    alpha = 1 - (1 - over) * (1 - alpha);
+    mix(copy, paint.tint, alpha ? over / alpha : 0);
+  }
   copy.opacity = (material.opacity ?? 1) * alpha;
   copy.transparent = copy.opacity < 0.9998;
+  copy.depthWrite = !copy.transparent;
   return copy;
 }
 
+/** Mix the color of a material, also that of its texture, with another one: `part` of it. */
+function mix(material, [r, g, b], part) {
+  const color = [r, g, b].map((each) => (each / 255).toFixed(4)).join(", ");
+  material.onBeforeCompile = (shader) => {
+    shader.fragmentShader = shader.fragmentShader.replace(
+      "#include <color_fragment>",
+      `#include <color_fragment>\n  diffuseColor.rgb = mix(diffuseColor.rgb, vec3(${color}), ${part.toFixed(4)});`,
+    );
+  };
+  // Programs are shared by this key.
+  material.customProgramCacheKey = () => `${color} ${part}`;
+}
+
+function checked(uri) {
+  if (!/^(package|file):\/\//.test(uri))
+    throw new Error(t("{name}: only files of package:// and file:// can be loaded", { name: uri || "?" }));
+  return uri;
+}
+
+/** Return the address of a file that another file names. */
+function beside(uri, name) {
+  const [, scheme, path] = /^(package|file):\/\/(.*)$/.exec(uri);
+  const root = scheme === "package" ? "http://x/" : "http://x";
+  const { pathname } = new URL(name.replace(/^(package|file):\/\//, root), `${root}${path}`);
+  return scheme === "package" ? `package:/${decodeURI(pathname)}` : `file://${decodeURI(pathname)}`;
+}
+
 async function read(link, uri) {
-  if (!uri.startsWith("package://"))
-    throw new Error(t("{name}: only meshes of package:// can be loaded", { name: uri || "?" }));
-  const bytes = await link.asset(uri);
+  const bytes = await link.asset(checked(uri));
   const kind = /\.(\w+)$/.exec(uri)?.[1].toLowerCase();
-  if (kind === "stl") return { object: readStl(bytes), hasColors: false };
-  if (kind === "obj") return { object: readObj(new TextDecoder().decode(bytes)), hasColors: false };
-  if (kind === "dae") return { object: await readDae(link, uri, bytes), hasColors: true };
+  if (kind === "stl") return { object: readStl(bytes) };
+  if (kind === "obj") return { object: await objectOf(link, uri, bytes) };
+  if (kind === "dae") return { object: await readDae(link, uri, bytes) };
   throw new Error(t("{name}: meshes are .stl, .dae or .obj", { name: uri }));
 }
 
@@ -77,30 +138,33 @@ function readStl(bytes) {
     geometry.computeVertexNormals();
     break;
   }
-  return new Mesh(geometry, bodyMaterial([200, 200, 200]));
+  const material = bodyMaterial([200, 200, 200]);
+  material.userData.isPlain = true;
+  return new Mesh(geometry, material);
 }
 
-/** Read the triangles of Wavefront's format; its materials are left out. */
-function readObj(text) {
-  const vertices = [];
-  const positions = [];
-  for (const line of text.split("\n")) {
-    const [word, ...rest] = line.trim().split(/\s+/);
-    if (word === "v") vertices.push(rest.slice(0, 3).map(Number));
-    else if (word === "f") {
-      const corners = rest
-        .map((part) => Number(part.split("/")[0]))
-        .map((index) => vertices[index < 0 ? vertices.length + index : index - 1]);
-      if (corners.includes(undefined)) throw new Error(t("the mesh names a vertex that it does not have"));
-      for (let corner = 2; corner < corners.length; corner++)
-        for (const each of [corners[0], corners[corner - 1], corners[corner]]) positions.push(...each);
+/** Read a file of Wavefront's format with the colors of its materials. */
+async function objectOf(link, uri, bytes) {
+  const { parts, libraries } = readObj(new TextDecoder().decode(bytes));
+  const colors = new Map();
+  for (const name of libraries) {
+    try {
+      const text = new TextDecoder().decode(await link.asset(beside(uri, name)));
+      for (const [material, color] of readMaterials(text)) colors.set(material, color);
+    } catch {
+      // Without its file a material is gray, as in RViz.
     }
   }
-  const mesh = new Mesh(new STLLoader().parse("solid x\nendsolid x"), bodyMaterial([200, 200, 200]));
-  mesh.geometry.setAttribute("position", new BufferAttribute(Float32Array.from(positions), 3));
-  mesh.geometry.deleteAttribute("normal");
-  mesh.geometry.computeVertexNormals();
-  return mesh;
+  const group = new Group();
+  for (const { material, positions, normals } of parts) {
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    if (normals) geometry.setAttribute("normal", new BufferAttribute(normals, 3));
+    else geometry.computeVertexNormals();
+    const { rgb = GRAY, alpha = 1 } = colors.get(material) ?? {};
+    group.add(new Mesh(geometry, bodyMaterial(rgb, alpha)));
+  }
+  return group;
 }
 
 async function readDae(link, uri, bytes) {
@@ -108,9 +172,8 @@ async function readDae(link, uri, bytes) {
   // The pictures come through the bridge, too: fetched first, since the loader wants addresses.
   const pictures = new Map();
   for (const [, name] of text.matchAll(/<init_from>(?:<ref>)?([^<]+\.(?:png|jpe?g|webp))/gi)) {
-    const { pathname } = new URL(name, uri.replace("package://", "http://x/"));
     try {
-      pictures.set(name, URL.createObjectURL(new Blob([await link.asset(`package:/${decodeURI(pathname)}`)])));
+      pictures.set(name, URL.createObjectURL(new Blob([await link.asset(beside(uri, name))])));
     } catch {
       pictures.set(name, EMPTY_PICTURE);
     }
@@ -125,7 +188,27 @@ async function readDae(link, uri, bytes) {
   // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and
   // so does RViz.
   parsed.scene.rotation.set(0, 0, 0);
+  const others = []; // lamps and cameras, which are not part of a body
+  let first = null;
+  parsed.scene.traverse((/** @type {any} */ each) => {
+    if (each.isLight || each.isCamera) others.push(each);
+    for (const material of each.isMesh ? [each.material].flat() : []) if (!isMissing(material)) first ??= material;
+  });
+  for (const each of others) each.removeFromParent();
+  // RViz gives the file's first material to a mesh without any.
+  const replaced = first ?? bodyMaterial(GRAY);
+  const known = (material) => (isMissing(material) ? replaced : material);
+  parsed.scene.traverse((/** @type {any} */ each) => {
+    if (each.isMesh) each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
+  });
   const group = new Group();
   group.add(parsed.scene);
   return group;
+}
+
+/** Return whether ColladaLoader made this material, for a mesh without one or with one that the file does not have. */
+function isMissing({ name, type, map, color, specular, shininess }) {
+  if (name === "__DEFAULT") return true;
+  const isUnchanged = color?.getHex() === 0xffffff && specular?.getHex() === 0x111111 && shininess === 30;
+  return type === "MeshPhongMaterial" && name === "" && !map && isUnchanged;
 }

@@ -293,6 +293,7 @@ export class Panel {
     }
     this.mark(dot, display.level());
     row.dataset.level = LEVELS[display.level()];
+    row.classList.toggle("gone", display.isGone === true);
     if (status)
       fill(
         status,

@@ -44,7 +44,8 @@ export function pointsOfScan({
   let count = 0;
   for (let index = 0; index < ranges.length; index++) {
     const range = ranges[index];
-    if (!(range >= least && range <= most)) continue;
+    // As in laser_geometry, which RViz uses: a range that equals the largest one was not measured.
+    if (!(range >= least && range < most)) continue;
     const angle = first + index * step;
     positions[count * 3] = range * Math.cos(angle);
     positions[count * 3 + 1] = range * Math.sin(angle);
@@ -77,6 +78,8 @@ export function pointsOfOldCloud({ points, channels }) {
  */
 export function pointsOfCloud(message, wanted = [], stride = 1) {
   const { width, height, point_step: step, data } = message;
+  // Programs leave the fields of an empty cloud out.
+  if (width * height === 0) return { count: 0, total: 0, positions: new Float32Array(), channels: new Map() };
   const fields = new Map(message.fields.map((field) => [field.name, field]));
   for (const name of ["x", "y", "z"]) {
     if (!fields.has(name))

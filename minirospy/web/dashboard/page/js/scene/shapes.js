@@ -27,6 +27,7 @@ import {
   Vector3,
 } from "../../vendor/three/three.min.js";
 
+const FADED = 0.3; // of the opacity of what nobody publishes any more
 const X_AXIS = new Vector3(1, 0, 0);
 // Cylinder and cone along x from 0 to 1, of diameter 1: an arrow's parts, scaled.
 const SHAFT = new CylinderGeometry(0.5, 0.5, 1, 16).rotateZ(-Math.PI / 2).translate(0.5, 0, 0);
@@ -96,7 +97,7 @@ const AXES = [
   [255, 0, 0],
   [0, 255, 0],
   [0, 0, 255],
-].map((rgb) => bodyMaterial(rgb));
+].map((rgb) => Object.assign(bodyMaterial(rgb), { userData: { isShared: true } }));
 
 /**
  * Return axes as RViz's: x red, y green, z blue. What RViz calls a radius is the diameter of what it draws; so it is
@@ -292,5 +293,23 @@ export function discard(object) {
       material.dispose();
     }
     if (each.isInstancedMesh) each.dispose();
+  });
+}
+
+/** Let what an object shows fade, or show it in full again. Materials that other objects use keep their colors. */
+export function fade(object, isFaded) {
+  object.traverse((/** @type {any} */ each) => {
+    for (const material of each.material ? [each.material].flat() : []) {
+      if (material.userData.isShared) continue;
+      const full = (material.userData.full ??= {
+        opacity: material.uniforms?.opacity?.value ?? material.opacity,
+        transparent: material.transparent,
+      });
+      const opacity = full.opacity * (isFaded ? FADED : 1);
+      if (material.uniforms?.opacity) material.uniforms.opacity.value = opacity;
+      else material.opacity = opacity;
+      if (material.transparent !== (isFaded || full.transparent)) material.needsUpdate = true;
+      material.transparent = isFaded || full.transparent;
+    }
   });
 }

@@ -8,33 +8,45 @@ import { parseXml } from "./xml.js";
 export class UrdfError extends Error {}
 
 /**
- * Return {name, root, links: Map of name -> {name, visuals, collisions}, joints: Map of name -> joint}.
+ * Return {name, root, links: Map of name -> {name, visuals, collisions}, joints: Map of name -> joint, notes: faults of
+ * the text that were passed over}.
  * Throws UrdfError or XmlError.
  *
- * A visual is {origin, geometry: {kind, size | radius, length | uri, scale}, color: [r, g, b, a] | null}; a joint
+ * A visual is {origin, geometry: {kind, size | radius, length | uri, scale}, color: [r, g, b, a] | null,
+ * texture: uri or ""}; a joint
  * {name, type, parent, child,
  * origin, axis, mimic: {joint, multiplier, offset} | null}. */
 export function parseUrdf(text) {
   const robot = parseXml(text);
   if (robot.name !== "robot") throw new UrdfError(t("<{name}>, where <robot> is expected", { name: robot.name }));
-  const colors = new Map();
-  for (const material of named(robot, "material")) {
-    const color = colorOf(material);
-    if (color) colors.set(material.attributes.name, color);
-  }
+  const notes = [...robot.notes];
   // Materials within links count for all links, too.
-  for (const link of named(robot, "link")) {
-    for (const visual of named(link, "visual")) {
-      const material = first(visual, "material");
-      if (material?.attributes.name && colorOf(material)) colors.set(material.attributes.name, colorOf(material));
-    }
+  const paints = new Map();
+  const visuals = named(robot, "link").flatMap((link) => named(link, "visual"));
+  for (const material of [
+    ...named(robot, "material"),
+    ...visuals.map((visual) => first(visual, "material")).filter((each) => each?.attributes.name),
+  ]) {
+    const paint = paintOf(material);
+    if (paint.color || paint.texture) paints.set(material.attributes.name, paint);
   }
 
   const links = new Map();
   for (const link of named(robot, "link")) {
     const shapes = (kind) =>
       named(link, kind)
-        .map((each) => shapeOf(each, colors, link.attributes.name))
+        .map((each) => {
+          try {
+            return shapeOf(each, paints);
+          } catch (error) {
+            if (!(error instanceof UrdfError)) throw error;
+            // As in ROS, the fault costs this shape, not the robot.
+            notes.push(
+              t('link "{link}": a shape is left out: {why}', { link: link.attributes.name, why: error.message }),
+            );
+            return null;
+          }
+        })
         .filter(Boolean);
     links.set(link.attributes.name, {
       name: link.attributes.name,
@@ -58,7 +70,7 @@ export function parseUrdf(text) {
     throw new UrdfError(
       roots.length ? t("two root links: {names}", { names: roots.join(", ") }) : t("there is no root link"),
     );
-  return { name: robot.attributes.name ?? "", root: roots[0], links, joints };
+  return { name: robot.attributes.name ?? "", root: roots[0], links, joints, notes };
 }
 
 /**
@@ -112,17 +124,24 @@ function originOf(element) {
   return { p: numbers(origin.xyz, [0, 0, 0]), q: fromRpy(numbers(origin.rpy, [0, 0, 0])) };
 }
 
-function colorOf(material) {
+/** Return {color, texture} of a material; a color that cannot be read is none. */
+function paintOf(material) {
   const color = first(material, "color");
-  return color ? numbers(color.attributes.rgba, [1, 1, 1, 1]) : null;
+  const texture = first(material, "texture")?.attributes.filename ?? "";
+  try {
+    return { color: color ? numbers(color.attributes.rgba, [1, 1, 1, 1]) : null, texture };
+  } catch {
+    return { color: null, texture };
+  }
 }
 
-function shapeOf(element, colors, link) {
+function shapeOf(element, paints) {
   const geometry = first(element, "geometry")?.children[0];
   if (!geometry) return null;
   const { attributes } = geometry;
   const material = first(element, "material");
-  const color = material ? (colorOf(material) ?? colors.get(material.attributes.name) ?? null) : null;
+  let paint = material ? paintOf(material) : { color: null, texture: "" };
+  if (material && !paint.color && !paint.texture) paint = paints.get(material.attributes.name) ?? paint;
   const size = (name) => numbers(attributes[name], [NaN])[0];
   const kinds = {
     box: () => ({ kind: "box", size: numbers(attributes.size, [1, 1, 1]) }),
@@ -131,11 +150,11 @@ function shapeOf(element, colors, link) {
     mesh: () => ({ kind: "mesh", uri: attributes.filename ?? "", scale: numbers(attributes.scale, [1, 1, 1]) }),
   };
   if (!Object.hasOwn(kinds, geometry.name))
-    throw new UrdfError(t('link "{link}": the shape <{name}> is not known', { link, name: geometry.name }));
+    throw new UrdfError(t("the shape <{name}> is not known", { name: geometry.name }));
   const made = kinds[geometry.name]();
   if ([made.radius ?? 0, made.length ?? 0].includes(NaN))
-    throw new UrdfError(t('link "{link}": <{name}> without radius or length', { link, name: geometry.name }));
-  return { origin: originOf(element), geometry: made, color };
+    throw new UrdfError(t("<{name}> without radius or length", { name: geometry.name }));
+  return { origin: originOf(element), geometry: made, ...paint };
 }
 
 function jointOf(element) {

@@ -1,5 +1,6 @@
 // Bags: topics recorded into the folder of the command, and a bag on a timeline, played without or with publishing it.
 
+import { decompressed } from "../compressed.js";
 import { bandwidth, fill, h, setText } from "../dom.js";
 import { Endpoint } from "../endpoint.js";
 import { pixelsOf } from "../pixels.js";
@@ -874,19 +875,12 @@ class Card {
 
 /** Return what a canvas can draw of an image message. Throws Error. */
 async function pictureOf(message) {
-  if ("encoding" in message) {
-    const { rgba, width, height } = pixelsOf(message);
-    const canvas = new OffscreenCanvas(width, height);
-    canvas.getContext("2d").putImageData(new ImageData(rgba, width, height), 0, 0);
-    return canvas;
-  }
-  try {
-    return await createImageBitmap(new Blob([message.data]));
-  } catch {
-    throw new Error(
-      t('a compressed image of format "{format}" cannot be shown by this browser', { format: message.format }),
-    );
-  }
+  const found = "encoding" in message ? message : await decompressed(message);
+  if (!("encoding" in found)) return found.bitmap;
+  const { rgba, width, height } = pixelsOf(found);
+  const canvas = new OffscreenCanvas(width, height);
+  canvas.getContext("2d").putImageData(new ImageData(rgba, width, height), 0, 0);
+  return canvas;
 }
 
 function small(image, height) {

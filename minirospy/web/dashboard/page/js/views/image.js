@@ -1,8 +1,9 @@
 // Images of a topic, raw and compressed: always the newest one; zoom, the value of a pixel, and markers over them.
 
+import { decompressed } from "../compressed.js";
 import { fill, h, number, setText } from "../dom.js";
 import { ImageMarkers } from "../image_markers.js";
-import { pixelsOf } from "../pixels.js";
+import { COLOR_MAPS, pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { t } from "../texts.js";
 
@@ -37,7 +38,13 @@ export class Image {
         onchange: () => this.rescale(),
       }),
     );
-    this.scale = h("label", { hidden: true }, t("black to white"), this.bounds);
+    this.mapChoice = h(
+      "select",
+      { "aria-label": t("Colors of the numbers"), onchange: () => this.rescale() },
+      Object.keys(COLOR_MAPS).map((name) => h("option", { value: name }, t(name))),
+    );
+    this.mapChoice.value = words.get("colors") in COLOR_MAPS ? words.get("colors") : "gray";
+    this.scale = h("label", { hidden: true }, t("black to white"), this.bounds, this.mapChoice);
     this.zoomed = null; // pixels of the screen for one of the image; null: as it fits
     this.isActual = h("input", { type: "checkbox", onchange: () => this.unzoom() });
     this.about = h("span", { class: "muted" });
@@ -130,7 +137,8 @@ export class Image {
 
   remember() {
     const [low, high] = this.bounds.map(({ value }) => value);
-    this.place.remember({ topic: this.topic, markers: this.markerTopic, low, high });
+    const colors = this.mapChoice.value === "gray" ? "" : this.mapChoice.value;
+    this.place.remember({ topic: this.topic, markers: this.markerTopic, low, high, colors });
   }
 
   // --- markers
@@ -184,12 +192,17 @@ export class Image {
 
   rescale() {
     this.remember();
-    if (this.pixels?.range) this.show(this.decoded(this.message), this.message);
+    if (this.pixels?.range) this.show(this.decoded(this.values), this.message);
     this.showAbout();
   }
 
   decoded(message) {
-    return pixelsOf(message, ...this.bounds.map(({ value }) => (value === "" ? null : Number(value))));
+    this.values = message;
+    return pixelsOf(
+      message,
+      ...this.bounds.map(({ value }) => (value === "" ? null : Number(value))),
+      this.mapChoice.value,
+    );
   }
 
   subscribe() {
@@ -209,7 +222,8 @@ export class Image {
       const [message, { topic }] = [this.next, this];
       this.next = null;
       try {
-        const found = "encoding" in message ? this.decoded(message) : await decompressed(message);
+        const picture = "encoding" in message ? message : await decompressed(message);
+        const found = "encoding" in picture ? this.decoded(picture) : picture;
         if (topic === this.topic && !this.isClosed) this.show(found, message);
         else found.bitmap?.close();
         setText(this.problem, "");
@@ -317,14 +331,4 @@ export class Image {
       setTimeout(() => URL.revokeObjectURL(url), 60_000);
     });
   }
-}
-
-async function decompressed({ data, format }) {
-  let bitmap;
-  try {
-    bitmap = await createImageBitmap(new Blob([data]));
-  } catch {
-    throw new Error(t('a compressed image of format "{format}" cannot be shown by this browser', { format }));
-  }
-  return { width: bitmap.width, height: bitmap.height, bitmap, range: null };
 }

@@ -3,7 +3,7 @@
 import { Group } from "../../../vendor/three/three.min.js";
 import { CLASSES, classOf, getSetting } from "../classes.js";
 import { rgbOf } from "../colors.js";
-import { discard } from "../shapes.js";
+import { discard, fade } from "../shapes.js";
 import { missingText, secondsOf } from "../transforms.js";
 import { t } from "../../texts.js";
 
@@ -127,6 +127,7 @@ export class TopicDisplay extends Display {
     const name = String(this.get(topicKey) ?? "");
     this.topic = name && !name.startsWith("/") ? `/${name}` : name;
     this.count = 0;
+    this.isGone = false; // there were messages, and nothing publishes them now
     if (!this.topic) {
       this.setStatus("Topic", 1, t("No topic is set"));
       return;
@@ -176,6 +177,19 @@ export class TopicDisplay extends Display {
         }),
       );
     else if (!this.count) this.setStatus("Topic", 1, t("No messages received"));
+    else {
+      const isGone = !channel;
+      this.setStatus(
+        "Topic",
+        isGone ? 1 : 0,
+        isGone ? t("Nothing publishes this topic any more") : t("Messages received"),
+      );
+      if (isGone !== this.isGone) {
+        this.isGone = isGone;
+        fade(this.object, isGone);
+        this.context.stage.invalidate();
+      }
+    }
   }
 
   stop() {

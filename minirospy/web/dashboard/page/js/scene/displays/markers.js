@@ -35,6 +35,7 @@ const KINDS = [
   "Triangle List",
 ];
 const MOST = 10_000; // markers of a display
+const WHITE = [255, 255, 255];
 const MAX_SPACES = 1000; // namespaces in the list of settings
 
 const rgbOf = ({ r, g, b }) => [r * 255, g * 255, b * 255];
@@ -272,8 +273,11 @@ function makeTriangles({ points, colors, scale, color }) {
 function makeMesh({ mesh_resource: uri, mesh_use_embedded_materials: isOwn, scale, color }, display) {
   const holder = new Group();
   holder.scale.set(scale.x, scale.y, scale.z);
-  const usesOwn = isOwn && color.r + color.g + color.b + color.a === 0;
-  loadMesh(display.context.link, uri, usesOwn ? null : { rgb: rgbOf(color), alpha: color.a }).then(
+  const isUnset = color.r === 0 && color.g === 0 && color.b === 0 && color.a === 0;
+  const paint = isOwn
+    ? { tint: isUnset ? null : rgbOf(color), alpha: isUnset ? 1 : color.a, rgb: isUnset ? WHITE : rgbOf(color) }
+    : { rgb: rgbOf(color), alpha: color.a, isForced: true };
+  loadMesh(display.context.link, uri, paint).then(
     (mesh) => {
       holder.add(mesh);
       display.context.stage.invalidate();

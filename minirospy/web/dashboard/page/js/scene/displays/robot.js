@@ -2,14 +2,14 @@
 // joints.
 
 import { Group, Mesh } from "../../../vendor/three/three.min.js";
-import { loadMesh } from "../meshes.js";
+import { loadMesh, loadTexture } from "../meshes.js";
 import { BALL, bodyMaterial, BOX, ROLL } from "../shapes.js";
 import { compose, missingText, plainName } from "../transforms.js";
 import { linkPoses, parseUrdf } from "../urdf.js";
 import { t } from "../../texts.js";
 import { Display } from "./display.js";
 
-const PLAIN = [180, 180, 180, 1];
+const PLAIN = [255, 0, 0, 1]; // as in RViz, a link without a material is red
 
 export class RobotModel extends Display {
   start() {
@@ -58,7 +58,8 @@ export class RobotModel extends Display {
       this.setStatus("URDF", 2, t("URDF failed Model parse: {why}", { why: error.message }));
       return;
     }
-    this.setStatus("URDF", 0, t("URDF parsed OK"));
+    const { notes } = this.robot;
+    this.setStatus("URDF", notes.length ? 1 : 0, [t("URDF parsed OK"), ...notes].join("; "));
     this.poses = null;
     this.isLoading = 0;
     this.failed = [];
@@ -78,43 +79,58 @@ export class RobotModel extends Display {
       ...(this.get("Visual Enabled") === false ? [] : visuals),
       ...(this.get("Collision Enabled") === true ? collisions : []),
     ];
-    for (const { origin, geometry, color } of shown) {
+    for (const { origin, geometry, ...own } of shown) {
+      // As in RViz, shapes without a material have that of the link's first shape.
+      const { color, texture } = own.color || own.texture ? own : (visuals[0] ?? own);
       const holder = new Group();
       holder.position.fromArray(origin.p);
       holder.quaternion.fromArray(origin.q);
-      this.fill(holder, geometry, color);
+      this.fill(holder, geometry, color, texture);
       group.add(holder);
     }
     return group;
   }
 
-  fill(holder, geometry, color) {
+  fill(holder, geometry, color, texture) {
     const [r, g, b, a] = color ? [color[0] * 255, color[1] * 255, color[2] * 255, color[3]] : PLAIN;
     const alpha = a * this.number("Alpha", 1);
     if (geometry.kind === "mesh") {
-      this.isLoading += 1;
-      loadMesh(this.context.link, geometry.uri, { rgb: [r, g, b], alpha, isForced: Boolean(color) })
-        .then(
-          (mesh) => {
-            mesh.scale.multiply({ x: geometry.scale[0], y: geometry.scale[1], z: geometry.scale[2] });
-            holder.add(mesh);
-          },
-          (error) => this.failed.push(error.message),
-        )
-        .finally(() => {
-          this.isLoading -= 1;
-          this.context.stage.invalidate();
-          if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
-          else if (!this.isLoading) this.clearStatus("Meshes");
-        });
+      this.load(async () => {
+        const map = texture ? await loadTexture(this.context.link, texture) : null;
+        const rgb = map ? [255, 255, 255] : [r, g, b];
+        const mesh = await loadMesh(this.context.link, geometry.uri, { rgb, alpha, map });
+        mesh.scale.multiply({ x: geometry.scale[0], y: geometry.scale[1], z: geometry.scale[2] });
+        holder.add(mesh);
+      });
       return;
     }
     const material = bodyMaterial([r, g, b], alpha);
+    if (texture) {
+      this.load(async () => {
+        material.map = await loadTexture(this.context.link, texture);
+        material.color.setRGB(1, 1, 1);
+        material.needsUpdate = true;
+      });
+    }
     const shape = new Mesh({ box: BOX, sphere: BALL, cylinder: ROLL }[geometry.kind], material);
     if (geometry.kind === "box") shape.scale.fromArray(geometry.size);
     else if (geometry.kind === "sphere") shape.scale.setScalar(geometry.radius * 2);
     else shape.scale.set(geometry.radius * 2, geometry.radius * 2, geometry.length);
     holder.add(shape);
+  }
+
+  /** Load a mesh or a texture; a failure is the status of the display. */
+  async load(work) {
+    this.isLoading += 1;
+    try {
+      await work();
+    } catch (error) {
+      this.failed.push(error.message);
+    }
+    this.isLoading -= 1;
+    this.context.stage.invalidate();
+    if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
+    else if (!this.isLoading) this.clearStatus("Meshes");
   }
 
   update() {

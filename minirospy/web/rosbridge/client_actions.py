@@ -1,0 +1,206 @@
+"""The goals that a rosbridge client sends to action servers, as in rosbridge 2 for ROS 2, for servers of ROS 1 (actionlib).
+
+Source: ROSBRIDGE_PROTOCOL.md in https://github.com/RobotWebTools/rosbridge_suite, branch ros2, sections 3.2.12 to 3.2.15.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from minirospy.aio.tasks import ErrorReporter
+from minirospy.base.errors import BridgeError, ROSInterruptException
+from minirospy.core.graph.goals import GoalState
+from minirospy.core.idl.protocols import Message
+from minirospy.web.json_text import dump_json_in_pieces
+from minirospy.web.rosbridge import conversion, protocol
+from minirospy.web.rosbridge.operation import REFUSALS, check_name
+from minirospy.web.rosbridge.types import UnknownTypeError, message_class
+
+if TYPE_CHECKING:
+    from minirospy.ros.actionlib.actionlib.aio import ActionClient, ClientGoal
+    from minirospy.web.rosbridge.operation import OperationSession
+
+__all__ = ["ClientActions"]
+
+_log = logging.getLogger(__name__)
+
+_MAX_GOALS = 100  # maximum number of running goals of one client
+_MAX_ACTIONS = 50  # maximum number of actions that one client may use; each has five topics
+SERVER_SECONDS = 5.0  # maximum time until a server is connected; rosbridge gives up then, too
+
+_UNKNOWN = 0  # values of action_msgs/GoalStatus of ROS 2
+_STATUSES = {
+    GoalState.SUCCEEDED: 4,
+    GoalState.PREEMPTED: 5,
+    GoalState.RECALLED: 5,
+    GoalState.ABORTED: 6,
+}
+
+
+@dataclass
+class _Running:
+    """A goal that has no result yet. ``goal``: set once it can be sent. ``is_cancelled``: set if that comes too late."""
+
+    goal: ClientGoal[Message, Message] | None = None
+    is_cancelled: bool = False
+
+    def cancel(self) -> None:
+        self.is_cancelled = True
+        if self.goal is not None:
+            self.goal.cancel()
+
+
+class ClientActions:
+    """The actions that one client uses. Its methods are called in the order of the client's operations."""
+
+    def __init__(self, session: OperationSession) -> None:
+        self._session = session
+        self._clients: dict[tuple[str, Any], ActionClient[Any, Message, Message]] = {}  # by (action, class)
+        self._goals: dict[object, _Running] = {}  # by the id of the operation
+        self._count = 0  # number of running goals, also of those without an id
+        self._reporter = ErrorReporter(_log, "a client's goal")
+
+    def close(self) -> None:
+        """Leave the topics of the actions. Goals that are running continue."""
+        for client in self._clients.values():
+            self._session.graph.spawn(client.close())
+        self._clients.clear()
+        self._goals.clear()
+
+    def send_goal(self, event: protocol.SendActionGoal) -> None:
+        if not self._is_allowed(event.action):
+            return
+        if self._count >= _MAX_GOALS:
+            raise BridgeError(f"{_MAX_GOALS} goals are running: wait for a result")
+        self._count += 1
+        running = _Running()
+        if event.id is not None:
+            self._goals[event.id] = running
+
+        def ended(_: object) -> None:
+            self._count -= 1
+            if self._goals.get(event.id) is running:
+                del self._goals[event.id]
+
+        self._session.spawn(self._send(event, running)).add_done_callback(ended)
+
+    def cancel_goal(self, event: protocol.CancelActionGoal) -> None:
+        running = self._goals.get(event.id)
+        if running is not None:
+            running.cancel()
+
+    def _is_allowed(self, action: str) -> bool:
+        what = "action, cancelling sending action goal for"
+        return all(
+            self._session.is_allowed("topics", f"{action}/{each}", what) for each in ("goal", "result")
+        )
+
+    async def _send(self, event: protocol.SendActionGoal, running: _Running) -> None:
+        try:
+            await self._run(event, running)
+        except (*REFUSALS, ROSInterruptException, TimeoutError) as error:
+            self._session.shared.log.warning(
+                "[Client %s] send_action_goal %s: %s", self._session.client.name, event.action, error
+            )
+            await self._result(event, str(error), _UNKNOWN, is_result=False)
+        except Exception as error:  # noqa: BLE001 - the client waits for the result, whatever happened here
+            self._reporter.report(error)
+            await self._result(event, "the bridge failed on this goal", _UNKNOWN, is_result=False)
+
+    async def _run(self, event: protocol.SendActionGoal, running: _Running) -> None:
+        self._session.require_write("sending goals")
+        check_name("action", event.action)
+        resolved = self._session.graph.node.resolve(event.action)
+        if not self._session.graph.filters.publishable(f"{resolved}/goal"):
+            raise BridgeError(f"topic [{resolved}/goal] may not be published by clients")
+        class_: Any = _action_class(event.type)
+        client = self._client(resolved, class_)
+        message = class_().action_goal.goal
+        now = self._session.graph.node.now
+        conversion.fill(message, conversion.request_values(message, event.arguments), now)
+
+        goal = running.goal = client.send(message)
+        if running.is_cancelled:
+            goal.cancel()
+        try:
+            await client.wait_for_server(SERVER_SECONDS)
+            async for feedback in goal:
+                if event.feedback:
+                    await self._feedback(event, feedback)
+            await self._ended(event, goal)
+        except TimeoutError:
+            goal.cancel()  # it is not sent if a server starts later
+            raise
+
+    def _client(self, action: str, class_: Any) -> ActionClient[Any, Message, Message]:
+        key = (action, class_)
+        if key not in self._clients:
+            # This imports the messages of actionlib, which most clients do not need.
+            from minirospy.ros.actionlib.actionlib.aio import ActionClient
+
+            if len(self._clients) >= _MAX_ACTIONS:
+                raise BridgeError(f"a client may use {_MAX_ACTIONS} actions")
+            self._clients[key] = ActionClient(self._session.graph.node, action, class_)
+        return self._clients[key]
+
+    async def _ended(self, event: protocol.SendActionGoal, goal: ClientGoal[Message, Message]) -> None:
+        from minirospy.ros.actionlib.actionlib.aio import GoalError
+
+        result: Any
+        try:
+            result = await goal
+        except GoalError as error:
+            result = error.result
+        status = _STATUSES.get(goal.state)
+        if status is None or result is None:
+            why = f": {goal.text}" if goal.text else ""
+            text = f"the goal was {goal.state.name.lower()}{why}"
+            await self._result(event, text, _UNKNOWN if status is None else status, is_result=False)
+        else:
+            await self._result(event, conversion.values(result), status, is_result=True)
+
+    async def _feedback(self, event: protocol.SendActionGoal, feedback: Message) -> None:
+        fields: dict[str, object] = {
+            "op": "action_feedback",
+            "action": event.action,
+            "values": conversion.values(feedback),
+        }
+        await self._encode(event, fields)
+
+    async def _result(
+        self, event: protocol.SendActionGoal, values: object, status: int, *, is_result: bool
+    ) -> None:
+        fields: dict[str, object] = {
+            "op": "action_result",
+            "action": event.action,
+            "values": values,
+            "status": status,
+            "result": is_result,
+        }
+        await self._encode(event, fields)
+
+    async def _encode(self, event: protocol.SendActionGoal, fields: dict[str, object]) -> None:
+        if event.id is not None:
+            fields["id"] = event.id
+        shared = self._session.shared
+        size = event.fragment_size or shared.options.fragment_size
+        messages = await shared.encode(
+            lambda: protocol.encode_messages(fields, event.compression, size, dump_json_in_pieces)
+        )
+        self._session.send_encoded(messages)
+
+
+def _action_class(type_: str) -> type[Message]:
+    """Return the class of an action. Names of ROS 2 are accepted, too. Raise UnknownTypeError if it is not installed."""
+    package, _, short = type_.replace("/action/", "/", 1).partition("/")
+    name = f"{package}/{short}" if short.endswith("Action") else f"{package}/{short}Action"
+    try:
+        return message_class(name)
+    except UnknownTypeError:
+        if short.endswith("Action"):
+            raise
+        raise UnknownTypeError(
+            f"the action {type_[:200]} is not installed: its type is {name[:200]} in ROS 1"
+        ) from None
