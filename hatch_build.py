@@ -21,6 +21,10 @@ from hatchling.builders.config import BuilderConfig
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
+if sys.version_info < (3, 10):  # noqa: UP036 pip builds before it compares requires-python
+    found = ".".join(map(str, sys.version_info[:2]))
+    sys.exit(f"minirospy needs Python 3.10 or newer, this is {found} (docs/install.md)")
+
 ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
 """The environment variable with the address of the repository, set by the publisher: docs/release.md."""
 
