@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import operator
-import sys
-from typing import TypeVar
 
 from minirospy.board.events import Detector, Slope
 
-__all__ = ["NO_BOUNCETIME", "channels_of", "detector_of", "level_of", "noted"]
-
-_E = TypeVar("_E", bound=Exception)
+__all__ = ["NO_BOUNCETIME", "channels_of", "detector_of", "level_of"]
 
 NO_BOUNCETIME = -666  # RPi.GPIO's default: no debouncing
-
-
-def noted(error: _E, note: str) -> _E:
-    """Return an error whose traceback ends with a note; its text stays RPi.GPIO's. Python 3.10 shows no notes."""
-    if sys.version_info >= (3, 11):
-        error.add_note(f"minirospy: {note}")
-    return error
 
 
 def channels_of(channel: object) -> list[int]:

@@ -15,8 +15,9 @@ import warnings
 import weakref
 from collections.abc import Sequence
 
+from minirospy.base.notes import noted
 from minirospy.base.signal_dispatch import is_dispatching_signal
-from minirospy.board.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of, noted
+from minirospy.board.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of
 from minirospy.board.directory import BoardDirectory
 from minirospy.board.events import Callback, CallbackThread, Detector, Slope
 from minirospy.board.link import Edge, Link

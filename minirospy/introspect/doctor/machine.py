@@ -18,6 +18,8 @@ from minirospy.base.errors import ManifestError, NotFoundError, NoThreadsAtEndEr
 from minirospy.base.installation import install_command
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import MasterLocation, is_loopback, is_own_address
+from minirospy.workspace.hidden_modules import hiding_files
+from minirospy.workspace.stale import warning_of_stale_definitions, workspace_of
 
 __all__ = ["check_packages", "check_python", "check_variables"]
 
@@ -60,6 +62,12 @@ def check_python() -> Iterator[Finding]:
     if (3, 12, 0) <= sys.version_info[:3] < (3, 12, 3):
         yield warning(
             "python", str(NoThreadsAtEndError()), "install a newer Python, and make the environment again"
+        )
+    for file in hiding_files(Path.cwd()):
+        yield problem(
+            "python",
+            f"{file} hides the module {file.stem} from programs in this folder",
+            "give it another name",
         )
     missing = [package for module, package in _LIBRARIES.items() if importlib.util.find_spec(module) is None]
     if missing:
@@ -222,6 +230,10 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                     "remove or rename one of them",
                 )
             )
+    # One warning for each workspace.
+    firsts = {workspace_of(folders[0]): folders[0] for folders in copies.values()}
+    stale = filter(None, map(warning_of_stale_definitions, firsts.values()))
+    found += (warning("packages", text, "catkin_make") for text in stale)
     found += _dependency_findings(environment, sorted(copies))
     yield from found or [
         ok("packages", f"{len(copies)} in ROS_PACKAGE_PATH" if copies else "those of minirospy")
