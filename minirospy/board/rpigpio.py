@@ -134,7 +134,11 @@ class Gpio:
 
     def setmode(self, mode: int) -> None:
         """Choose the pin numbering: BCM (chip) or BOARD (header)."""
-        mode = operator.index(mode)
+        try:
+            mode = operator.index(mode)
+        except TypeError as error:
+            noted(error, "the modes are GPIO.BCM and GPIO.BOARD, without quotes")
+            raise
         if self._mode is not None and mode != self._mode:
             raise ValueError("A different mode has already been set!")
         if mode not in {BOARD, BCM}:

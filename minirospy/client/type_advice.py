@@ -2,9 +2,36 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from types import ModuleType
+from typing import Any
 
-__all__ = ["advice_for_message_class", "advice_for_service_class"]
+__all__ = ["advice_for_callback", "advice_for_message_class", "advice_for_service_class"]
+
+
+def advice_for_callback(
+    error: BaseException, function: Callable[..., object], message: Any, *, has_args: bool
+) -> str:
+    """Return what is wrong with a callback: its parameters, or the use of a message in place of a field of it.
+
+    Return an empty string if the error has another cause.
+    """
+    if isinstance(error, TypeError):
+        given = "the message and callback_args" if has_args else "the message"
+        try:
+            inspect.signature(function).bind(*((message, None) if has_args else (message,)))
+        except TypeError:
+            name = getattr(function, "__name__", "callback")
+            parameters = "message, args" if has_args else "message"
+            return f"a callback gets {given}: def {name}({parameters})"
+        except ValueError:
+            return ""
+        if list(message.__slots__) == ["data"]:
+            return f"the value of a {message._type} is its field: message.data"
+    if isinstance(error, AttributeError) and error.obj is message:
+        return f"a {message._type} has the fields {', '.join(message.__slots__)}"
+    return ""
 
 
 def advice_for_message_class(given: object) -> str:

@@ -291,3 +291,109 @@ def test_type_that_a_wrong_publisher_left_behind(master: str) -> None:
     assert line.startswith(
         "WARNING: nothing publishes [/b] now; messages of its last type [std_msgs/String] are awaited."
     )
+
+
+@pytest.mark.skipif(not HAS_NOTES, reason="Python 3.10 has no notes")
+@pytest.mark.parametrize(
+    ("callback", "note"),
+    [
+        ("lambda: 1", "minirospy: a callback gets the message: def <lambda>(message)"),
+        ("lambda m: m + 1", "minirospy: the value of a std_msgs/Int32 is its field: message.data"),
+        ("lambda m: m.dta", "minirospy: a std_msgs/Int32 has the fields data"),
+        ("lambda m: [].dta", ""),
+        ("lambda m: 1 / 0", ""),
+    ],
+)
+def test_callback_that_fails(callback: str, note: str, master: str) -> None:
+    code = (
+        "import rospy; from std_msgs.msg import Int32; rospy.init_node('x')\n"
+        "rospy.Publisher('/a', Int32, queue_size=1, latch=True).publish(5)\n"
+        f"rospy.Subscriber('/a', Int32, {callback}); rospy.sleep(1)\n"
+    )
+    done = typed("python", "-c", code)
+    lines = [line for line in done.stderr.splitlines() if line]
+    assert "bad callback" in lines[0]
+    assert (lines[-1] == note) if note else not lines[-1].startswith("minirospy:")
+
+
+@pytest.mark.parametrize("value", ["'5'", "5.5"])
+def test_message_that_does_not_fit_and_that_nobody_gets(value: str, master: str) -> None:
+    code = (
+        "import rospy; from std_msgs.msg import Int32; rospy.init_node('x')\n"
+        f"p = rospy.Publisher('/a', Int32, queue_size=1); p.publish({value}); p.publish({value})\n"
+    )
+    done = typed("python", "-c", code)
+    (line,) = done.stderr.splitlines()
+    assert "a message on /a does not fit std_msgs/Int32: field data must be an integer type" in line
+
+
+@pytest.mark.skipif(not HAS_NOTES, reason="Python 3.10 has no notes")
+@pytest.mark.parametrize(
+    ("code", "note"),
+    [
+        ("import rospy; rospy.init_node('x'); rospy.Rate(0)", "rospy.Rate(10)"),
+        (
+            "import RPi.GPIO as GPIO; GPIO.setmode('BCM')",
+            "the modes are GPIO.BCM and GPIO.BOARD, without quotes",
+        ),
+    ],
+)
+def test_wrong_number_or_mode(code: str, note: str, master: str) -> None:
+    assert typed("python", "-c", code).stderr.splitlines()[-1].endswith(note)
+
+
+# Forty mistakes that are typed without a running node, and a part of the last line of the answer.
+TYPED = [
+    ("rosrun", "type rosrun PACKAGE EXECUTABLE"),
+    ("rosrun rpi_feros", "[rpi_feros] has button_publisher.py"),
+    ("rosrun rpi_feros led_actuator", "did you mean led_actuator.py?"),
+    ("rosrun led_actuator.py", "as `rosrun rpi_feros led_actuator.py`"),
+    ("rosrun turtlesim turtle", "did you mean turtle_teleop_key or turtlesim_node?"),
+    ("rosrun nope x", "package [nope] not found"),
+    ("roslaunch rpi_led.launch", "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?"),
+    ("roslaunch rpi_feros rpi_led.launch", "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`"),
+    ("roslaunch nope.launch", "[nope.launch] is not a launch file name"),
+    ("minirospy launch", "specify what to launch"),
+    ("rostopic ehco /a", "did you mean echo?"),
+    ("rostopic pub /a std_msgs/Int32", "please specify message values: data"),
+    ("rostopic pub -1 /a std_msgs/Int32 five", "[std_msgs/Int32] has int32 data"),
+    ("rostopic pub -1 /a Int32 5", "did you mean std_msgs/Int32?"),
+    ("rostopic pub -1 /a std_msgs/Int33 5", "did you mean std_msgs/Int32"),
+    ("rostopic pub -r x /a std_msgs/Int32 5", "rate must be a number"),
+    ("rostopic info /nope", "topic [/nope] not found"),
+    ("rosservice call /nope", "service [/nope] not found"),
+    ("rosservice args", "the following arguments are required: service"),
+    ("rosnode kill /nope", "node [/nope] not found"),
+    ("rosnode info nope", "node [/nope] not found"),
+    ("rosnode lsit", "did you mean list?"),
+    ("rosparam get nope", "parameter [/nope] not found"),
+    ("rosparam set", "the following arguments are required: parameter"),
+    ("rosparam load nope.yaml", "nope.yaml"),
+    ("rosbag play nope.bag", "bag [nope.bag] not found"),
+    ("rosbag record", "You must specify a topic name"),
+    ("rosbag inof x.bag", "did you mean info?"),
+    ("rosmsg show geometry_msgs/Twits", "did you mean geometry_msgs/Twist?"),
+    ("rosmsg show geometry_msgs", "it is a package: `rosmsg package geometry_msgs`"),
+    ("rossrv show std_srvs/Setbool", "did you mean std_srvs/SetBool?"),
+    ("rospack find rpi_fero", "did you mean rpi_feros"),
+    ("catkin_make", "The specified source space does not exist"),
+    ("catkin_create_pkg My,Package", "is not a name for a package"),
+    ("catkin_create_pkg", "the following arguments are required: name"),
+    ("roscore", "another roscore/master is already running"),
+    ("minirospy demoo", "did you mean demo?"),
+    ("minirospy board press 99", "pin 99 does not exist: BCM numbers are 0 to 53"),
+    ("minirospy board press", "the following arguments are required: pin"),
+    ("minirospy board prss 11", "did you mean press?"),
+    ("xacro nope.xacro", "nope.xacro"),
+    ("minirospy python nope.py", "nope.py"),
+]
+
+
+@pytest.mark.parametrize(("line", "answer"), TYPED, ids=[line for line, _ in TYPED])
+def test_typed_mistake_is_answered_in_its_last_line(
+    line: str, answer: str, tmp_path: Path, master: str
+) -> None:
+    done = typed(*line.split(), folder=tmp_path)
+    text = done.stdout + done.stderr
+    assert "Traceback" not in text
+    assert answer in text.splitlines()[-1]
