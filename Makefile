@@ -6,8 +6,11 @@ BIN := $(VENV)/Scripts
 else
 BIN := $(VENV)/bin
 endif
+# minirospy alone, its generated modules, and the packages for tests and checks.
+PROGRAMS := $(VENV)/.programs
+OVERLAY := $(VENV)/.overlay
 STAMP := $(VENV)/.installed
-READY := $(VENV)/.overlay
+READY := $(STAMP) $(OVERLAY)
 
 # As on a user's machine: processes keep what they compile, which makes thousands of them start faster, and buffer their output.
 unexport PYTHONDONTWRITEBYTECODE PYTHONUNBUFFERED
@@ -21,9 +24,9 @@ CHECKED := tests/core/graph tests/core/wire tests/core/idl tests/introspect test
 .PHONY: demo check test interop ros2 ros2-core windows pythons lint guard bench fuzz mutants site release clean help
 
 help:
-	@echo "make demo     show the workshop's button and LED on the virtual board"
+	@echo "make demo     install minirospy into .venv, show the workshop's button and LED on the virtual board"
 	@echo "make check    the fast tests, lint and types: under a minute"
-	@echo "make test     run every test: some minutes"
+	@echo "make test     install what the tests need, run every test: some minutes"
 	@echo "make interop  test against Debian's real ROS 1, which it installs (needs apt-get and root)"
 	@echo "make windows  test on Windows' CPython by Wine, which it installs (needs apt-get and root)"
 	@echo "make pythons  run the fast tests on every Python found, with -X dev"
@@ -38,7 +41,9 @@ help:
 	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
 	@echo "make clean    remove the environment and all that was generated"
 
-demo: $(READY)
+# A second make sees that the installation has just written the overlay.
+demo: $(PROGRAMS)
+	@$(MAKE) --silent --no-print-directory $(OVERLAY)
 	@$(BIN)/minirospy demo
 
 check: lint
@@ -109,15 +114,23 @@ release: $(READY)
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
-# Made again when the project file or a definition changes; an interrupted install leaves no stamp.
-$(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py minirospy/cli/windows.py minirospy/core/idl/*.py msgs/*/*/* msgs/*/package.xml)
-	@$(PYTHON) -c "import sys; v = sys.version_info; v >= (3, 10) or sys.exit('minirospy needs Python 3.10 or newer, this is %d.%d: make PYTHON=python3.x' % v[:2])"
+# Made again when the project file or a definition changes; an interrupted install leaves no stamp. Modules are compiled when
+# they are first imported: most of them never are.
+$(PROGRAMS): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py minirospy/cli/windows.py minirospy/core/idl/*.py msgs/*/*/* msgs/*/package.xml)
+	@$(PYTHON) -c "import sys; v = sys.version_info; v >= (3, 10) or sys.exit('minirospy needs Python 3.10 or newer, this is %d.%d: make PYTHON=python3.x (docs/install.md)' % v[:2])"
 	@echo "Making the environment $(VENV) ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
+	@echo "Installing minirospy and its libraries ..."
+	@$(BIN)/python -m pip install --disable-pip-version-check --no-compile --editable .
+	@$(PYTHON) -c "open('$(PROGRAMS)', 'w').close(); open('$(OVERLAY)', 'w').close()"
+
+# minirospy[dev] is the installed one: only the packages of the extra are added.
+$(STAMP): $(PROGRAMS)
+	@echo "Installing what the tests and checks need into $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "minirospy[dev]"
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
 
 # Written again when a module that programs import changes what it offers.
-$(READY): $(STAMP) $(wildcard minirospy/ros/*.py minirospy/ros/*.json minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
+$(OVERLAY): $(PROGRAMS) $(wildcard minirospy/ros/*.py minirospy/ros/*.json minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
 	@$(BIN)/python -m minirospy.ros.overlay_modules
-	@$(PYTHON) -c "open('$(READY)', 'w').close()"
+	@$(PYTHON) -c "open('$(OVERLAY)', 'w').close()"

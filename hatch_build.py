@@ -21,9 +21,14 @@ from hatchling.builders.config import BuilderConfig
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
+if sys.version_info < (3, 10):  # noqa: UP036 pip builds before it compares requires-python
+    found = ".".join(map(str, sys.version_info[:2]))
+    sys.exit(f"minirospy needs Python 3.10 or newer, this is {found} (docs/install.md)")
+
 ADDRESS_VARIABLE = "MINIROSPY_PROJECT_URL"
 """The environment variable with the address of the repository, set by the publisher: docs/release.md."""
 
+_PICTURE = re.compile(r"!\[([^\]]*)\]\((?!https?:)([^)]+)\)")
 _LINK = re.compile(r"\[([^\]]+)\]\((?!https?:|#)([^)]+)\)")
 
 _PAGE = re.compile(r"minirospy/web/dashboard/page/(?!vendor/).*\.(js|css)")
@@ -61,10 +66,20 @@ def project_urls(address: str) -> dict[str, str]:
 
 
 def readme_of_wheel(text: str, url: str = "") -> str:
-    """Return the README with links that work outside of the sources: below ``url``, or as the names of files without one."""
-    if url:
-        return _LINK.sub(lambda link: f"[{link[1]}]({url.rstrip('/')}/{link[2]})", text)
-    return _LINK.sub(lambda link: link[1] if link[1] == link[2] else f"{link[1]} ({link[2]})", text)
+    """Return the README for outside of the sources: links lead below ``url``, the address of the repository's files.
+
+    Without a ``url``, links become names of files, and pictures are left out.
+    """
+    if not url:
+        text = _PICTURE.sub("", text)
+        return _LINK.sub(lambda link: link[1] if link[1] == link[2] else f"{link[1]} ({link[2]})", text)
+    files = url.rstrip("/")
+    # A page about a file is no picture.
+    contents = files.replace("/blob/", "/raw/")
+    repository = re.sub(r"(/-)?/blob/.*", "", files)
+    text = _PICTURE.sub(lambda picture: f"![{picture[1]}]({contents}/{picture[2]})", text)
+    text = _LINK.sub(lambda link: f"[{link[1]}]({files}/{link[2]})", text)
+    return text.replace("<this repository>", repository)
 
 
 def lean(text: str) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import importlib.machinery
 import os
+import re
 import shlex
+import shutil
+import subprocess
 import sys
 import sysconfig
 from pathlib import Path
@@ -13,6 +16,7 @@ import pytest
 
 from minirospy.base import installation
 from minirospy.base.installation import install_command
+from minirospy.web.serve import LIBRARIES
 
 ROOT = Path(__file__).parents[1]
 
@@ -127,3 +131,45 @@ def test_no_module_has_a_command_of_its_own() -> None:
         and "--target" not in line
     ]
     assert own == []
+
+
+def test_build_with_an_old_python_names_the_version_in_one_line() -> None:
+    """pip builds before it compares requires-python."""
+    code = "import runpy, sys; sys.version_info = (3, 8, 10); runpy.run_path('hatch_build.py')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "minirospy needs Python 3.10 or newer, this is 3.8 (docs/install.md)\n"
+
+
+def test_dashboard_needs_nothing_but_the_dependencies() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    required = text.partition("\ndependencies = [")[2].partition("]")[0]
+    assert [name for name in LIBRARIES if f'"{name}>=' not in required] == []
+
+
+@pytest.mark.skipif(not shutil.which("make"), reason="make is not installed")
+def test_demo_installs_no_packages_for_developers(tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["make", "-n", "demo", f"VENV={tmp_path.as_posix()}/venv"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    # The second make, which -n runs too, prints the same line.
+    (installed,) = {line for line in done.stdout.splitlines() if "pip install" in line}
+    assert installed.endswith("--editable .")
+    assert "--quiet" not in installed
+
+
+def test_no_page_promises_a_release_on_pypi() -> None:
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    promised = [
+        f"{page.relative_to(ROOT)}: {line}"
+        for page in pages
+        for line in page.read_text(encoding="utf-8").splitlines()
+        # minirospy[mcap] adds an extra to an installation; minirospy-0.1.0-py3-none-any.whl is a file.
+        if re.search(r"(pip|pipx|uv tool) install minirospy(?![-[\w])|uvx minirospy", line)
+        and "once it is released" not in line
+    ]
+    assert promised == []

@@ -213,7 +213,8 @@ def test_description_has_no_link_into_the_sources(tmp_path: Path, monkeypatch: p
     text = Path(folder, "METADATA").read_text(encoding="utf-8")
     assert "# minirospy" in text
     assert not re.findall(r"\]\((?!https?:|#)", text)
-    assert "security (docs/security.md)" in text
+    assert "threats and limits (docs/security.md)" in text
+    assert "![" not in text
 
 
 @pytest.mark.timeout(300)
@@ -224,7 +225,7 @@ def test_one_address_is_in_sdist_and_wheel(source: Path, wheel: Path) -> None:
         text = archive.read(name).decode()
     assert text == (source / "PKG-INFO").read_text(encoding="utf-8")
     assert faults_of_metadata(text, project_urls(ADDRESS)) == []
-    assert f"[security]({ADDRESS}/blob/HEAD/docs/security.md)" in text
+    assert f"[threats and limits]({ADDRESS}/blob/HEAD/docs/security.md)" in text
 
 
 def _build(target: Path, kind: str, source: Path, environ: dict[str, str]) -> Path:

@@ -157,6 +157,10 @@ def test_every_link_of_the_readme_leads_to_a_file() -> None:
     text = readme_of_wheel((ROOT / "README.md").read_text(encoding="utf-8"), files)
     named = [link.partition(")")[0] for link in text.split(f"]({files}")[1:]]
     assert len(named) > 20
+    pictures = [link.partition(")")[0] for link in text.split(f"]({ADDRESS}/raw/HEAD/")[1:]]
+    assert len(pictures) == 5
+    assert f"git clone {ADDRESS} minirospy" in text
+    named += pictures
     assert [name for name in named if not (ROOT / name.partition("#")[0]).is_file()] == []
 
 

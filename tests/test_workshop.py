@@ -161,8 +161,8 @@ def test_ctrl_c_ends_the_server_in_the_middle_of_a_goal(start: Start, board: Boa
     assert "'NoneType' object has no attribute 'finalRun'" in output
 
 
-def test_node_of_the_readme_runs(start: Start, board: Board, tmp_path: Path) -> None:
-    text = (TESTS.parent / "README.md").read_text(encoding="utf-8")
+def test_node_of_the_tour_runs(start: Start, board: Board, tmp_path: Path) -> None:
+    text = (TESTS.parent / "docs" / "tour.md").read_text(encoding="utf-8")
     node = tmp_path / "my_node.py"
     node.write_text(re.findall(r"```python\n(import rospy.*?)```", text, re.DOTALL)[0])
     publisher, mine = start(OURS / "button_publisher.py"), start(node)

@@ -7,6 +7,7 @@ Source: https://www.w3.org/TR/xml/.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml"
 MAX_LEVELS = 100  # maximum depth of nested tags; parsers and libraries recurse at least once per level
 # maximum tags per document; even a tag of 4 characters uses about 500 bytes of memory
 _MAX_ELEMENTS = 1_000_000
+_UNQUOTED = re.compile(rb"""<[^"'>]*(?:"[^"]*"[^"'>]*|'[^']*'[^"'>]*)*?\s([\w:-]+)\s*=\s*([^\s"'<>/=]+)""")
 
 
 class XmlError(MinirospyError):
@@ -106,7 +108,10 @@ def parse_xml(text: str | bytes) -> XmlElement:
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = data
-    _parse(parser, text)
+    try:
+        _parse(parser, text)
+    except XmlSyntaxError as error:
+        raise XmlSyntaxError(error.line, f"{error.why}{_advice(error, stack, text)}") from None
     return roots[0]
 
 
@@ -131,6 +136,21 @@ def check_xml(text: str | bytes) -> None:
     parser.StartElementHandler, parser.EndElementHandler = start, end
     with suppress(XmlSyntaxError):
         _parse(parser, text)
+
+
+def _advice(error: XmlSyntaxError, opened: list[XmlElement], text: str | bytes) -> str:
+    """Return a hint for the usual mistakes: an element that is not closed, a value without quotes, no text at all."""
+    if not text.strip():
+        return ": the file is empty"
+    if error.why.startswith(("mismatched tag", "no element found")) and opened:
+        last = opened[-1]
+        return f": <{last.tag}> of line {last.line} is not closed, by /> or </{last.tag}>"
+    lines = text.split(b"\n") if isinstance(text, bytes) else text.encode("utf-8", "replace").split(b"\n")
+    line = lines[error.line - 1] if 0 < error.line <= len(lines) else b""
+    if found := _UNQUOTED.search(line):
+        name, value = (part.decode("utf-8", "replace") for part in found.groups())
+        return f': a value is written in quotes: {name}="{value}"'
+    return ""
 
 
 def _check(line: int, level: int, left: int) -> None:

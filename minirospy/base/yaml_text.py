@@ -178,7 +178,21 @@ def one_line(error: Exception) -> str:
     """Return a YAML library's error message on one line."""
     problem = " ".join(str(getattr(error, "problem", None) or error).split())
     mark = getattr(error, "problem_mark", None)
-    return f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
+    place = f"{problem} (line {mark.line + 1}, column {mark.column + 1})" if mark else problem
+    for part, advice in _ADVICE.items():
+        if part in problem:
+            return f"{place}: {advice}"
+    return place
+
+
+_ADVICE = {
+    "expected ',' or ']'": "a [ is not closed, or a comma is missing",
+    "expected ',' or '}'": "a { is not closed, or a comma is missing",
+    "found a tab character": "YAML is indented with blanks, not with tabs",
+    "character '\\t'": "YAML is indented with blanks, not with tabs",
+    "mapping values are not allowed": "a value that contains a colon and a blank is written in quotes",
+}
+"""Advice by a part of the YAML library's error message."""
 
 
 _RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)

@@ -15,6 +15,7 @@ import warnings
 import weakref
 from collections.abc import Sequence
 
+from minirospy.base.notes import noted
 from minirospy.base.signal_dispatch import is_dispatching_signal
 from minirospy.board.arguments import NO_BOUNCETIME, channels_of, detector_of, level_of
 from minirospy.board.directory import BoardDirectory
@@ -22,6 +23,7 @@ from minirospy.board.events import Callback, CallbackThread, Detector, Slope
 from minirospy.board.link import Edge, Link
 from minirospy.board.model import PINS, Function, Pull, Setup
 from minirospy.board.wave import Wave
+from minirospy.board.wiring import wiring_fault
 
 __all__ = [
     "BCM",
@@ -116,6 +118,7 @@ class Gpio:
         self._lock = threading.RLock()
         self._mode: int | None = None
         self._warns = True
+        self._reported: set[int] = set()  # channels whose wiring a warning has named
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
@@ -131,7 +134,11 @@ class Gpio:
 
     def setmode(self, mode: int) -> None:
         """Choose the pin numbering: BCM (chip) or BOARD (header)."""
-        mode = operator.index(mode)
+        try:
+            mode = operator.index(mode)
+        except TypeError as error:
+            noted(error, "the modes are GPIO.BCM and GPIO.BOARD, without quotes")
+            raise
         if self._mode is not None and mode != self._mode:
             raise ValueError("A different mode has already been set!")
         if mode not in {BOARD, BCM}:
@@ -171,9 +178,12 @@ class Gpio:
             pin = self._writable[channel]  # type: ignore[index]
             level = level_of(value)
         except (KeyError, TypeError):
-            self._output_several(channel, value)
+            pass
         else:
             self._linked().write(((pin, level),))
+            return
+        # Outside of the handler, so that an error has no KeyError before it.
+        self._output_several(channel, value)
 
     def input(self, channel: int) -> int:
         """Return the level at a configured channel, output or input: 0 or 1."""
@@ -182,8 +192,9 @@ class Gpio:
         except (KeyError, TypeError):
             if (interrupted := self._interrupted.pop(channel, None)) is not None:
                 return self._levels[interrupted]
-            self._pin(channel)
-            raise RuntimeError("You must setup() the GPIO channel first") from None
+        self._pin(channel)
+        error = RuntimeError("You must setup() the GPIO channel first")
+        raise noted(error, f"channel {channel}: call GPIO.setup({channel}, GPIO.IN) before")
 
     def gpio_function(self, channel: int) -> int:
         """Return the current function of the channel's pin: IN or OUT."""
@@ -340,25 +351,33 @@ class Gpio:
 
     def _pin(self, channel: int) -> int:
         if self._mode is None:
-            raise RuntimeError(
-                "Please set pin numbering mode using GPIO.setmode(GPIO.BOARD) or GPIO.setmode(GPIO.BCM)"
+            raise noted(
+                RuntimeError(
+                    "Please set pin numbering mode using GPIO.setmode(GPIO.BOARD) or GPIO.setmode(GPIO.BCM)"
+                ),
+                "the numbers on the workshop's board are those of GPIO.setmode(GPIO.BCM)",
             )
         if not isinstance(channel, int):
-            raise TypeError("Channel must be an integer")
+            raise noted(TypeError("Channel must be an integer"), f"it is {channel!r}")
         pin = channel if self._mode == BCM else HEADER.get(channel, -1)
         if not 0 <= pin < PINS:
-            raise ValueError("The channel sent is invalid on a Raspberry Pi")
+            raise noted(
+                ValueError("The channel sent is invalid on a Raspberry Pi"),
+                f"it is {channel}, with the numbers of GPIO.{'BCM' if self._mode == BCM else 'BOARD'}",
+            )
         return pin
 
     def _input_pin(self, channel: int) -> int:
         pin = self._pin(channel)
         if self._directions.get(pin) != IN:
-            raise RuntimeError("You must setup() the GPIO channel as an input first")
+            error = RuntimeError("You must setup() the GPIO channel as an input first")
+            raise noted(error, f"channel {channel}: call GPIO.setup({channel}, GPIO.IN) before")
         return pin
 
     def _set_up(self, channel: int, direction: int, pull: int, level: int | None) -> None:
         pin = self._pin(channel)
         link = self._linked()
+        self._check_wiring(channel, pin, direction)
         if pin not in self._directions and link.states[pin].function is Function.OUT:
             self._warn(
                 "This channel is already in use, continuing anyway.  "
@@ -404,8 +423,10 @@ class Gpio:
             ) from None
 
         pins = [self._pin(one) for one in channels]
-        if any(self._directions.get(pin) != OUT for pin in pins):
-            raise RuntimeError("The GPIO channel has not been set up as an OUTPUT")
+        for one, pin in zip(channels, pins, strict=True):
+            if self._directions.get(pin) != OUT:
+                error = RuntimeError("The GPIO channel has not been set up as an OUTPUT")
+                raise noted(error, f"channel {one}: call GPIO.setup({one}, GPIO.OUT) before")
         self._linked().write(list(zip(pins, levels, strict=True)))
 
     def _forget_events(self, pin: int) -> None:
@@ -427,6 +448,16 @@ class Gpio:
             callbacks = self._callbacks
             if callbacks is not None:
                 callbacks.schedule(detector)
+
+    def _check_wiring(self, channel: int, pin: int, direction: int) -> None:
+        """Warn once for each channel that is set up in a way in which nothing can happen on the virtual board.
+
+        ``setwarnings(False)`` does not suppress it: listings start with that line.
+        """
+        fault = wiring_fault(channel, pin, direction, is_board=self._mode == BOARD)
+        if fault and channel not in self._reported:
+            self._reported.add(channel)
+            warnings.warn(f"virtual board: {fault}", RuntimeWarning, stacklevel=4)
 
     def _warn(self, text: str, depth: int) -> None:
         """Issue a warning for the user's line, which is ``depth`` calls above this one."""

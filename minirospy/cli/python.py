@@ -9,10 +9,12 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from minirospy.base.environment import export_local
-from minirospy.command.command import run
+from minirospy.command.command import run, warn
 from minirospy.ros.rosbash.commands.rosrun import become
+from minirospy.workspace.hidden_modules import warning_of_hiding_file
 
 __all__ = ["main"]
 
@@ -34,5 +36,8 @@ def _python(words: list[str]) -> int:
     if words[:1] in (["-h"], ["--help"]):
         print(_HELP, end="")
         return 0
+    program = next((word for word in words if not word.startswith("-")), "")
+    if program and (warning := warning_of_hiding_file(Path(program).absolute())):
+        warn(warning)
     export_local(os.environ)
     return become([sys.executable, *words])

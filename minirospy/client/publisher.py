@@ -258,7 +258,7 @@ class PublishedTopic(SharedTopic):
                 self._deferral.poll()
         elif not self._had_subscriber:
             self._had_subscriber = True
-            self._log_unheard()
+            self._log_unheard(message)
 
     def forget_subscribers(self) -> None:
         """Stop publishing to the current subscribers: in a fork, these are connected to the parent process."""
@@ -307,13 +307,20 @@ class PublishedTopic(SharedTopic):
         """Return whether the node ``endpoint_id`` is connected."""
         return any(link.peer == endpoint_id for link in self.publication.links)
 
-    def _log_unheard(self) -> None:
-        """Log that the first message was published without a subscriber.
+    def _log_unheard(self, message: Any) -> None:
+        """Log that the first message was published without a subscriber, or that it does not match its type.
 
         Log a warning only if the master reports a subscriber that is still connecting: many topics have no subscriber at
         first, or never have one.
         """
-        if self.publication.expected and not self._session.is_shutdown():
+        if fault := self._fault_of(message):
+            _log.warning(
+                "a message on %s does not fit %s: %s. It went to nobody; with a subscriber, publish() raises this",
+                self.resolved_name,
+                self.type,
+                fault,
+            )
+        elif self.publication.expected and not self._session.is_shutdown():
             _log.warning(
                 "the first message on %s went to nobody: %d known to the master, not connected yet. "
                 "wait_for_subscribers() waits for them, latch=True keeps the last message for them",
@@ -322,6 +329,18 @@ class PublishedTopic(SharedTopic):
             )
         else:
             _log.debug("the first message on %s went to nobody: it has no subscriber yet", self.resolved_name)
+
+    def _fault_of(self, message: Any) -> str:
+        """Return why a message does not match its type, or an empty string. Unlike `_frame`, leave its header unchanged."""
+        if isinstance(message, AnyMsg) or (self._has_header and message.header.frame_id is None):
+            return ""
+        try:
+            message.serialize(Pieces())
+        except SerializationError as error:
+            return str(error)
+        except Exception:  # noqa: BLE001 - publish() raises it if there is a subscriber
+            return ""
+        return ""
 
     def _frame(self, message: Any) -> bytes | LargeFrame:
         if self._has_header and not isinstance(message, AnyMsg):

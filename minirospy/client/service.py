@@ -16,10 +16,12 @@ from minirospy.base.errors import (
     RpcRefused,
     ServiceException,
 )
+from minirospy.base.notes import noted
 from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import current_session
 from minirospy.client.topic import unregister_from_master
+from minirospy.client.type_advice import advice_for_service_class
 from minirospy.core.idl.message import number_header
 from minirospy.core.idl.service import to_response
 from minirospy.core.wire.header import Header
@@ -64,7 +66,11 @@ class Service(Generic[_S_co]):
         self._session = current_session()
         self.resolved_name = self._session.resolve(name)
         self.service_class = service_class
-        self.request_class: type[Message] = service_class._request_class
+        try:
+            self.request_class: type[Message] = service_class._request_class
+        except AttributeError as error:
+            noted(error, advice_for_service_class(service_class))
+            raise
         self.response_class: type[Message] = service_class._response_class
         self.type: str = service_class._type
         self.md5sum: str = service_class._md5sum

@@ -25,8 +25,10 @@ from minirospy.base.errors import (
     TransportException,
     WireError,
 )
+from minirospy.base.notes import noted
 from minirospy.base.times import Duration
 from minirospy.client.session import Session, current_session
+from minirospy.client.type_advice import advice_for_service_class
 from minirospy.core.idl.message import args_kwds_to_message, number_header
 from minirospy.core.wire.tcpros import ANY
 
@@ -63,7 +65,11 @@ class ServiceProxy(Generic[_S_co]):
         # If the name was never set (None), only calls raise an error, not the constructor.
         self.resolved_name = current_session().resolve(str(name) if name else "")
         self.service_class = service_class
-        self.request_class: type[Message] = service_class._request_class
+        try:
+            self.request_class: type[Message] = service_class._request_class
+        except AttributeError as error:
+            noted(error, advice_for_service_class(service_class))
+            raise
         self.response_class: type[Message] = service_class._response_class
         self.type: str = service_class._type
         self.md5sum: str = service_class._md5sum

@@ -39,6 +39,7 @@ small computer.
 """
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
+_SERVICES_OF_NODES = ("/get_loggers", "/set_logger_level")
 
 
 class Session:
@@ -235,21 +236,25 @@ class Session:
         self.signals.flush_at_exit()
 
     def _warn_of_missing_spin(self) -> None:
-        """Log a warning if the program ends without an error right after subscribing, before any message has arrived."""
+        """Log a warning if the program ends without an error right after it has subscribed, or offered a service."""
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
+        # Every node offers the last two.
+        own = {name: each for name, each in self.offered.items() if not name.endswith(_SERVICES_OF_NODES)}
         # A program that polls or has waited ends on purpose, and so does an interactive session.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
-        if (
-            topics
-            and not is_meant
-            and not hasattr(sys, "last_value")
-            and all(state.is_new for state in waiting.values())
-        ):
+        if is_meant or hasattr(sys, "last_value") or not all(state.is_new for state in waiting.values()):
+            return
+        if topics:
             logging.getLogger("rosout").warning(
                 "the program ends while it subscribes to %s, before any message has arrived. rospy.spin() at its end keeps it "
                 "running",
                 ", ".join(topics),
+            )
+        elif own and all(service.seq == 0 for service in own.values()):
+            logging.getLogger("rosout").warning(
+                "the program ends while it offers the service %s, before any call. rospy.spin() at its end keeps it running",
+                ", ".join(sorted(own)),
             )
 
     def abandon_in_fork(self) -> None:

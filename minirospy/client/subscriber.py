@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
+from minirospy.base.notes import noted
 from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
+from minirospy.client.type_advice import advice_for_callback
 from minirospy.core.idl.protocols import Message
 from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
@@ -372,6 +374,10 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
             callback.function(message, callback.args)
     except BaseException as error:
         add_numpy_note(error)
+        if advice := advice_for_callback(
+            error, callback.function, message, has_args=callback.args is not None
+        ):
+            noted(error, advice)
         # As in rospy, sys.exit() has no effect in a link's thread, but inside the Subscriber() call it exits the program.
         if is_callers_thread and not isinstance(error, Exception):
             raise

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from minirospy.base import errors, times
 from minirospy.base.clock import SignalSafeEvent, SimulatedClock
 from minirospy.base.errors import ROSInitException
+from minirospy.base.notes import noted
 from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.session import current_session
 from minirospy.runtime.transport.limits import naming_thread_limit
@@ -118,7 +119,11 @@ class Rate:
         Raise ZeroDivisionError if the rate is 0, ROSInitException before init_node.
         """
         self.last_time = get_rostime()
-        self.sleep_dur = Duration(0, int(1e9 / hz))
+        try:
+            self.sleep_dur = Duration(0, int(1e9 / hz))
+        except ZeroDivisionError as error:
+            noted(error, "a rate is a number of times per second: rospy.Rate(10)")
+            raise
         self._reset = reset
 
     def remaining(self) -> Duration:

@@ -10,9 +10,11 @@ from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar
 
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
+from minirospy.base.notes import noted
 from minirospy.client.connection import Connection
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
+from minirospy.client.type_advice import advice_for_message_class
 from minirospy.core.idl import protocols
 from minirospy.core.idl.message import Message
 from minirospy.core.wire.tcpros import ANY
@@ -63,11 +65,14 @@ class Topic(Generic[_M_co]):
         if not name or not isinstance(name, str):
             raise ValueError("topic name is not a non-empty string")
         if data_class is None:
-            raise ValueError("topic parameter 'data_class' is not initialized")
+            error = ValueError("topic parameter 'data_class' is not initialized")
+            raise noted(error, "the second argument is the type, as std_msgs.msg.String")
         if not isinstance(data_class, type):
-            raise ValueError(f"data_class [{data_class}] is not a class")
+            error = ValueError(f"data_class [{data_class}] is not a class")
+            raise noted(error, advice_for_message_class(data_class))
         if not hasattr(data_class, "_md5sum") or not hasattr(data_class, "serialize"):
-            raise ValueError(f"data_class [{type(data_class).__name__}] is not a message data class")
+            error = ValueError(f"data_class [{type(data_class).__name__}] is not a message data class")
+            raise noted(error, advice_for_message_class(data_class))
         self._session = current_session()
         self.resolved_name = self._session.identity.resolve_topic(name)
         warn_of_illegal_name(name, stacklevel=4)

@@ -68,9 +68,14 @@ class Interfaces:
         if not found:
             known = {type_.partition("/")[2] for type_ in everything} if by_itself else everything
             tool = "rosmsg" if self._kind is Kind.MESSAGE else "rossrv"
-            hint = f"it is a package: `{tool} package {name}` lists its types"
-            is_package = name in self._catalogue.packages
-            raise NotFoundError(f"{self._kind.word} type", name, known, hint if is_package else "")
+            if name in self._catalogue.packages:
+                hint = f"it is a package: `{tool} package {name}` lists its types"
+            elif self._is_of_other_kind(name):
+                other, word = ("rossrv", "service") if self._kind is Kind.MESSAGE else ("rosmsg", "message")
+                known, hint = [], f"it is a {word} type: `{other} show {name}`"
+            else:
+                hint = ""
+            raise NotFoundError(f"{self._kind.word} type", name, known, hint)
         return found
 
     def text(self, type_: str) -> str:
@@ -87,6 +92,12 @@ class Interfaces:
         if isinstance(spec, ServiceSpec):
             return service_md5(spec, self._catalogue.message)
         return message_md5(spec, self._catalogue.message)
+
+    def _is_of_other_kind(self, name: str) -> bool:
+        """Return whether a name is that of a service although messages are looked up, or the other way round."""
+        other = Interfaces(self._packages, Kind.SERVICE if self._kind is Kind.MESSAGE else Kind.MESSAGE)
+        types = other.all()
+        return name in types or any(type_.partition("/")[2] == name for type_ in types)
 
     def _spec(self, type_: str) -> MessageSpec | ServiceSpec:
         if self._kind is Kind.MESSAGE:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from minirospy.web.bridge import Bridge
 
 __all__ = [
+    "LIBRARIES",
     "Part",
     "announce",
     "exit_status",
@@ -31,6 +32,12 @@ __all__ = [
     "run_program",
 ]
 
+
+LIBRARIES = (
+    "websockets",
+    "segno",
+    "cbor2",
+)  # of the dashboard and the bridges, dependencies of minirospy
 
 _LARGE_BLOCK = 4 * 1024 * 1024
 """Minimum size, in bytes, of freed blocks that are returned to the system. It exceeds the size of camera images, because
@@ -69,7 +76,7 @@ def require_libraries() -> None:
         import websockets.server  # noqa: F401 only whether it is there
     except ImportError as error:
         raise BridgeError(
-            f"the bridge needs the library {error.name}: {install_command('minirospy[web]')}"
+            f"the bridge needs the library {error.name}: {install_command(*LIBRARIES)}"
         ) from error
 
 

@@ -352,6 +352,12 @@ class _Builder:
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
         """Return warnings about the package's name, and about nonexistent packages in find_package()."""
         warnings = [warning] if (warning := naming_warning(plan.name)) else []
+        hidden = next((root / plan.name for root in built_in_roots() if package_name(root / plan.name)), None)
+        if hidden and (hidden / "msg").is_dir() and not plan.definitions:
+            warnings.append(
+                f"{plan.cmake_lists.parent}: it hides the package {plan.name} in {hidden}, and has none of its messages: "
+                "give yours another name"
+            )
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
             if name not in known:

@@ -143,6 +143,9 @@ class Packages:
         known = self.executables(package)
         has = ", ".join(known[:_SHOWN]) + (" ..." if known[_SHOWN:] else "") if known else "no programs"
         hidden = self.hidden_hint(package, name, folder)
+        if is_compiled_program(folder, name):
+            hint = "it is a C++ program, which catkin_make skips: run it on a machine with real ROS 1, over the same master"
+            raise NotFoundError("executable", name, hint=hint)
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
@@ -352,3 +355,13 @@ def _starts_like_program(path: Path) -> bool:
         return path.suffix.lower() in (".exe", ".bat", ".cmd")
     with path.open("rb") as file:
         return file.read(2) in (b"#!", b"\x7fE", b"\xcf\xfa", b"\xca\xfe")
+
+
+def is_compiled_program(folder: Path, name: str) -> bool:
+    """Return whether the package in ``folder`` has a C++ program of this name, which catkin_make skips."""
+    from minirospy.workspace.plan import read_plan
+
+    try:
+        return name in read_plan(folder).skipped
+    except (MinirospyError, OSError):
+        return False

@@ -348,7 +348,8 @@ class _Collector:
         for name in names:
             path = folder / name
             if path.suffix != f".{kind}":
-                raise _error(command, f"{command.name}: [{name}] does not end in .{kind}")
+                comma = f": CMake separates names by blanks, write {name.strip(',')}" if "," in name else ""
+                raise _error(command, f"{command.name}: [{name}] does not end in .{kind}{comma}")
             if not path.is_file():
                 hint = did_you_mean(name, there, 1)
                 raise _error(command, f"{command.name}: [{name}] does not exist in folder [{place}]{hint}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -14,8 +16,9 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError, RpcUnreachable
+from minirospy.base.installation import install_command
 from minirospy.introspect.doctor import Examination, Finding, Status, reach
-from minirospy.introspect.doctor.machine import check_packages, check_variables
+from minirospy.introspect.doctor.machine import check_packages, check_python, check_variables
 from minirospy.introspect.doctor.master import clock_finding
 from minirospy.introspect.doctor.reach import (
     Fault,
@@ -236,6 +239,30 @@ def test_clocks(theirs: float, status: str, text: str) -> None:
 
 
 # --- packages
+
+
+def test_python_and_libraries_are_fine() -> None:
+    assert [finding.status for finding in check_python()] == [Status.OK]
+
+
+def test_library_that_is_not_installed_is_named_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name in ("yaml", "segno") else real(name)
+    )
+    _, finding = check_python()
+    assert (finding.status, finding.text) == (Status.PROBLEM, "not installed: PyYAML, segno")
+    assert finding.advice == install_command("PyYAML", "segno")
+
+
+@pytest.mark.parametrize(("version", "count"), [((3, 12, 1), 1), ((3, 12, 3), 0), ((3, 11, 9), 0)])
+def test_python_that_loses_threads_is_reported(
+    version: tuple[int, int, int], count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "version_info", (*version, "final", 0))
+    warnings = [finding for finding in check_python() if finding.status is Status.WARNING]
+    assert len(warnings) == count
+    assert all("3.12.3" in finding.text for finding in warnings)
 
 
 def package(folder: Path, name: str, *depends: str) -> None:

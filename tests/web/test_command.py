@@ -20,6 +20,7 @@ from minirospy.base.installation import install_command
 from minirospy.cli import bridge as command
 from minirospy.web.addresses import links, own_addresses, qr_code
 from minirospy.web.foxglove.node import options_of
+from minirospy.web.serve import LIBRARIES
 from minirospy.web.tokens import kept_tokens, read_tokens
 from tests.conftest import free_port
 from tests.web.conftest import Client
@@ -213,7 +214,7 @@ def test_missing_library_is_named_with_the_command(
     monkeypatch.setitem(sys.modules, "websockets", None)
     monkeypatch.setitem(sys.modules, "websockets.server", None)
     assert command.main([]) == 1
-    assert install_command("minirospy[web]") in capsys.readouterr().err
+    assert install_command(*LIBRARIES) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -232,7 +233,7 @@ def test_missing_library_ends_a_node_in_one_line(package: str, program: str) -> 
     )
     assert done.returncode == 1
     assert done.stderr.startswith(f"{program}: ERROR: the bridge needs the library websockets")
-    assert install_command("minirospy[web]") in done.stderr
+    assert install_command(*LIBRARIES) in done.stderr
     assert done.stderr.count("\n") == 1
 
 

@@ -152,7 +152,18 @@ class Catalogue:
         near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
         if near and near[0] in PRIMITIVES:
             raise NotFoundError("message type", full_name, hint=f"did you mean {near[0]}?")
+        elsewhere = [each for each in self._packages_with(name) if each != package]
+        if elsewhere:
+            hint = f"did you mean {' or '.join(f'{each}/{name}' for each in elsewhere[:3])}?"
+            raise NotFoundError("message type", full_name, hint=hint)
         raise NotFoundError("message type", full_name, [f"{package}/{other}" for other in files])
+
+    def _packages_with(self, name: str) -> list[str]:
+        """Return the packages that define a message of this name, those of ROS itself first."""
+        from minirospy.core.idl.own_packages import COMPILED_AHEAD
+
+        found = [package for package in self.packages if name in self.files(package, "msg")]
+        return sorted(found, key=lambda package: (package not in COMPILED_AHEAD, package))
 
 
 _OF_OTHER_LANGUAGES = {

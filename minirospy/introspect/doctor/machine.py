@@ -7,19 +7,29 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import minirospy
 from minirospy.base import names
 from minirospy.base.environment import Environment
-from minirospy.base.errors import ManifestError, NotFoundError
+from minirospy.base.errors import ManifestError, NotFoundError, NoThreadsAtEndError
+from minirospy.base.installation import install_command
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import MasterLocation, is_loopback, is_own_address
+from minirospy.workspace.hidden_modules import hiding_files
+from minirospy.workspace.stale import warning_of_stale_definitions, workspace_of
 
 __all__ = ["check_packages", "check_python", "check_variables"]
 
 _OURS = Path(minirospy.__file__).parent
+_LIBRARIES = {"yaml": "PyYAML"} | {
+    name: name
+    for name in ("msgpack", "psutil", "rich", "lz4", "numpy", "xacro", "websockets", "segno", "cbor2")
+}
+"""The modules of the packages that pip installs with minirospy, and the names of the packages."""
+
 _MEANT = (
     "ROS_MASTER_URI",
     "ROS_HOSTNAME",
@@ -33,7 +43,7 @@ _MEANT = (
 
 
 def check_python() -> Iterator[Finding]:
-    """Yield findings about the Python version, and about the rospy that programs import."""
+    """Yield findings about the Python version, the rospy that programs import, and the required libraries."""
     import importlib.util
 
     what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
@@ -49,6 +59,19 @@ def check_python() -> Iterator[Finding]:
         yield ok("python", f"{what}; `import rospy` is minirospy's")
     else:
         yield ok("python", f"{what}; `import rospy` is {Path(origin).parent}, which goes before minirospy's")
+    if (3, 12, 0) <= sys.version_info[:3] < (3, 12, 3):
+        yield warning(
+            "python", str(NoThreadsAtEndError()), "install a newer Python, and make the environment again"
+        )
+    for file in hiding_files(Path.cwd()):
+        yield problem(
+            "python",
+            f"{file} hides the module {file.stem} from programs in this folder",
+            "give it another name",
+        )
+    missing = [package for module, package in _LIBRARIES.items() if importlib.util.find_spec(module) is None]
+    if missing:
+        yield problem("libraries", f"not installed: {', '.join(missing)}", install_command(*missing))
 
 
 def check_variables(
@@ -207,6 +230,10 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                     "remove or rename one of them",
                 )
             )
+    # One warning for each workspace.
+    firsts = {workspace_of(folders[0]): folders[0] for folders in copies.values()}
+    stale = filter(None, map(warning_of_stale_definitions, firsts.values()))
+    found += (warning("packages", text, "catkin_make") for text in stale)
     found += _dependency_findings(environment, sorted(copies))
     yield from found or [
         ok("packages", f"{len(copies)} in ROS_PACKAGE_PATH" if copies else "those of minirospy")

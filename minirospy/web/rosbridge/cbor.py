@@ -114,6 +114,6 @@ def _library() -> Any:
     except ImportError as error:
         # Do not include the install command, which contains the server's interpreter path: clients receive this text.
         raise BridgeProtocolError(
-            "compression cbor needs the library cbor2: install minirospy[web] on the server"
+            "compression cbor needs the library cbor2: install it on the server"
         ) from error
     return cbor2

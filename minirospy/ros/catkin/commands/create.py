@@ -121,12 +121,28 @@ def create_package_here(
     made = create_package(parent, package)
     if warning := naming_warning(name):
         warn(warning)
+    if existing := _existing(name):
+        warn(f"{name} exists already, in {existing}, and yours hides it: choose another name")
     for path in made:
         print(f"Created {'folder' if path.is_dir() else 'file'} {path.relative_to(parent).as_posix()}")
 
     print(f"Successfully created files in {parent / name}. Please adjust the values in package.xml.")
     if (parent / "src").is_dir() and (parent / "devel").is_dir():
         warn(f"catkin_make builds what is in {parent / 'src'} alone: `mv {name} src`")
+
+
+def _existing(name: str) -> str:
+    """Return the folder of minirospy's package of this name, or the file of Python's module; an empty string if there is none."""
+    import importlib.util
+
+    from minirospy.workspace.packages import built_in_roots, package_name
+
+    for root in built_in_roots():
+        if package_name(root / name) == name:
+            return str(root / name)
+    # A package's messages are a Python package of its name.
+    spec = importlib.util.find_spec(name) if name.isidentifier() else None
+    return str(spec.origin) if spec and spec.origin else ""
 
 
 def _user() -> str:

@@ -14,7 +14,9 @@ from minirospy.base.child_lifetime import guard_children
 from minirospy.base.environment import export_local
 from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.command.command import RosText, WordedError, run, warn
+from minirospy.workspace.hidden_modules import warning_of_hiding_file
 from minirospy.workspace.packages import NotExecutableError, Packages, why_ros_refuses, with_prefix
+from minirospy.workspace.stale import warning_of_stale_definitions
 
 __all__ = ["become", "main"]
 
@@ -71,6 +73,10 @@ def _rosrun(words: list[str]) -> int:
     command = [*with_prefix(prefix, chosen), *arguments]
     if why := why_ros_refuses(Path(chosen[-1])):
         warn(why)
+    if hiding := warning_of_hiding_file(Path(chosen[-1])):
+        warn(hiding)
+    if stale := warning_of_stale_definitions(packages.find(package)):
+        warn(stale)
     if debug:
         print(f"[rosrun] Looking in rospack dir: {packages.find(package)}", file=sys.stderr)
         print(f"[rosrun] Running {shlex.join(command)}", file=sys.stderr, flush=True)

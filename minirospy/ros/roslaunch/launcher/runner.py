@@ -29,7 +29,9 @@ from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, MachineSpec, NodeS
 from minirospy.ros.roslaunch.launcher.summary import summary
 from minirospy.ros.roslaunch.launcher.supervisor import Supervisor
 from minirospy.ros.roslaunch.launcher.watch import FileWatch
+from minirospy.workspace.hidden_modules import warning_of_hiding_file
 from minirospy.workspace.packages import Packages, why_ros_refuses
+from minirospy.workspace.stale import warning_of_stale_definitions
 
 if TYPE_CHECKING:
     from minirospy.ros.roslaunch.launcher.remote import RemoteMachines
@@ -205,9 +207,19 @@ class Launcher:
             self._output.print(summary([*here, *elsewhere], params, self._spec.clear))
         for warning in self._spec.warnings:
             self._output.warn(f"WARNING: {warning}")
-        for program in dict.fromkeys(self._programs(here)):
-            if why := why_ros_refuses(program):
-                self._output.warn(f"WARNING: {why}")
+        programs = list(dict.fromkeys(self._programs(here)))
+        warnings = [why_ros_refuses(program) for program in programs]
+        warnings += map(warning_of_hiding_file, programs)
+        warnings += map(warning_of_stale_definitions, self._folders(here))
+        for warning in dict.fromkeys(warnings):
+            if warning:
+                self._output.warn(f"WARNING: {warning}")
+
+    def _folders(self, nodes: list[NodeSpec]) -> Iterator[Path]:
+        """Yield the folders of the nodes' packages, without those that do not exist."""
+        for package in dict.fromkeys(node.package for node in nodes):
+            with contextlib.suppress(MinirospyError):
+                yield self._packages.find(package)
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
         """Yield the nodes' programs. Skip missing ones, which are reported when the node is started."""

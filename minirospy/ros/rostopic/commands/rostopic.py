@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import NotFoundError
-from minirospy.command.command import RosText, WordedError, tool_node, warn_unpublished
+from minirospy.command.command import RosText, WordedError, tool_node, warn, warn_unpublished
 from minirospy.command.parser import Misuse, Parser, integer
 from minirospy.command.verbs import Family, HelpStatus, Verb, deferred_verb
 from minirospy.introspect import topics
@@ -275,6 +275,7 @@ def _echo(
         if count is not None and count <= 0:
             return
         field = wait_for_topic(graph, name, lambda: warn_unpublished(graph, name))
+        _warn_of_type_left_behind(graph, field.topic)
 
     def report(error: Exception) -> None:
         """Print ROS's message and minirospy's message for an index that exceeds an array."""
@@ -298,6 +299,17 @@ def _echo(
             printed += 1
             if printed == count:
                 return
+
+
+def _warn_of_type_left_behind(graph: Graph, topic: str) -> None:
+    """Warn if nothing publishes a topic. Its type may come from a publisher with a wrong type, which has left."""
+    if topic in graph.state().publishers:
+        return
+    type_ = graph.master.get_topic_types().get(topic)
+    warn(
+        f"nothing publishes [{topic}] now; messages of its last type [{type_}] are awaited. A publisher of another type "
+        "needs another `rostopic echo`"
+    )
 
 
 # --- arguments that several verbs take

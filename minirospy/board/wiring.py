@@ -1,0 +1,26 @@
+"""The parts on the virtual board, and the faults of a program that expects others."""
+
+from __future__ import annotations
+
+from minirospy.board.model import BUTTONS, LEDS, Function
+
+__all__ = ["wiring_fault"]
+
+_PARTS = f"its LEDs are at {min(LEDS)} to {max(LEDS)}, its buttons at {' and '.join(map(str, BUTTONS))} (BCM numbers)"
+
+
+def wiring_fault(channel: int, pin: int, direction: int, *, is_board: bool) -> str:
+    """Return why nothing happens at BCM ``pin`` in this direction; an empty string if something does.
+
+    ``channel`` is the number that the program uses, ``is_board``: a number of GPIO.BOARD.
+    """
+    is_output = direction == Function.OUT
+    if pin in LEDS or (pin in BUTTONS and not is_output):
+        return ""
+    name = f"{channel} with GPIO.BOARD is GPIO {pin}" if is_board else f"GPIO {pin}"
+    if pin in BUTTONS:
+        return f"{name} is a button: as an output it reads no press, and on a real board a press is a short circuit"
+    if is_board and (channel in LEDS or channel in BUTTONS):
+        return f"nothing is wired: {name}; with GPIO.setmode(GPIO.BCM), {channel} is a part of the board"
+    # `minirospy board press` drives every input.
+    return f"nothing is wired to {name}: {_PARTS}" if is_output else ""

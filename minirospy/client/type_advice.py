@@ -1,0 +1,65 @@
+"""Advice for a topic or service that gets a class of the wrong kind: a service's class, a module, an instance."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+__all__ = ["advice_for_callback", "advice_for_message_class", "advice_for_service_class"]
+
+
+def advice_for_callback(
+    error: BaseException, function: Callable[..., object], message: Any, *, has_args: bool
+) -> str:
+    """Return what is wrong with a callback: its parameters, or the use of a message in place of a field of it.
+
+    Return an empty string if the error has another cause.
+    """
+    if isinstance(error, TypeError):
+        given = "the message and callback_args" if has_args else "the message"
+        try:
+            inspect.signature(function).bind(*((message, None) if has_args else (message,)))
+        except TypeError:
+            name = getattr(function, "__name__", "callback")
+            parameters = "message, args" if has_args else "message"
+            return f"a callback gets {given}: def {name}({parameters})"
+        except ValueError:
+            return ""
+        if list(message.__slots__) == ["data"]:
+            return f"the value of a {message._type} is its field: message.data"
+    if isinstance(error, AttributeError) and error.obj is message:
+        return f"a {message._type} has the fields {', '.join(message.__slots__)}"
+    return ""
+
+
+def advice_for_message_class(given: object) -> str:
+    """Return what is wrong with an argument that is no message class."""
+    if hasattr(given, "_request_class"):
+        return f"{given._type} is a service type; a topic needs a message type (rosmsg list)"
+    if isinstance(given, ModuleType):
+        return f"{given.__name__} is a module; name a class of it: from {given.__name__} import String"
+    if isinstance(given, str):
+        return f"{given!r} is a string; pass the class: from std_msgs.msg import String"
+    if hasattr(given, "_md5sum") and not isinstance(given, type):
+        name = type(given).__name__
+        return f"this is a message; pass its class: {name}, not {name}()"
+    return "it must be a class from a .msg module, as std_msgs.msg.String"
+
+
+def advice_for_service_class(given: object) -> str:
+    """Return what is wrong with an argument that is no service class."""
+    name = getattr(given, "__name__", "")
+    if isinstance(given, ModuleType):
+        return f"{name} is a module; name a class of it: from {name} import SetBool"
+    if isinstance(given, str):
+        return f"{given!r} is a string; pass the class: from std_srvs.srv import SetBool"
+    if hasattr(given, "_md5sum"):
+        service = name.removesuffix("Request").removesuffix("Response")
+        if service != name:
+            return f"{name} is half of a service; pass {service}"
+        return (
+            f"{getattr(given, '_type', name)} is a message type; a service needs a service type (rossrv list)"
+        )
+    return "it must be a class from a .srv module, as std_srvs.srv.SetBool"
