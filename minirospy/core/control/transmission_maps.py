@@ -1,7 +1,7 @@
-"""What a transmission does between actuators and joints: maps of positions, velocities and efforts, in both directions.
+"""Transmissions as maps of positions, velocities and efforts between actuators and joints, in both directions.
 
-A driver that commands the motors of a coupled mechanism uses them in ``read`` and ``write``. Source: the documentation of ROS's
-transmission_interface.
+A driver that commands the motors of a coupled mechanism uses them in ``read`` and ``write``. Source:
+http://wiki.ros.org/transmission_interface, and the code of the noetic release.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _Matrix = tuple[tuple[float, ...], ...]
 
 
 class TransmissionMap:
-    """The base of all transmissions. Values are in the order of ``actuators`` and ``joints``, which are names, if known."""
+    """The base of all transmissions. Values are in the order of the names in ``actuators`` and ``joints``."""
 
     actuators: Sequence[str] = ()
     joints: Sequence[str] = ()

@@ -3,7 +3,7 @@
     python tests/core/control/make_recorded_grippers.py ROS_CONTROLLERS.git
 
 The argument is a git directory with the branch noetic-devel. The controller is compiled with headers that replace ROS's nodes,
-actions and hardware; a goal's outcome is reported at once, not at action_monitor_rate. It needs g++, and the headers of roscpp.
+actions and hardware; a goal's outcome is reported immediately, not at action_monitor_rate. It needs g++ and roscpp's headers.
 """
 
 from __future__ import annotations
