@@ -50,6 +50,9 @@ PAGES = (
     "parameters.md",
     "logging.md",
     "bags.md",
+    "turtles.md",
+    "frames.md",
+    "pictures.md",
 )
 PATIENCE = 30.0
 """Seconds that a step may take; a busy machine needs its time."""

@@ -29,7 +29,8 @@ def advice_for_callback(
             return ""
         if list(message.__slots__) == ["data"]:
             return f"the value of a {message._type} is its field: message.data"
-    if isinstance(error, AttributeError) and error.obj is message:
+    # `is` would narrow the message's type to object.
+    if isinstance(error, AttributeError) and id(error.obj) == id(message):
         return f"a {message._type} has the fields {', '.join(message.__slots__)}"
     return ""
 
@@ -37,7 +38,9 @@ def advice_for_callback(
 def advice_for_message_class(given: object) -> str:
     """Return what is wrong with an argument that is no message class."""
     if hasattr(given, "_request_class"):
-        return f"{given._type} is a service type; a topic needs a message type (rosmsg list)"
+        return (
+            f"{getattr(given, '_type', given)} is a service type; a topic needs a message type (rosmsg list)"
+        )
     if isinstance(given, ModuleType):
         return f"{given.__name__} is a module; name a class of it: from {given.__name__} import String"
     if isinstance(given, str):

@@ -22,7 +22,14 @@ from minirospy.workspace.build_order import build_order
 from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import naming_warning
 from minirospy.workspace.options import make_options
-from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_python, package_name
+from minirospy.workspace.packages import (
+    OF_THE_WORKSHOP,
+    Packages,
+    built_in_roots,
+    crawl,
+    is_python,
+    package_name,
+)
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
@@ -353,7 +360,7 @@ class _Builder:
         """Return warnings about the package's name, and about nonexistent packages in find_package()."""
         warnings = [warning] if (warning := naming_warning(plan.name)) else []
         hidden = next((root / plan.name for root in built_in_roots() if package_name(root / plan.name)), None)
-        if hidden and (hidden / "msg").is_dir() and not plan.definitions:
+        if hidden and plan.name not in OF_THE_WORKSHOP and (hidden / "msg").is_dir() and not plan.definitions:
             warnings.append(
                 f"{plan.cmake_lists.parent}: it hides the package {plan.name} in {hidden}, and has none of its messages: "
                 "give yours another name"

@@ -18,6 +18,7 @@ from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.base.errors import MinirospyError, NotFoundError
 
 __all__ = [
+    "OF_THE_WORKSHOP",
     "ROSBUILD_MANIFEST",
     "CrawlTime",
     "NotExecutableError",
@@ -40,6 +41,9 @@ _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
+OF_THE_WORKSHOP = frozenset(
+    ["rpi_msgs", "rpi_feros", "rpi_feros_bringup"]
+)  # its participants write packages of these names
 _SHOWN = 12  # maximum number of programs to list in an error: about one line
 
 
@@ -357,11 +361,14 @@ def _starts_like_program(path: Path) -> bool:
         return file.read(2) in (b"#!", b"\x7fE", b"\xcf\xfa", b"\xca\xfe")
 
 
-def is_compiled_program(folder: Path, name: str) -> bool:
-    """Return whether the package in ``folder`` has a C++ program of this name, which catkin_make skips."""
-    from minirospy.workspace.plan import read_plan
+_PROGRAM = re.compile(r"\badd_executable\s*\(\s*([^\s)]+)")
 
+
+def is_compiled_program(folder: Path, name: str) -> bool:
+    """Return whether the CMakeLists.txt in ``folder`` has a C++ program of this name, which catkin_make skips."""
     try:
-        return name in read_plan(folder).skipped
-    except (MinirospyError, OSError):
+        text = (folder / "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
+    except OSError:
         return False
+    programs = _PROGRAM.findall(re.sub(r"#.*", "", text))
+    return name in {program.replace("${PROJECT_NAME}", folder.name) for program in programs}

@@ -106,7 +106,7 @@ def test_other_names_of_a_package_are_attribute_errors() -> None:
     import std_msgs
 
     assert not hasattr(std_msgs, "nothing")
-    assert not hasattr(std_msgs, "_private")
+    assert not hasattr(std_msgs, "__nothing__")
 
 
 def test_advice_for_classes_of_the_wrong_kind() -> None:

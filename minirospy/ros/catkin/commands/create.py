@@ -135,8 +135,10 @@ def _existing(name: str) -> str:
     """Return the folder of minirospy's package of this name, or the file of Python's module; an empty string if there is none."""
     import importlib.util
 
-    from minirospy.workspace.packages import built_in_roots, package_name
+    from minirospy.workspace.packages import OF_THE_WORKSHOP, built_in_roots, package_name
 
+    if name in OF_THE_WORKSHOP:
+        return ""
     for root in built_in_roots():
         if package_name(root / name) == name:
             return str(root / name)

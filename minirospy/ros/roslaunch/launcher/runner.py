@@ -208,12 +208,11 @@ class Launcher:
         for warning in self._spec.warnings:
             self._output.warn(f"WARNING: {warning}")
         programs = list(dict.fromkeys(self._programs(here)))
-        warnings = [why_ros_refuses(program) for program in programs]
-        warnings += map(warning_of_hiding_file, programs)
-        warnings += map(warning_of_stale_definitions, self._folders(here))
-        for warning in dict.fromkeys(warnings):
-            if warning:
-                self._output.warn(f"WARNING: {warning}")
+        found = [why_ros_refuses(program) for program in programs]
+        found += map(warning_of_hiding_file, programs)
+        found += map(warning_of_stale_definitions, self._folders(here))
+        for text in dict.fromkeys(filter(None, found)):
+            self._output.warn(f"WARNING: {text}")
 
     def _folders(self, nodes: list[NodeSpec]) -> Iterator[Path]:
         """Yield the folders of the nodes' packages, without those that do not exist."""
