@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import PointStamped, PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -461,6 +462,40 @@ def test_display_of_a_topic_that_vanishes_fades_until_it_comes_again(serve: Serv
     served.run(publisher(served, "/cube", Marker, latch=True).publish(cube))
     wait_hue(page, (True, False, True))
     page.wait(f"return !document.querySelector({row!r}).classList.contains('gone')")
+
+
+def test_camera_starts_at_the_robot_and_odometry_is_one_arrow_with_a_trail(
+    serve: Serve, browse: Browse
+) -> None:
+    served = serve()
+    served.run(served.node("setter").set_param("/robot_description", robot_scene.description()))
+    send = publish(served, {"/tf_static": robot_scene.frames(), "/base/long_odometry_name": Odometry()})
+    page = browse(address(served, "3d"))
+    kept = "JSON.parse(localStorage.getItem('3d')).raw['Visualization Manager']"
+    page.wait(f"return localStorage.getItem('3d') && {kept}.Views.Current.Distance < 4")
+    view = page.evaluate(f"{kept}.Views.Current")
+    # The robot is about a metre large, and at (0.8, -0.3).
+    assert 1.5 < view["Distance"] < 4
+    assert (view["Focal Point"]["X"], view["Focal Point"]["Y"]) == pytest.approx((0.8, -0.3), abs=0.2)
+
+    for step in range(20):
+        message = robot_scene.stamped(Odometry, "map")
+        message.pose.pose = robot_scene.pose(step * 0.2, 0)
+        send("/base/long_odometry_name", message)
+    name = "Odometry /base/long_odometry_name"
+    status(page, name, "Messages received")
+    settings = page.evaluate(f"{kept}.Displays.find(e => e.Name === {name!r})")
+    assert (settings["Keep"], settings["Trail"]) == (1, 1000)
+    # The name may only be broken behind "/" and "_".
+    parts = page.evaluate(
+        f"[...document.querySelector(\".display[data-name='{name}'] .display-name\").childNodes].map(e => e.textContent)"
+    )
+    assert [part for part in parts if part] == ["Odometry /", "base/", "long_", "odometry_", "name"]
+
+    # A page that was used before keeps its view.
+    page.reload()
+    status(page, name, "essages received")
+    assert page.evaluate(f"{kept}.Views.Current.Distance") == view["Distance"]
 
 
 RVIZ = """Visualization Manager:

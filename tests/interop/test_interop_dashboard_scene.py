@@ -217,7 +217,8 @@ def test_poses_of_links_agree_with_our_urdf() -> None:
             'UrdfError: joint "j": there is no link "b"',
         ),
         (
-            "<robot><link name='a'><visual><geometry><box size='1 2'/></geometry></visual></link></robot>",
+            "<robot><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/><child link='b'/>"
+            "<origin xyz='1 2'/></joint></robot>",
             'UrdfError: "1 2", where 3 numbers are expected',
         ),
     ],

@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { fromHex, hexOf, palette, rgbOf } from "../../../minirospy/web/dashboard/page/js/scene/colors.js";
+import { stacked } from "../../../minirospy/web/dashboard/page/js/scene/labels.js";
 import { readMaterials, readObj } from "../../../minirospy/web/dashboard/page/js/scene/obj.js";
 import { Config, readView, writeView } from "../../../minirospy/web/dashboard/page/js/scene/config.js";
 import { classOf, getSetting, setSetting, topicKeyOf } from "../../../minirospy/web/dashboard/page/js/scene/classes.js";
@@ -120,6 +121,7 @@ test("a shape that cannot be read costs that shape, with a line", () => {
   const mesh = (attributes) => `<geometry><mesh filename='package://a/b.stl' ${attributes}/></geometry>`;
   const shapes = [
     ["<geometry><capsule radius='1' length='2'/></geometry>", "the shape <capsule> is not known"],
+    ["<geometry><box size='1 2'/></geometry>", '"1 2", where 3 numbers are expected'],
     [mesh("scale='0.001'"), '"0.001", where 3 numbers are expected'],
     [`<origin xyz='0,0,1'/>${box}`, '"0,0,1", where 3 numbers are expected'],
     [`<origin rpy='nan 0 0'/>${box}`, '"nan 0 0", where 3 numbers are expected'],
@@ -236,4 +238,15 @@ test("a file of RViz 2 is read, and keeps its names", () => {
   assert.deepEqual([readView(config.view).kind, readView(config.view).scale], ["top", 40]);
   writeView(config.view, { ...readView(config.view), kind: "orbit" });
   assert.equal(config.view.Class, "rviz_default_plugins/Orbit");
+});
+
+test("of names at one place three are stacked, and the others are hidden", () => {
+  const taken = [];
+  const tops = Array.from({ length: 6 }, () => stacked(taken, 100, 50, 40, 15));
+  assert.deepEqual(tops, [50, 65, 80, null, null, null]);
+  assert.equal(stacked(taken, 150, 50, 40, 15), 50);
+  // 65.1 - 50.1 is a little less than 15.
+  const fractions = [];
+  assert.ok(stacked(fractions, 0, 50.1, 40, 15) < stacked(fractions, 0, 50.1, 40, 15));
+  assert.ok(stacked(fractions, 0, 65.1, 40, 15) > 65);
 });

@@ -42,6 +42,13 @@ function append(element, children, isWorded = false) {
   }
 }
 
+/** Return the parts of a name, which a browser may break behind "/" and "_" and not inside of words. */
+export function breakable(name) {
+  return String(name)
+    .split(/(?<=[/_])(?=[^/_])/)
+    .flatMap((part, index) => (index ? [h("wbr"), part] : [part]));
+}
+
 /** Replace what is in an element. */
 export function fill(element, ...children) {
   waiting.delete(element);

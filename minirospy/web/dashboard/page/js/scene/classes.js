@@ -206,6 +206,7 @@ export const CLASSES = {
     settings: [
       ["Topic", topic, ""],
       ["Keep", number, 100],
+      ["Trail", number, 0],
       ["Position Tolerance", number, 0.1],
       ["Angle Tolerance", number, 0.1],
       ["Shape", { kind: "choice", options: ["Arrow", "Axes"] }, "Arrow"],

@@ -1,20 +1,26 @@
-// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests. Names
-// that would cover
-// each other are stacked.
+// Text in the scene, as elements above the picture: sharp at every distance, and readable for people and tests.
+// Of names that would cover each other, a few are stacked, and the others are hidden until the camera is nearer.
 
 import { Vector3 } from "../../vendor/three/three.min.js";
 import { h, setText } from "../dom.js";
 
 const LINE = 15; // pixels
 const MOST = 400;
+const MAX_STACKED = 2; // lines that a name may be away from its place
 const TEXT_SIZE = 0.91; // of RViz's letters: a marker's scale.z is more than their em
 
-/** Return how far down a name is at this place, so that it covers none of those that are there already. */
-function stacked(taken, x, y, width, line) {
+/**
+ * Return how far down a name is at this place, so that it covers none of those that are there already; null if it
+ * would be too far away.
+ */
+export function stacked(taken, x, y, width, line) {
   let top = y;
-  const covers = (other) => Math.abs(other.top - top) < line && x < other.x + other.width && other.x < x + width;
-  for (let other = taken.find(covers), tries = 0; other && tries < 20; other = taken.find(covers), tries++)
+  // Half a pixel less than a line: sums of fractions are not exact.
+  const covers = (other) => Math.abs(other.top - top) < line - 0.5 && x < other.x + other.width && other.x < x + width;
+  for (let other = taken.find(covers); other; other = taken.find(covers)) {
     top = other.top + line;
+    if (top > y + MAX_STACKED * line) return null;
+  }
   taken.push({ x, top, width });
   return top;
 }
@@ -78,6 +84,7 @@ export class Labels {
         context.font = `600 ${0.8 * line}px system-ui, sans-serif`;
         context.textAlign = "left";
         const top = stacked(taken, x, y, context.measureText(text).width, line);
+        if (top === null) continue;
         context.strokeText(text, x, top);
         context.fillText(text, x, top);
       } else {
@@ -114,7 +121,9 @@ export class Labels {
         const far = stage.view.kind === "top" ? 1 : stage.camera.position.distanceTo(label.place);
         label.span.style.fontSize = `${Math.min(300, Math.max(3, (TEXT_SIZE * label.metres * stage.pixelsPerMetre) / far))}px`;
       } else {
-        top = stacked(taken, x, top, label.width, LINE);
+        const free = stacked(taken, x, top, label.width, LINE);
+        label.span.style.visibility = free === null ? "hidden" : "";
+        top = free ?? top;
       }
       label.span.style.transform = `translate(${x.toFixed(1)}px, ${top.toFixed(1)}px)`;
     }

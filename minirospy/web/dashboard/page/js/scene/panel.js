@@ -1,6 +1,6 @@
 // The list of displays: what is shown, its status, and its settings under RViz's names.
 
-import { fill, h, refill, setText } from "../dom.js";
+import { breakable, fill, h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 import { CLASSES, classForType, classOf, getSetting, setSetting, topicKeyOf } from "./classes.js";
 import { fromHex, hexOf, rgbOf } from "./colors.js";
@@ -110,7 +110,7 @@ export class Panel {
         title: settings.Class,
         onclick: () => this.toggle(settings),
       },
-      name,
+      breakable(name),
     );
     const isEnabled = h("input", {
       type: "checkbox",
@@ -185,7 +185,7 @@ export class Panel {
     const field = h("input", { type: "text", class: "rename", value: settings.Name ?? "", "aria-label": "Name" });
     const end = () => {
       settings.Name = field.value.trim() || settings.Name;
-      setText(title, settings.Name);
+      fill(title, breakable(settings.Name));
       row.dataset.name = settings.Name;
       field.replaceWith(title);
       this.view.changed();

@@ -3,6 +3,7 @@
 import { fill, h, setText } from "../dom.js";
 import { t } from "../texts.js";
 import { classForType, CLASSES, classOf, getSetting, newSettings, topicKeyOf } from "./classes.js";
+import { boundsOf } from "./bounds.js";
 import { rgbOf } from "./colors.js";
 import { Config, readView, writeView } from "./config.js";
 import { Context } from "./context.js";
@@ -61,6 +62,9 @@ const DISPLAYS = {
 };
 const MAX_AUTOMATIC = 20; // displays that are added without a click
 const LEFT_OUT = /_updates$|^\/rosout/;
+const SMALL_ARROW = { "Shaft Length": 0.25, "Shaft Radius": 0.03, "Head Length": 0.1, "Head Radius": 0.08 }; // metres
+const SETTLED_LOOKS = 3; // with one fixed frame, before the camera is put to the robot
+const ROBOT_SIZES = 3; // distance of the camera at the start, in diameters of the robot
 const VIEWS = { orbit: "Orbit", top: "Top down", follow: "Follow" };
 
 export class SceneView {
@@ -148,6 +152,7 @@ export class SceneView {
       link.watch(["channels", "parameters"], () => this.addNew()),
       () => removeEventListener("pagehide", leave),
     ];
+    this.startView = this.isRestored ? "" : JSON.stringify(this.stage.view);
     this.timer = setInterval(() => this.look(), 300);
     if (this.hasFile && !this.state.isOpened) this.files.read();
   }
@@ -202,6 +207,7 @@ export class SceneView {
       // Another command's file.
       if (origin && origin !== location.origin) throw new Error();
       this.dismissed = new Set(dismissed);
+      this.isRestored = true;
       return { config: new Config(raw), isAutomatic, isOpened };
     } catch {
       return { ...this.first(), isOpened: false };
@@ -236,6 +242,7 @@ export class SceneView {
 
   /** Show another configuration. Throws Error if it is none. */
   open(raw) {
+    this.startView = "";
     this.config = new Config(raw);
     this.state = { config: this.config, isAutomatic: false, isOpened: true };
     this.dismissed.clear();
@@ -312,6 +319,8 @@ export class SceneView {
     if (name === "LaserScan") settings["Size (m)"] = 0.04;
     if (name === "PointCloud2" || name === "PointCloud") settings["Size (m)"] = 0.02;
     if (name === "Path" && /local/.test(topic)) settings.Color = "255; 170; 0";
+    // RViz shows a hundred arrows of a metre.
+    if (name === "Odometry") Object.assign(settings, SMALL_ARROW, { Keep: 1, Trail: 1000 });
     return settings;
   }
 
@@ -348,6 +357,7 @@ export class SceneView {
   // --- frames and views
 
   look() {
+    if (this.startView) this.lookAtRobot();
     this.showFrames();
     this.panel.look();
   }
@@ -421,6 +431,24 @@ export class SceneView {
 
   viewChanged() {
     this.changed();
+  }
+
+  /** Put the camera to where the robot is seen, once it is there, unless the view was changed before. */
+  lookAtRobot() {
+    if (this.hasFile || JSON.stringify(this.stage.view) !== this.startView) {
+      this.startView = "";
+      return;
+    }
+    // The fixed frame changes while the first transforms come.
+    const { fixedFrame } = this.context;
+    this.looks = fixedFrame === this.lookedAt ? this.looks + 1 : 0;
+    this.lookedAt = fixedFrame;
+    if (this.looks < SETTLED_LOOKS) return;
+    const robot = [...this.displays.values()].find((display) => display instanceof RobotModel);
+    const bounds = robot?.isPlaced() ? boundsOf(robot.object) : null;
+    if (!bounds) return;
+    this.startView = "";
+    this.stage.setView({ focus: bounds.center, distance: Math.max(0.2, ROBOT_SIZES * bounds.diameter) });
   }
 
   /** Turn the view around a point of the fixed frame. */

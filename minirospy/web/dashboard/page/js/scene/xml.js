@@ -57,8 +57,7 @@ export function parseXml(text) {
       const comment = whole.slice(4, -3);
       if (comment.includes("--") || comment.endsWith("-")) note(start, t("'--' is not allowed inside a comment"));
     } else if (plain !== undefined) {
-      if (open.length === 1 && plain.trim())
-        fail(start, t('"{text}" is not XML', { text: plain.trim().slice(0, 30).split("\n")[0] }));
+      if (open.length === 1 && plain.trim()) fail(start, t("there is not one element around all others"));
       inside.text += decode(start, plain);
     } else if (closed !== undefined) {
       if (inside.name !== closed || open.length === 1)

@@ -129,9 +129,12 @@ export class PoseArray extends LastMessage {
   }
 }
 
+/** Arrows of the last poses; with "Trail", which RViz does not have, a line through so many of them. */
 export class Odometry extends LastMessage {
   start() {
     this.last = null;
+    this.trail = []; // positions
+    this.line = null; // item
     super.start();
   }
 
@@ -143,13 +146,18 @@ export class Odometry extends LastMessage {
     const { pose } = message.pose;
     if (!isFinitePose(pose)) throw new Error(t("Message contained invalid floating point values (nans or infs)"));
     const now = fromMessage(pose);
+    const trail = Math.min(MAX_KEPT, this.number("Trail"));
+    let isNew = true;
     if (this.last) {
       const moved = Math.hypot(...now.p.map((value, index) => value - this.last.p[index]));
       const turned =
         2 * Math.acos(Math.min(1, Math.abs(now.q.reduce((sum, value, index) => sum + value * this.last.q[index], 0))));
-      if (moved < this.number("Position Tolerance", 0.1) && turned < this.number("Angle Tolerance", 0.1)) return;
+      isNew = moved >= this.number("Position Tolerance", 0.1) || turned >= this.number("Angle Tolerance", 0.1);
+      // A single arrow is where the robot is, and not where it was last.
+      if (!isNew && trail <= 0) return;
     }
-    this.last = now;
+    if (isNew) this.last = now;
+    if (trail > 0) this.follow(message.header, now.p, trail, isNew);
     const group = grouped(posed(this.pointer(), pose));
     if (this.ball) this.ball.removeFromParent();
     if (this.get("Covariance/Position/Value") !== false && message.pose.covariance.some((value) => value > 0)) {
@@ -159,7 +167,29 @@ export class Odometry extends LastMessage {
       group.add(this.ball);
     }
     this.addAt(message.header, group);
-    this.keep(Math.min(MAX_KEPT, this.number("Keep", 100) || MAX_KEPT));
+    const most = Math.min(MAX_KEPT, this.number("Keep", 100) || MAX_KEPT);
+    this.keep(this.line ? most + 1 : most);
+  }
+
+  /** Draw the line through the last positions. */
+  follow(header, position, most, isNew) {
+    if (isNew) this.trail.push(position);
+    this.trail.splice(0, this.trail.length - most);
+    const points = isNew ? this.trail : [...this.trail, position];
+    if (this.line) this.remove(this.line);
+    const line = segments(chain(Float32Array.from(points.flat())), {
+      rgb: this.color(),
+      alpha: this.number("Alpha", 1),
+    });
+    this.line = this.addAt(header, grouped(line));
+  }
+
+  /** Keep so many of the newest items, and the line. */
+  keep(most) {
+    for (const item of [...this.items]) {
+      if (this.items.size <= Math.max(1, most)) return;
+      if (item !== this.line) this.remove(item);
+    }
   }
 }
 

@@ -119,6 +119,11 @@ export class RobotModel extends Display {
     holder.add(shape);
   }
 
+  /** Return whether all that can be shown of the robot is at its place. */
+  isPlaced() {
+    return Boolean(this.robot) && !this.isLoading && [...this.links.values()].some(({ object }) => object.visible);
+  }
+
   /** Load a mesh or a texture; a failure is the status of the display. */
   async load(work) {
     this.isLoading += 1;
