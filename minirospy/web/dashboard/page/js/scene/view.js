@@ -60,7 +60,7 @@ const DISPLAYS = {
   DepthCloud,
 };
 const MAX_AUTOMATIC = 20; // displays that are added without a click
-const LEFT_OUT = /_updates$|^\/rosout/;
+const LEFT_OUT = /_updates$|^\/rosout|^\/gazebo\/window\//; // the last ones are for the view Simulation
 const VIEWS = { orbit: "Orbit", top: "Top down", follow: "Follow" };
 
 export class SceneView {
