@@ -10,12 +10,13 @@ import pytest
 from gazebo_msgs.srv import GetModelState, GetPhysicsProperties, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Pose
 
+from minirospy.web.access import Access
 from tests.interop.browser import Page
 from tests.interop.test_interop_dashboard import address, browse, needs_chromium
-from tests.interop.test_interop_dashboard_3d import colors, drag, mouse, wait_color
+from tests.interop.test_interop_dashboard_3d import colors, drag, levels, mouse, wait_color
 from tests.ros.robot_state_publisher.conftest import Start, start
 from tests.waiting import wait_until
-from tests.web.dashboard.conftest import Served, serve
+from tests.web.dashboard.conftest import TOKEN, Served, serve
 
 pytest.importorskip("mujoco", reason="mujoco-core is not installed: pip install minirospy[sim]")
 
@@ -284,6 +285,29 @@ def test_simulation_that_stands_or_has_died_is_named(serve: Serve, browse: Brows
     world.process.wait()
     page.click(".sim-bar button", "Reset world")
     page.wait("return /reset_world|No simulation/.test(document.querySelector('main').innerText)")
+
+
+@needs_chromium
+def test_read_only_page_shows_the_world_and_changes_nothing(
+    serve: Serve, browse: Browse, start: Start
+) -> None:
+    served = serve(access=Access(read_token="look-only-0", write_token=TOKEN, requires_token=True))
+    start("gazebo_ros", "gzserver", "-u", "__name:=gazebo")
+    page = browse(address(served, "simulation?token=look-only-0"))
+    page.wait_text(".sim-model", "ground_plane")
+    page.wait("return document.querySelector('.sim-play').disabled")
+    page.click("[data-model=ground_plane] .sim-delete")
+    page.wait_text("p.error", "This token is read-only.")
+
+
+@needs_chromium
+def test_3d_view_adds_no_displays_of_the_windows_topics(serve: Serve, browse: Browse, start: Start) -> None:
+    served = serve()
+    start("gazebo_ros", "gzserver", "-u", "__name:=gazebo")
+    page = browse(address(served, "3d"))
+    page.wait_text(".displays", "/gazebo/world_markers")
+    page.wait("return document.querySelector('.displays')")
+    assert not [name for name in levels(page) if "/window/" in name]
 
 
 @needs_chromium

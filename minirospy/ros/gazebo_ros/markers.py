@@ -147,14 +147,22 @@ def _add_triangles(
 ) -> Marker | None:
     """Return the marker with the triangles of a shape, or None after one line if there are none."""
     try:
-        found = read_triangles(shape)
+        points, colors = _triangle_points(shape)
     except MeshError as error:
         if shape not in _named:
             _named.add(shape)
             rospy.logwarn("a shape is missing in the window: %s", error)
         return None
     marker.type, marker.scale = Marker.TRIANGLE_LIST, Vector3(1.0, 1.0, 1.0)
-    marker.points = [Point(x, y, z) for x, y, z in found.corners.tolist()]
-    if found.colors is not None and not is_colored:
-        marker.colors = [ColorRGBA(*color) for color in found.colors.tolist()]
+    marker.points = points
+    if not is_colored:
+        marker.colors = colors
     return marker
+
+
+@functools.lru_cache(maxsize=64)
+def _triangle_points(shape: MeshShape | Polyline | Heightmap) -> tuple[list[Point], list[ColorRGBA]]:
+    """Return the corners and their colours, none if the shape has none. Each change of the world needs them again."""
+    found = read_triangles(shape)
+    colors = [] if found.colors is None else [ColorRGBA(*color) for color in found.colors.tolist()]
+    return [Point(x, y, z) for x, y, z in found.corners.tolist()], colors

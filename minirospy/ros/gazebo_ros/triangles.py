@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +26,6 @@ class Triangles(NamedTuple):
     colors: NDArray[np.float64] | None
 
 
-@functools.lru_cache(maxsize=200)
 def read_triangles(shape: MeshShape | Polyline | Heightmap) -> Triangles:
     """Return a shape's triangles. Raise MeshError if it cannot be read, or has more than MAX_TRIANGLES."""
     if isinstance(shape, Heightmap):

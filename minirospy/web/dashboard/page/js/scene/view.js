@@ -61,7 +61,7 @@ const DISPLAYS = {
   DepthCloud,
 };
 const MAX_AUTOMATIC = 20; // displays that are added without a click
-const LEFT_OUT = /_updates$|^\/rosout/;
+const LEFT_OUT = /_updates$|^\/rosout|^\/gazebo\/window\//; // the last ones are for the view Simulation
 const SMALL_ARROW = { "Shaft Length": 0.25, "Shaft Radius": 0.03, "Head Length": 0.1, "Head Radius": 0.08 }; // metres
 const SETTLED_LOOKS = 3; // with one fixed frame, before the camera is put to the robot
 const ROBOT_SIZES = 3; // distance of the camera at the start, in diameters of the robot

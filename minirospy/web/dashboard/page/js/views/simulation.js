@@ -1,7 +1,7 @@
 // The window of a simulation under Gazebo's names: its world in three dimensions; pause, step, speed, reset; models
 // that are selected, moved, pushed, inserted and deleted; joints; contacts and rays.
 
-import { fill, h, redraw, setText } from "../dom.js";
+import { fill, h, redraw, setText, uniqueId } from "../dom.js";
 import {
   clockText,
   DIRECTIONS,
@@ -58,7 +58,7 @@ export class Simulation {
     this.load();
     this.ends = [
       link.subscribe({ topic: topicOf("state"), mode: "latest" }, ({ message }) => message && this.received(message)),
-      link.watch(["services", "state"], () => this.look()),
+      link.watch(["services", "channels", "state"], () => this.look()),
     ];
     this.timers = [
       setInterval(() => this.look(), LOOK_MS),
@@ -213,9 +213,10 @@ export class Simulation {
       Object.entries(SHAPES).map(([value, { title }]) => h("option", { value }, title)),
       h("option", { value: LIBRARY }, "Model by name"),
     );
-    this.library = h("datalist", { id: "sim-library" });
+    const id = uniqueId("sim-library");
+    this.library = h("datalist", { id });
     this.libraryName = h("input", {
-      list: "sim-library",
+      list: id,
       "aria-label": "Model",
       placeholder: "Model",
       hidden: true,
@@ -301,7 +302,9 @@ export class Simulation {
   }
 
   get isThere() {
-    return isThere(this.link.services);
+    // A page that may not call services is offered none.
+    const { mayWrite, services, channels } = this.link;
+    return mayWrite ? isThere(services) : channels.has(topicOf("state"));
   }
 
   get isQuiet() {
@@ -416,11 +419,13 @@ export class Simulation {
   // --- models
 
   async list() {
-    if (!this.isThere || !this.link.mayWrite || this.isListing || this.isClosed) return;
+    if (!this.isThere || this.isListing || this.isClosed) return;
     this.isListing = true;
     try {
-      const { model_names: names } = await this.call("get_world_properties");
-      this.models = names;
+      // A page that calls no services has the models that it sees.
+      this.models = this.link.mayWrite
+        ? (await this.call("get_world_properties")).model_names
+        : (this.scene?.world.models() ?? []);
     } catch (error) {
       if (this.isThere) this.say(errorText(error));
     } finally {
@@ -489,7 +494,7 @@ export class Simulation {
 
   async readProperties() {
     const { model } = this;
-    if (!model || !this.isThere) return;
+    if (!model || !this.isThere || !this.link.mayWrite) return;
     try {
       const properties = await this.call("get_model_properties", { model_name: model });
       if (model !== this.model) return;

@@ -98,6 +98,11 @@ export class World extends Markers {
     return { model: splitLink(link)[0], link, isMoving, point: hit.point };
   }
 
+  /** Return the names of the models that have shapes. */
+  models() {
+    return [...new Set([...this.markers.values()].map(({ space }) => splitLink(space)[0]))];
+  }
+
   select(model) {
     this.selected = model;
     this.shine();
