@@ -80,7 +80,7 @@ CASES = [
 
 
 class Usage(NamedTuple):
-    """What processes have used since they started: wake-ups, and CPU seconds."""
+    """Wake-ups and CPU seconds of processes since their start."""
 
     wake_ups: int
     cpu: float

@@ -146,7 +146,7 @@ def test_codec_of_the_page_decodes_values_and_refuses_invalid_bytes() -> None:
 
 
 CONNECTION_ERRORS = ("WebSocket connection", "status of 401", "net::ERR_CONNECTION_REFUSED")
-"""What the browser logs while a server is gone or refuses the page."""
+"""Texts that the browser logs while a server is gone or refuses the page."""
 
 
 @pytest.fixture

@@ -44,9 +44,6 @@ GREY: Color = (0.7, 0.7, 0.7, 1.0)
 MAX_PLANE = 100.0  # m; larger planes are drawn smaller
 PLANE_THICKNESS = 0.001  # m
 
-_named: set[MeshShape | Polyline | Heightmap] = set()  # shapes that are missing, after the line that says so
-
-
 class WorldMarkers:
     """Publishes markers. All methods run in the simulation's thread."""
 
@@ -149,15 +146,19 @@ def _add_triangles(
     try:
         points, colors = _triangle_points(shape)
     except MeshError as error:
-        if shape not in _named:
-            _named.add(shape)
-            rospy.logwarn("a shape is missing in the window: %s", error)
+        _warn_once(str(error))
         return None
     marker.type, marker.scale = Marker.TRIANGLE_LIST, Vector3(1.0, 1.0, 1.0)
     marker.points = points
     if not is_colored:
         marker.colors = colors
     return marker
+
+
+@functools.lru_cache(maxsize=1000)
+def _warn_once(error: str) -> None:
+    """Log why a shape is missing, unless the same line was logged before."""
+    rospy.logwarn("a shape is missing in the window: %s", error)
 
 
 @functools.lru_cache(maxsize=64)

@@ -105,7 +105,7 @@ class ClientActions:
                 "[Client %s] send_action_goal %s: %s", self._session.client.name, event.action, error
             )
             await self._result(event, str(error), _UNKNOWN, is_result=False)
-        except Exception as error:  # noqa: BLE001 - the client waits for the result, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the client waits for a result in any case
             self._reporter.report(error)
             await self._result(event, "the bridge failed on this goal", _UNKNOWN, is_result=False)
 
