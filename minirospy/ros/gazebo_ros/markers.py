@@ -44,6 +44,7 @@ GREY: Color = (0.7, 0.7, 0.7, 1.0)
 MAX_PLANE = 100.0  # m; larger planes are drawn smaller
 PLANE_THICKNESS = 0.001  # m
 
+
 class WorldMarkers:
     """Publishes markers. All methods run in the simulation's thread."""
 
