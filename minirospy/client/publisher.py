@@ -332,9 +332,9 @@ class PublishedTopic(SharedTopic):
 
     def _fault_of(self, message: Any) -> str:
         """Return why a message does not match its type, or an empty string. Unlike `_frame`, leave its header unchanged."""
-        if isinstance(message, AnyMsg) or (self._has_header and message.header.frame_id is None):
-            return ""
         try:
+            if isinstance(message, AnyMsg) or (self._has_header and message.header.frame_id is None):
+                return ""
             message.serialize(Pieces())
         except SerializationError as error:
             return str(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 import traceback
 from collections.abc import Callable
 from io import BytesIO
@@ -19,7 +20,7 @@ from minirospy.base.errors import (
 from minirospy.base.notes import noted
 from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.identity import warn_of_illegal_name
-from minirospy.client.session import current_session
+from minirospy.client.session import NEW_SECONDS, current_session
 from minirospy.client.topic import unregister_from_master
 from minirospy.client.type_advice import advice_for_service_class
 from minirospy.core.idl.message import number_header
@@ -78,6 +79,7 @@ class Service(Generic[_S_co]):
         self.handler = handler
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
+        self._since = time.monotonic()
         self.seq = 0  # the number of responses, used as seq in responses that start with a header
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
@@ -91,6 +93,11 @@ class Service(Generic[_S_co]):
     def uri(self) -> str | None:
         """The URI of the service, ``rosrpc://host:port``; None before init_node."""
         return self._session.node.service_uri if self._session.node else None
+
+    @property
+    def is_new(self) -> bool:
+        """Return whether the service was offered a moment ago and has not been called since."""
+        return not self.seq and time.monotonic() - self._since < NEW_SECONDS
 
     @property
     def done(self) -> bool:

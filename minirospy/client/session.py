@@ -30,7 +30,9 @@ if TYPE_CHECKING:
     from minirospy.runtime.node.node import Node
     from minirospy.runtime.transport.loop import LoopThread
 
-__all__ = ["Session", "current_session", "replace_session", "replace_session_in_fork"]
+__all__ = ["NEW_SECONDS", "Session", "current_session", "replace_session", "replace_session_in_fork"]
+
+NEW_SECONDS = 2.0  # a program that ends this soon after it has subscribed or offered a service lacks spin()
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
@@ -251,7 +253,7 @@ class Session:
                 "running",
                 ", ".join(topics),
             )
-        elif own and all(service.seq == 0 for service in own.values()):
+        elif own and all(service.is_new for service in own.values()):
             logging.getLogger("rosout").warning(
                 "the program ends while it offers the service %s, before any call. rospy.spin() at its end keeps it running",
                 ", ".join(sorted(own)),

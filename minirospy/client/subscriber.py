@@ -15,7 +15,7 @@ from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.base.notes import noted
 from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection, connection_to_publisher
-from minirospy.client.session import Session, current_session
+from minirospy.client.session import NEW_SECONDS, Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
 from minirospy.client.type_advice import advice_for_callback
 from minirospy.core.idl.protocols import Message
@@ -34,8 +34,6 @@ _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
-# a program that ends within this time after creating its last Subscriber has not waited for messages
-_NEW_SECONDS = 2.0
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 """Topics that are not counted: /statistics itself, and /clock, from which the times come."""
 
@@ -175,7 +173,7 @@ class SubscribedTopic(SharedTopic):
     def is_new(self) -> bool:
         """Return whether the latest Subscriber was created a moment ago and no message has arrived since."""
         has_received = any(link.received for link in self.links)
-        return not has_received and time.monotonic() - self._since < _NEW_SECONDS
+        return not has_received and time.monotonic() - self._since < NEW_SECONDS
 
     @property
     def links(self) -> tuple[InLink, ...]:

@@ -27,7 +27,7 @@ def advice_for_callback(
             return f"a callback gets {given}: def {name}({parameters})"
         except ValueError:
             return ""
-        if list(message.__slots__) == ["data"]:
+        if list(message.__slots__) == ["data"] and type(message).__name__ in str(error):
             return f"the value of a {message._type} is its field: message.data"
     # `is` would narrow the message's type to object.
     if isinstance(error, AttributeError) and id(error.obj) == id(message):

@@ -71,9 +71,10 @@ def columns(messages: Sequence[Any]) -> list[Column]:
     by_path = dict(zip((field.path for field in fields), map(list, zip(*rows, strict=True)), strict=True))
 
     found: list[Column] = []
+    lists_of_names = {field.path for field in fields if field.type.startswith("string[")}
     for field in fields:
         values = by_path[field.path]
-        names = by_path.get(_names_of(field), [])
+        names = by_path[path] if (path := _names_of(field)) in lists_of_names else []
         if field.type in ("time", "duration"):
             kind = Kind.TIME if field.type == "time" else Kind.DURATION
             found.append(Column(field.path, kind, [value.to_nsec() for value in values]))
@@ -95,10 +96,8 @@ def _names_of(field: _Leaf) -> str:
 
 def _belong(names: Sequence[Any], values: Sequence[Any]) -> bool:
     """Return whether each array has as many values as there are names, or none."""
-    return all(
-        not isinstance(own, str) and len(array) in (0, len(own))
-        for own, array in zip(names, values, strict=True)
-    ) and any(map(len, values))
+    fits = (len(array) in (0, len(own)) for own, array in zip(names, values, strict=True))
+    return all(fits) and any(map(len, values))
 
 
 def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[Any]]) -> Iterator[Column]:

@@ -10,8 +10,10 @@ import os
 import subprocess
 import sys
 import threading
+from collections import deque
 from collections.abc import Iterable
 from html import escape
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from minirospy.base.errors import MinirospyError
@@ -21,6 +23,7 @@ from minirospy.web.dashboard.views import VIEWS, link
 __all__ = ["Frame", "view"]
 
 _HEIGHT = 420  # pixels
+_NO_MASTER = "no ROS master answers"  # the dashboard waits for one before it prints its link
 
 
 class Frame:
@@ -77,6 +80,10 @@ def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterabl
 
 
 def _start() -> _Dashboard:
+    # In a group of its own: an interrupt of a cell goes to the kernel's whole group.
+    group: dict[str, Any] = {"start_new_session": True}
+    if sys.platform == "win32":
+        group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     process = subprocess.Popen(
         [sys.executable, "-m", "minirospy", "dashboard", "--embed", "--no-browser", "--port", "0"],
         stdin=subprocess.PIPE,
@@ -84,6 +91,7 @@ def _start() -> _Dashboard:
         stderr=subprocess.STDOUT,
         text=True,
         encoding="utf-8",
+        **group,
     )
     assert process.stdout
     said = []
@@ -92,7 +100,10 @@ def _start() -> _Dashboard:
         url = next((word for word in line.split() if word.startswith("http") and "token=" in word), "")
         if url:
             # Discard the rest, so that the process never waits for a reader.
-            threading.Thread(target=process.stdout.read, daemon=True).start()
+            threading.Thread(target=deque, args=(process.stdout, 0), daemon=True).start()
             return _Dashboard(process, url)
-    process.wait()
+        if _NO_MASTER in line:
+            process.kill()
+            break
+    said.append(process.communicate()[0])  # also closes the pipes
     raise MinirospyError(f"the dashboard did not start: {''.join(said).strip()}")

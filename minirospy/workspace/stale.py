@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 from minirospy.workspace.plan import DIST_PACKAGES
 
 __all__ = ["stale_definitions", "warning_of_stale_definitions", "workspace_of"]
+
+_SEPARATOR = "=" * 80  # before the definitions of the fields' types
 
 
 def workspace_of(package: Path) -> Path | None:
@@ -30,16 +33,27 @@ def stale_definitions(package: Path) -> list[Path]:
             try:
                 if definition.stat().st_mtime > module.stat().st_mtime and _differs(definition, module):
                     found.append(definition)
-            except (OSError, UnicodeError):
+            except (OSError, ValueError, SyntaxError):
                 continue
     return found
 
 
 def _differs(definition: Path, module: Path) -> bool:
-    """Return whether a line of the definition is missing in the module, which contains its text."""
-    generated = module.read_text(encoding="utf-8")
-    lines = (line.strip() for line in definition.read_text(encoding="utf-8").splitlines())
-    return any(repr(line)[1:-1] not in generated for line in lines if line and line != "---")
+    """Return whether the definition has other lines than the text in the module's classes; ValueError if it has none."""
+    tree = ast.parse(module.read_text(encoding="utf-8"))
+    texts = [
+        ast.literal_eval(node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign)
+        and [getattr(target, "id", "") for target in node.targets] == ["_full_text"]
+    ]
+    generated = [line for text in texts for line in _lines(text.partition(_SEPARATOR)[0])]
+    return generated != _lines(definition.read_text(encoding="utf-8"))
+
+
+def _lines(text: str) -> list[str]:
+    lines = (line.strip() for line in text.splitlines())
+    return [line for line in lines if line and line != "---"]
 
 
 def warning_of_stale_definitions(package: Path) -> str:

@@ -255,6 +255,27 @@ def test_definition_changed_after_catkin_make(workspace: Path) -> None:
     assert stale_definitions(package) == []
 
 
+@pytest.mark.parametrize(
+    ("text", "is_stale"),
+    [
+        ('int8 x  # don\'t "x"\nHeader header\n\nint8 y2\n', False),
+        ('int8 x  # don\'t "x"\nHeader header\n', True),
+        ('Header header\nint8 x  # don\'t "x"\nint8 y2\n', True),
+        ('int8 x  # don\'t "x"\nHeader header\nint8 y\n', True),
+    ],
+)
+def test_fields_that_are_removed_moved_or_renamed_make_classes_stale(
+    workspace: Path, text: str, is_stale: bool
+) -> None:
+    package = workspace / "src" / "my_pkg"
+    definition = package / "msg" / "A.msg"
+    write_files(package, {"msg/A.msg": 'int8 x  # don\'t "x"\nHeader header\nint8 y2\n'})
+    assert typed("catkin_make", folder=workspace).returncode == 0
+    write_files(package, {"msg/A.msg": text})
+    os.utime(definition, (4e9, 4e9))
+    assert stale_definitions(package) == ([definition] if is_stale else [])
+
+
 def test_package_with_a_name_that_exists(tmp_path: Path) -> None:
     write_files(tmp_path, {"src/.keep": ""})
     done = typed("catkin_create_pkg", "std_msgs", folder=tmp_path / "src")

@@ -486,7 +486,7 @@ MISSING_SPIN = (
         ("rospy.signal_shutdown('')", ""),
         ("rospy.Subscriber('t', Bool); sub.unregister()", ""),
         ("sys.ps1 = '> '", ""),
-        ("from minirospy.client import subscriber; subscriber._NEW_SECONDS = 0.0", ""),
+        ("from minirospy.client import subscriber; subscriber.NEW_SECONDS = 0.0", ""),
         ("1 / 0", ""),
     ],
 )

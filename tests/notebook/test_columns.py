@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from genpy import Message
 from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import TopicStatistics
 from sensor_msgs.msg import Image, JointState, LaserScan
@@ -52,6 +53,15 @@ def test_arrays_of_named_values_have_one_column_for_each_name() -> None:
 def test_arrays_that_do_not_belong_to_the_names_stay_whole() -> None:
     found = named([JointState(name=["elbow"], position=[1.0, 2.0])])
     assert [list(each) for each in found["position"].values] == [[1.0, 2.0]]
+
+
+def test_a_name_that_is_no_list_of_names_belongs_to_no_array() -> None:
+    class Counted(Message):
+        __slots__ = ["name", "values"]
+        _slot_types = ["uint32", "float64[]"]
+
+    found = named([Counted(3, [1.0, 2.0])])
+    assert found["values"].values == [[1.0, 2.0]]
 
 
 def test_other_arrays_and_bytes_stay_as_they_are() -> None:

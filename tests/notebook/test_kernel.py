@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -123,6 +124,36 @@ def test_view_is_embedded_and_its_dashboard_ends_with_a_killed_kernel(master: st
         finally:
             kernel.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGKILL)
     wait_until(lambda: not dashboard.is_running() or dashboard.status() == psutil.STATUS_ZOMBIE)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="process groups")
+def test_dashboard_survives_an_interrupt_of_the_kernel_and_its_group(master: str) -> None:
+    program = SHOW.replace("sys.stdin.read()", "os.write(1, sys.stdin.readline().encode())")
+    with subprocess.Popen(
+        [sys.executable, "-c", f"import signal; signal.signal(signal.SIGINT, lambda *_: None)\n{program}"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as kernel:
+        assert kernel.stdout
+        assert kernel.stdin
+        kernel.stdout.readline()
+        base = kernel.stdout.readline().partition("#")[0]
+        (dashboard,) = psutil.Process(kernel.pid).children()
+        assert os.getpgid(dashboard.pid) != os.getpgid(kernel.pid)
+        os.killpg(kernel.pid, signal.SIGINT)
+        with urllib.request.urlopen(base, timeout=30) as answer:
+            assert answer.status == 200
+        kernel.stdin.close()
+
+
+def test_view_without_a_master_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
+    with pytest.raises(
+        MinirospyError, match=r"the dashboard did not start: .*no ROS master answers at http://localhost:1"
+    ):
+        view("plot")
 
 
 def test_view_that_does_not_exist_is_named() -> None:
