@@ -6,6 +6,7 @@ Each error is logged in full the first time, and then in one line with the numbe
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 import time
 import traceback
@@ -45,8 +46,11 @@ class CallbackErrors:
         # Use a reentrant lock: a signal handler that interrupts :meth:`log` may call :meth:`close` in the same thread.
         self._lock = threading.RLock()
 
-    def log(self, callback: object, error: BaseException) -> None:
-        """Log ``error``, which ``callback`` raised, or count it."""
+    def log(self, callback: object, error: BaseException, advice: str = "") -> None:
+        """Log ``error``, which ``callback`` raised, or count it.
+
+        ``advice`` is printed once, outside the log: programs compare the log's text with ROS's.
+        """
         now = self._clock()
         name = getattr(callback, "__qualname__", type(callback).__qualname__)
         place = type(error), name, *_place(error.__traceback__)
@@ -67,6 +71,8 @@ class CallbackErrors:
         if known is None:
             text = "".join(traceback.format_exception(error))
             _log.error("bad callback: %s\n%s", shown, text, stacklevel=2)
+            if advice and sys.stderr is not None:
+                print(f"minirospy: {advice}", file=sys.stderr)
         else:
             _log.error("%s", line, stacklevel=2)
 

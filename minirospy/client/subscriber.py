@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
-from minirospy.base.notes import noted
 from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import NEW_SECONDS, Session, current_session
@@ -372,14 +371,13 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
             callback.function(message, callback.args)
     except BaseException as error:
         add_numpy_note(error)
-        if advice := advice_for_callback(
-            error, callback.function, message, has_args=callback.args is not None
-        ):
-            noted(error, advice)
         # As in rospy, sys.exit() has no effect in a link's thread, but inside the Subscriber() call it exits the program.
         if is_callers_thread and not isinstance(error, Exception):
             raise
         # Ignore errors in the callback during a shutdown: a hook may have released resources that the callback uses.
         session = current_session()
         if not session.lifecycle.is_shutdown_requested:
-            session.callback_errors.log(callback.function, error)
+            advice = advice_for_callback(
+                error, callback.function, message, has_args=callback.args is not None
+            )
+            session.callback_errors.log(callback.function, error, advice)

@@ -384,16 +384,17 @@ def test_png_of_other_things_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "encode", "extra"), [("cbor2", encode_cbor, "web"), ("PIL", png.encode, "images")]
+    ("module", "encode", "named"),
+    [("cbor2", encode_cbor, "the library cbor2"), ("PIL", png.encode, "minirospy[images]")],
 )
 def test_missing_library_is_named_without_paths_of_the_server(
-    module: str, encode: Callable[[str], object], extra: str, monkeypatch: pytest.MonkeyPatch
+    module: str, encode: Callable[[str], object], named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
     monkeypatch.setattr(sys, "executable", "/home/me/.venv/bin/python")
     with pytest.raises(BridgeProtocolError) as error:
         encode("x")
-    assert f"minirospy[{extra}]" in str(error.value)
+    assert named in str(error.value)
     assert "/home/me" not in str(error.value)
 
 

@@ -202,7 +202,10 @@ class TestHarm:
         ("text", "why"),
         [
             ("", "world: the file is empty"),
-            ("<sdf><world>", "world:1: not XML: no element found (column 12)"),
+            (
+                "<sdf><world>",
+                "world:1: not XML: no element found (column 12): <world> of line 1 is not closed, by /> or </world>",
+            ),
             ("<gazebo:world/>", "world:1: the root is <gazebo:world>: <sdf> is expected"),
         ],
     )
