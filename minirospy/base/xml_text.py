@@ -20,7 +20,10 @@ __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml"
 MAX_LEVELS = 100  # maximum depth of nested tags; parsers and libraries recurse at least once per level
 # maximum tags per document; even a tag of 4 characters uses about 500 bytes of memory
 _MAX_ELEMENTS = 1_000_000
-_UNQUOTED = re.compile(rb"""<[^"'>]*(?:"[^"]*"[^"'>]*|'[^']*'[^"'>]*)*?\s([\w:-]+)\s*=\s*([^\s"'<>/=]+)""")
+_UNQUOTED = re.compile(rb"""<[^<"'>]*(?:"[^"]*"[^<"'>]*|'[^']*'[^<"'>]*)*?\s([\w:-]+)\s*=\s*([^\s"'<>/=]+)""")
+_MAX_ADVISED = (
+    1000  # bytes of a line that are searched for a value without quotes; the search takes quadratic time
+)
 
 
 class XmlError(MinirospyError):
@@ -146,7 +149,7 @@ def _advice(error: XmlSyntaxError, opened: list[XmlElement], text: str | bytes) 
         last = opened[-1]
         return f": <{last.tag}> of line {last.line} is not closed, by /> or </{last.tag}>"
     lines = text.split(b"\n") if isinstance(text, bytes) else text.encode("utf-8", "replace").split(b"\n")
-    line = lines[error.line - 1] if 0 < error.line <= len(lines) else b""
+    line = lines[error.line - 1][:_MAX_ADVISED] if 0 < error.line <= len(lines) else b""
     if found := _UNQUOTED.search(line):
         name, value = (part.decode("utf-8", "replace") for part in found.groups())
         return f': a value is written in quotes: {name}="{value}"'

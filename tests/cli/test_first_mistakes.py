@@ -314,7 +314,6 @@ def test_type_that_a_wrong_publisher_left_behind(master: str) -> None:
     )
 
 
-@pytest.mark.skipif(not HAS_NOTES, reason="Python 3.10 has no notes")
 @pytest.mark.parametrize(
     ("callback", "note"),
     [
