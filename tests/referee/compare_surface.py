@@ -348,6 +348,7 @@ NOT_EVERYWHERE = (
     "gnupg",
     "Cryptodome",
     "tzlocal",
+    "dateutil",
     "roslz4",
     "imp",
     "distutils",
