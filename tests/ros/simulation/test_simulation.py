@@ -29,6 +29,7 @@ from minirospy.core.sdf.model import (
     Pose,
     Sphere,
     Vector,
+    Visual,
     World,
 )
 from minirospy.ros.gazebo_ros.physics import Simulation, SimulationError, State
@@ -514,6 +515,20 @@ def test_a_mesh_without_area_is_named(tmp_path: Path) -> None:
     for model in (single("bad", MeshShape(line)), still("bad", MeshShape(line))):
         with pytest.raises(SimulationError, match="the mesh has no area"):
             simulation.add_model(model)
+
+
+def test_a_material_on_one_triangle_or_without_area_leaves_the_world(tmp_path: Path) -> None:
+    (tmp_path / "board.obj").write_text(
+        "mtllib board.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\n"
+        "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nf 1 2 3\nusemtl none\nf 1 2 5\n"
+    )
+    (tmp_path / "board.mtl").write_text("newmtl a\nnewmtl b\nnewmtl none\n")
+    board = Link("link", visuals=(Visual("v", MeshShape(str(tmp_path / "board.obj"))),))
+    simulation = Simulation(World(models=(GROUND, Model("board", {"link": board}, is_static=True))))
+    simulation.add_visuals()
+    simulation.add_model(single("ball", Sphere(0.1)))
+    simulation.remove_model("board")
+    assert simulation.warnings == []
 
 
 def test_a_moving_mesh_collides_as_the_hulls_of_its_parts(tmp_path: Path) -> None:
