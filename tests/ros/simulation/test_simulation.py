@@ -531,6 +531,25 @@ def test_a_material_on_one_triangle_or_without_area_leaves_the_world(tmp_path: P
     assert simulation.warnings == []
 
 
+def test_a_visual_that_mujoco_refuses_leaves_the_others(tmp_path: Path) -> None:
+    ball = Link("link", visuals=(Visual("v", Sphere(0.1)), Visual("mesh", MeshShape("/no/such.dae"))))
+    bad = Link("link", visuals=(Visual("first", Sphere(0.1)), Visual("v", Sphere(math.nan))))
+    models = [Model(name, {"link": link}) for name, link in (("a", ball), ("bad", bad), ("b", ball))]
+    simulation = Simulation(World(models=tuple(models)))
+
+    simulation.add_visuals()
+
+    unread = "visual 'mesh': /no/such.dae: No such file or directory"
+    assert simulation.warnings[:2] == [f"model 'a': {unread}", f"model 'b': {unread}"]
+    (line,) = simulation.warnings[2:]
+    assert line.startswith("model 'bad' is not shown: ")
+    assert simulation.engine.model.ngeom == 2
+    simulation.step()
+    simulation.remove_model("bad")
+    simulation.add_model(Model("c", {"link": ball}))
+    assert simulation.engine.model.ngeom == 3
+
+
 def test_a_moving_mesh_collides_as_the_hulls_of_its_parts(tmp_path: Path) -> None:
     def box(x: float) -> list[list[tuple[float, float, float]]]:
         low, high = -0.1, 0.1
