@@ -509,6 +509,25 @@ def test_a_model_that_mujoco_refuses_leaves_the_others(tmp_path: Path) -> None:
     simulation.add_model(still("more", MeshShape(rooms, scale=(2.0, 2.0, 2.0))))
 
 
+def test_meshes_of_a_model_that_is_refused_halfway_do_not_stay(tmp_path: Path) -> None:
+    small = [[(x * 1e-9, y * 1e-9, z * 1e-9) for x, y, z in corners] for corners in room()]
+    tiny = write_stl(tmp_path / "small.stl", small)
+    (tmp_path / "broken.obj").write_text("f 1 2 3\n")
+    links = {
+        name: Link(name, collisions=(Collision("c", MeshShape(path)),))
+        for name, path in (("first", tiny), ("second", str(tmp_path / "broken.obj")))
+    }
+    bad = Model("bad", links, is_static=True)
+    simulation = Simulation(World(models=(GROUND,)))
+    with pytest.raises(SimulationError, match=r"broken\.obj"):
+        simulation.add_model(bad)
+    simulation.add_model(single("ball", Sphere(0.1)))
+
+    simulation = Simulation(World(models=(GROUND, bad, single("ball", Sphere(0.1)))))
+    assert list(simulation.models) == ["ground", "ball"]
+    assert len(simulation.warnings) == 1
+
+
 def test_a_mesh_without_area_is_named(tmp_path: Path) -> None:
     line = write_stl(tmp_path / "line.stl", [[(0, 0, 0), (1, 0, 0), (2, 0, 0)]])
     simulation = Simulation(World(models=(GROUND,)))

@@ -232,7 +232,12 @@ class Simulation:
             raise SimulationError(f"model '{name}' has no links")
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise SimulationError(f"model '{name}': the pose is not finite")
-        built = self._builder.add(model, name, pose)
+        last = self._builder.shapes.last
+        try:
+            built = self._builder.add(model, name, pose)
+        except SimulationError:
+            self._builder.shapes.delete_after(last)
+            raise
         self.warnings += self._builder.take_warnings(name)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
