@@ -89,7 +89,7 @@ def terrain(path: str) -> NDArray[np.float64]:
             if picture.mode == "F":
                 return _relative(np.asarray(picture, np.float64)[::-1])
             pixels = np.asarray(picture.convert("I" if picture.mode.startswith("I") else "L"), np.float64)
-    except (OSError, ValueError, SyntaxError) as error:
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise MeshError(f"the heightmap cannot be read: {error}", path) from None
     scale = 65535.0 if pixels.max() > 255 else 255.0
     return np.clip(pixels[::-1] / scale, 0.0, 1.0)

@@ -21,6 +21,7 @@ from minirospy.core.sdf.model import (
     Inertial,
     Joint,
     Link,
+    Material,
     MeshShape,
     Mimic,
     Model,
@@ -33,6 +34,7 @@ from minirospy.core.sdf.model import (
     World,
 )
 from minirospy.ros.gazebo_ros.physics import Simulation, SimulationError, State
+from minirospy.ros.gazebo_ros.physics.shapes import Shapes
 from tests.ros.simulation.worlds import GROUND, arm, at, body, diff_drive, pendulum, single, solid, still
 
 G = 9.8
@@ -642,6 +644,34 @@ def test_an_unreadable_heightmap_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "no.png").write_bytes(b"no picture")
     with pytest.raises(SimulationError, match="the heightmap cannot be read"):
         Simulation().add_model(still("terrain", Heightmap(str(tmp_path / "no.png"))))
+
+
+def test_pictures_that_are_too_large_for_pillow_are_named(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="pictures need Pillow")
+    path = str(tmp_path / "large.png")
+    image.new("1", (20000, 10000)).save(path)
+    simulation = Simulation(World(models=(GROUND,)))
+    with pytest.raises(SimulationError, match="the heightmap cannot be read"):
+        simulation.add_model(still("terrain", Heightmap(path)))
+
+    simulation.add_visuals()
+    shown = Link("link", visuals=(Visual("v", Sphere(0.1), material=Material(texture=path)),))
+    simulation.add_model(Model("ball", {"link": shown}))
+    (line,) = simulation.warnings
+    assert line.startswith(f"model 'ball': the picture {path} is not shown: ")
+
+
+def test_an_error_while_a_model_is_built_leaves_nothing_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object, **options: object) -> None:
+        raise RuntimeError("no memory")
+
+    simulation = Simulation(World(models=(GROUND,)))
+    with monkeypatch.context() as patched:
+        patched.setattr(Shapes, "add_collision", fail)
+        with pytest.raises(RuntimeError):
+            simulation.add_model(single("ball", Sphere(0.1)))
+    simulation.add_model(single("ball", Sphere(0.1)))
+    assert list(simulation.models) == ["ground", "ball"]
 
 
 def test_mass_and_joint_can_be_changed() -> None:

@@ -97,6 +97,9 @@ class Builder:
         except SimulationError as error:
             self.delete(built)
             raise SimulationError(f"model '{name}': {error}") from error.__cause__
+        except Exception:
+            self.delete(built)
+            raise
         return built
 
     def add_scene(self, world: World) -> None:

@@ -235,7 +235,7 @@ class Simulation:
         last = self._builder.shapes.last
         try:
             built = self._builder.add(model, name, pose)
-        except SimulationError:
+        except Exception:
             self._builder.shapes.delete_after(last)
             raise
         self.warnings += self._builder.take_warnings(name)
