@@ -227,6 +227,9 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
         lambda: joint.set_velocity(1.0, math.nan),
         lambda: joint.set_position(math.nan),
         lambda: joint.set_state(math.nan),
+        lambda: joint.set_axis(Axis(damping=math.nan)),
+        lambda: joint.set_axis(Axis(damping=math.inf)),
+        lambda: joint.set_axis(Axis(friction=math.nan)),
         lambda: link.push((math.nan, 0.0, 0.0)),
         lambda: link.add_wrench(torque=(math.inf, 0.0, 0.0)),
         lambda: model.set_state(State(bad)),
@@ -235,6 +238,7 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
     ):
         with pytest.raises(SimulationError, match=r"^pendulum(::joint0|::rod0)?: .* is not finite$"):
             call()
+    joint.set_velocity(1.0, 1.0)
     assert simulation.step(10) == []
 
 
