@@ -91,14 +91,13 @@ class Builder:
                 for joint in tree.loops:
                     self._add_loop(built, model, name, joint)
                 self._add_mimics(built, model, name)
-        except (ValueError, TypeError, OSError) as error:
+        except Exception as error:
             self.delete(built)
-            raise SimulationError(f"model '{name}': {_first_line(error)}") from error
-        except SimulationError as error:
-            self.delete(built)
-            raise SimulationError(f"model '{name}': {error}") from error.__cause__
-        except Exception:
-            self.delete(built)
+            self.shapes.warnings.clear()  # they would name the next model
+            if isinstance(error, SimulationError):
+                raise SimulationError(f"model '{name}': {error}") from error.__cause__
+            if isinstance(error, (ValueError, TypeError, OSError)):
+                raise SimulationError(f"model '{name}': {_first_line(error)}") from error
             raise
         return built
 
