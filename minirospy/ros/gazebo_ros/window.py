@@ -21,6 +21,7 @@ All rates are of wall time. Nothing is computed without subscribers.
 from __future__ import annotations
 
 import functools
+import os
 import threading
 import time as wall
 from collections.abc import Callable, Iterable
@@ -267,7 +268,8 @@ def model_names(folders: Iterable[str]) -> list[str]:
 
 
 def _is_model(folder: Path) -> bool:
-    return (folder / "model.config").is_file() or (folder / "model.sdf").is_file()
+    # Path.is_file raises PermissionError for a file in a folder that cannot be read.
+    return any(os.path.isfile(folder / name) for name in ("model.config", "model.sdf"))
 
 
 def _camera(pose: Pose | None) -> list[KeyValue]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -16,6 +19,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import Node
+from minirospy.ros.gazebo_ros.window import model_names
 from tests.ros.simulation.processes import BOX, Start, call, run, start_world, until, written
 
 ROVER = Path(__file__).with_name("rover.urdf").read_text(encoding="utf-8")
@@ -206,3 +210,20 @@ def test_library_lists_its_models(
         assert properties.model_names == ["ground_plane", "my_table"]
 
     run(body)
+
+
+def test_a_folder_that_cannot_be_read_hides_no_other_models(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("hut", "secret"):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name, "model.config", "<model/>")
+    stat = os.stat
+
+    def refuse(path: Any, **options: Any) -> os.stat_result:
+        if Path(path).parent.name == "secret":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return stat(path, **options)
+
+    monkeypatch.setattr(os, "stat", refuse)
+    assert "hut" in model_names([str(tmp_path)])
