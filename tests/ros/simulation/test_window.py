@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from gazebo_msgs.msg import ModelState
@@ -19,7 +20,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import Node
-from minirospy.ros.gazebo_ros.window import model_names
+from minirospy.ros.gazebo_ros.window import model_names, ray_lengths
 from tests.ros.simulation.processes import BOX, Start, call, run, start_world, until, written
 
 ROVER = Path(__file__).with_name("rover.urdf").read_text(encoding="utf-8")
@@ -227,3 +228,10 @@ def test_a_folder_that_cannot_be_read_hides_no_other_models(
 
     monkeypatch.setattr(os, "stat", refuse)
     assert "hut" in model_names([str(tmp_path)])
+
+
+def test_rays_of_infinite_range_are_drawn_with_finite_lengths() -> None:
+    distances = np.array([2.0, 8.0, 150.0, np.inf])
+    assert ray_lengths(distances, np.inf).tolist() == [2, 8, 150, 100]
+    assert ray_lengths(distances, 5.0).tolist() == [2, 5, 5, 5]
+    assert ray_lengths(distances, 500.0).tolist() == [2, 8, 150, 500]
