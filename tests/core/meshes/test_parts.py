@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from minirospy.core.meshes.errors import MeshError
 from minirospy.core.meshes.mesh import Mesh
 from minirospy.core.meshes.parts import MAX_PRISMS, THICKNESS, collision_parts, connected_parts, is_convex
-from minirospy.core.meshes.solids import polyline_mesh
+from minirospy.core.meshes.solids import polyline_mesh, terrain
 
 
 def box(x: float = 0.0, side: float = 1.0) -> Mesh:
@@ -134,3 +136,10 @@ def test_polylines_that_cross_or_are_short_are_refused() -> None:
     for a, b, c in mesh.vertices[mesh.triangles]:
         volume += a @ np.cross(b, c) / 6
     assert volume == pytest.approx(3.0)
+
+
+def test_a_terrain_below_the_sea_has_its_heights(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="heightmaps need Pillow")
+    elevations = np.array([[-430, -400], [-410, -99999]], np.float32)  # the last one is missing
+    image.fromarray(elevations).save(tmp_path / "basin.tif")
+    assert terrain(str(tmp_path / "basin.tif")).tolist() == [[pytest.approx(2 / 3), 0], [0, 1]]
