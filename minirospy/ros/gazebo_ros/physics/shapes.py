@@ -203,7 +203,9 @@ class Shapes:
         name = geometry.path if isinstance(geometry, MeshShape) else "of a polyline"
         try:
             parts = collision_parts(
-                mesh, is_static=is_static, split=lambda part: self._decomposition.split(part, name)
+                mesh,
+                is_static=is_static,
+                split=lambda part, most: self._decomposition.split(part, name, most),
             )
         except MeshError as error:
             raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
