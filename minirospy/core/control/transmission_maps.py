@@ -80,7 +80,10 @@ class DifferentialTransmission(TransmissionMap):
         joint_offset: Sequence[float] = (0.0, 0.0),
     ) -> None:
         a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "differential")
-        motion = ((1 / (2 * a * c), 1 / (2 * b * c)), (1 / (2 * a * d), -1 / (2 * b * d)))
+        motion = (
+            (_reciprocal(2 * a * c), _reciprocal(2 * b * c)),
+            (_reciprocal(2 * a * d), -_reciprocal(2 * b * d)),
+        )
         super().__init__(motion, ((a * c, b * c), (a * d, -b * d)), joint_offset)
 
 
@@ -94,7 +97,7 @@ class FourBarLinkageTransmission(TransmissionMap):
         joint_offset: Sequence[float] = (0.0, 0.0),
     ) -> None:
         a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "four-bar linkage")
-        motion = ((1 / (a * c), 0.0), (-1 / (a * c * d), 1 / (b * d)))
+        motion = ((_reciprocal(a * c), 0.0), (-_reciprocal(a * c * d), _reciprocal(b * d)))
         # These efforts are ROS's; the power of actuators and joints is not equal.
         super().__init__(motion, ((a * c, 0.0), (-a * c * d, b * d)), joint_offset)
 
@@ -204,10 +207,18 @@ def _product(matrix: _Matrix, values: Sequence[float]) -> list[float]:
     return [sum(factor * value for factor, value in zip(row, values, strict=True)) for row in matrix]
 
 
+def _reciprocal(value: float) -> float:
+    """Return 1 / value. Raise HardwareError if the product of reductions was too large or too small for a float."""
+    if not value or not math.isfinite(value):
+        raise HardwareError("Transmission reduction ratios are too large or too small.")
+    return 1 / value
+
+
 def _inverse(matrix: _Matrix) -> _Matrix:
     """Return the inverse of a matrix of size 1 or 2."""
     if len(matrix) == 1:
         return ((1 / matrix[0][0],),)
     (a, b), (c, d) = matrix
     determinant = a * d - b * c
+    _reciprocal(determinant)  # it raises HardwareError if there is no inverse
     return (d / determinant, -b / determinant), (-c / determinant, a / determinant)

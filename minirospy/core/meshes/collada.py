@@ -200,8 +200,11 @@ class _Reader:
         found = next((each for each in inputs if each.attributes.get("semantic") == "TEXCOORD"), None)
         if found is None:
             return None
-        values = self._values(found.attributes.get("source", ""), 2)
-        chosen = indices[:, int(found.attributes.get("offset", "0"))][corners]
+        try:
+            values = self._values(found.attributes.get("source", ""), 2)
+            chosen = indices[:, int(found.attributes.get("offset", "0"))][corners]
+        except (ValueError, IndexError, OverflowError):
+            return None
         if values is None or chosen.min() < 0 or chosen.max() >= len(values):
             return None
         return values.astype(np.float32)[chosen]

@@ -43,9 +43,12 @@ class Parts(NamedTuple):
 
 
 def collision_parts(
-    mesh: Mesh, *, is_static: bool, split: Callable[[Mesh], list[Mesh] | None] = lambda part: None
+    mesh: Mesh, *, is_static: bool, split: Callable[[Mesh, int], list[Mesh] | None] = lambda part, most: None
 ) -> Parts:
-    """Return the convex parts. ``split`` returns those of a hollow part that moves, or None if its hull must do."""
+    """Return the convex parts.
+
+    ``split`` returns at most so many convex parts of a hollow part that moves, or None if its hull must do.
+    """
     mesh = _welded(mesh)
     if not _has_area(mesh).any():
         raise MeshError("the mesh has no area")
@@ -53,9 +56,11 @@ def collision_parts(
     if not is_static:
         if len(parts) > MAX_HULLS:
             return Parts([_thickened(mesh)], False)
+        hollow = list(map(is_hollow, parts))
+        most = MAX_HULLS // max(sum(hollow), 1)  # of each hollow part
         hulls: list[Mesh] = []
-        for part in parts:
-            hulls += (split(part) if is_hollow(part) else None) or [_thickened(part)]
+        for part, splits in zip(parts, hollow, strict=True):
+            hulls += (split(part, most) if splits and most > 1 else None) or [_thickened(part)]
         return Parts(hulls, all(map(is_convex, parts)))
 
     convex: list[Mesh] = []

@@ -76,7 +76,7 @@ def terrain(path: str) -> NDArray[np.float64]:
     """Return a grey picture's heights from 0 to 1, the first row at the smallest y. Raise MeshError if it cannot be read.
 
     A picture of floating-point numbers has elevations in metres, as files of digital elevation models do: 1 is the highest,
-    0 the sea or, above it, the lowest.
+    0 the sea or, if all are above or below it, the lowest.
     """
     try:
         from PIL import Image
@@ -89,7 +89,7 @@ def terrain(path: str) -> NDArray[np.float64]:
             if picture.mode == "F":
                 return _relative(np.asarray(picture, np.float64)[::-1])
             pixels = np.asarray(picture.convert("I" if picture.mode.startswith("I") else "L"), np.float64)
-    except (OSError, ValueError, SyntaxError) as error:
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise MeshError(f"the heightmap cannot be read: {error}", path) from None
     scale = 65535.0 if pixels.max() > 255 else 255.0
     return np.clip(pixels[::-1] / scale, 0.0, 1.0)
@@ -99,6 +99,8 @@ def _relative(elevations: NDArray[np.float64]) -> NDArray[np.float64]:
     known = np.isfinite(elevations) & (elevations > NO_ELEVATION)
     if not known.any():
         raise ValueError("it has no elevation")
-    lowest, highest = max(elevations[known].min(), 0.0), elevations[known].max()
+    lowest, highest = elevations[known].min(), elevations[known].max()
+    if highest > 0:
+        lowest = max(lowest, 0.0)
     heights: NDArray[np.float64] = np.where(known, elevations - lowest, 0.0) / max(highest - lowest, 1e-9)
     return np.clip(heights, 0.0, 1.0)

@@ -7,6 +7,7 @@ while there are subscribers.
 from __future__ import annotations
 
 import functools
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -100,7 +101,7 @@ def model_markers(model: SimModel) -> list[Marker]:
 @functools.cache
 def _uri(path: str) -> str:
     """Return a file's URI: package://, which the dashboard can read, if the file is in a package."""
-    file = Path(path)
+    file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may have relative folders
     for folder in file.parents:
         if name := package_name(folder):
             return f"package://{name}/{file.relative_to(folder).as_posix()}"

@@ -75,9 +75,13 @@ class Server:
         self.loop.simulation.remove_model(name)
         self._changed()
 
-    def moved(self, name: str) -> None:
-        """Publish the states now if the simulation is paused. Call it in the loop's thread."""
-        if self._window is not None and self.loop.simulation.models[name].is_static:
+    def moved(self, name: str, before: Pose) -> None:
+        """Publish the states now if the simulation is paused. Call it in the loop's thread.
+
+        The shapes of a static model are published if the pose before was another one.
+        """
+        model = self.loop.simulation.models[name]
+        if self._window is not None and model.is_static and model.pose != before:
             self._window.changed()
         if self.loop.is_paused:
             self._publish_states()

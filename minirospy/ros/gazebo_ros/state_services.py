@@ -212,8 +212,9 @@ class StateServices:
             return SetModelStateResponse(
                 False, "SetModelState: specified reference frame entity does not exist"
             )
+        before = model.pose
         model.set_state(State(pose, linear, angular))
-        self._server.moved(model.name)
+        self._server.moved(model.name, before)
         return SetModelStateResponse(True, "SetModelState: set model state done")
 
     def _set_model_configuration(
@@ -278,6 +279,7 @@ class StateServices:
         elif wanted.reference_frame not in WORLD_FRAMES:
             rospy.logerr("Updating LinkState: reference_frame is not a valid entity name")
             return SetLinkStateResponse(False, "SetLinkState: failed")
+        before = link.model.pose
         link.set_state(State(pose, linear, angular))
-        self._server.moved(link.model.name)
+        self._server.moved(link.model.name, before)
         return SetLinkStateResponse(True, "SetLinkState: success")

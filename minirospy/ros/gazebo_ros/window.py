@@ -21,6 +21,7 @@ All rates are of wall time. Nothing is computed without subscribers.
 from __future__ import annotations
 
 import functools
+import os
 import threading
 import time as wall
 from collections.abc import Callable, Iterable
@@ -48,7 +49,7 @@ from minirospy.ros.gazebo_ros.plugins import PluginHost
 if TYPE_CHECKING:
     from minirospy.ros.gazebo_ros.physics import SimModel
 
-__all__ = ["Window", "model_names"]
+__all__ = ["Window", "model_names", "ray_lengths"]
 
 PERIOD_SECONDS = 1 / 30  # between two messages with poses
 SLOW_SECONDS = 0.1  # between two messages with joints, contacts or rays
@@ -57,6 +58,7 @@ MAX_STEPS = 1_000_000  # of one message
 STEPS_AT_ONCE = 50  # then the simulation serves others
 MAX_CONTACTS = 2000  # that are shown
 MAX_RAYS = 360  # of one sensor that are shown
+ENDLESS_RAY = 100.0  # m, drawn of a ray that hits nothing if its maximum range is infinite
 NORMAL_LENGTH = 0.12  # m
 POINT_SIZE = 0.022  # m
 RAY_WIDTH = 0.01  # m
@@ -223,7 +225,7 @@ class Window:
             directions = rays.directions[:: -(-len(rays.directions) // MAX_RAYS) or 1]
             pose = plugin.sensor_pose
             hits = self._simulation.cast_rays(pose, directions, rays.max_range, min_range=rays.min_range)
-            ends = directions * np.minimum(hits.distances, rays.max_range)[:, None]
+            ends = directions * ray_lengths(hits.distances, rays.max_range)[:, None]
             lines = _new_marker(
                 f"{plugin.sensor_link.scoped_name}::{plugin.sensor.name}", Marker.LINE_LIST, RAY_COLOR
             )
@@ -255,6 +257,12 @@ class Window:
             pass
 
 
+def ray_lengths(distances: NDArray[np.float64], max_range: float) -> NDArray[np.float64]:
+    """Return the lengths with which rays are drawn. Those without a hit end at the maximum range if it is finite."""
+    end = max_range if np.isfinite(max_range) else ENDLESS_RAY
+    return np.where(np.isfinite(distances), distances, end).clip(max=max_range)
+
+
 def model_names(folders: Iterable[str]) -> list[str]:
     """Return the names of the models in some folders: those that have a model.config or a model.sdf."""
     found = set()
@@ -267,7 +275,8 @@ def model_names(folders: Iterable[str]) -> list[str]:
 
 
 def _is_model(folder: Path) -> bool:
-    return (folder / "model.config").is_file() or (folder / "model.sdf").is_file()
+    # Path.is_file raises PermissionError for a file in a folder that cannot be read.
+    return any(os.path.isfile(folder / name) for name in ("model.config", "model.sdf"))
 
 
 def _camera(pose: Pose | None) -> list[KeyValue]:

@@ -85,3 +85,13 @@ def test_invalid_transmission_is_refused_with_the_text_of_ros(old: str, new: str
 def test_two_reductions_are_required() -> None:
     with pytest.raises(HardwareError, match="vectors of a four-bar linkage transmission must have size 2"):
         FourBarLinkageTransmission([1.0])
+
+
+@pytest.mark.parametrize("kind", [DifferentialTransmission, FourBarLinkageTransmission])
+@pytest.mark.parametrize("size", [1e-320, 1e-200, 1e-160, 1e160, 1e200, 1e308])
+def test_reductions_beyond_the_range_of_numbers_are_refused(
+    kind: type[DifferentialTransmission | FourBarLinkageTransmission], size: float
+) -> None:
+    for actuators, joints in (((size, size), (size, size)), ((size, size), (1.0, 1.0))):
+        with pytest.raises(HardwareError, match="too large or too small"):
+            kind(actuators, joints)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from minirospy.core.meshes.errors import MeshError
 from minirospy.core.meshes.mesh import Mesh
 from minirospy.core.meshes.parts import MAX_PRISMS, THICKNESS, collision_parts, connected_parts, is_convex
-from minirospy.core.meshes.solids import polyline_mesh
+from minirospy.core.meshes.solids import polyline_mesh, terrain
 
 
 def box(x: float = 0.0, side: float = 1.0) -> Mesh:
@@ -126,6 +128,23 @@ def test_many_moving_parts_have_one_hull() -> None:
     assert len(parts.meshes) == 1
 
 
+@pytest.mark.parametrize(("count", "most"), [(1, 32), (5, 6), (16, 2), (17, None), (30, None)])
+def test_hollow_parts_share_the_hulls(count: int, most: int | None) -> None:
+    asked: list[int] = []
+
+    def split(part: Mesh, most: int) -> list[Mesh]:
+        asked.append(most)
+        return [part] * most
+
+    channel = polyline_mesh(((0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)), 1.0)
+    channels = [
+        Mesh(channel.vertices + np.array([5.0 * index, 0, 0]), channel.triangles) for index in range(count)
+    ]
+    parts = collision_parts(Mesh.join(channels), is_static=False, split=split)
+    assert asked == ([] if most is None else [most] * count)
+    assert len(parts.meshes) == count * (most or 1)
+
+
 def test_polylines_that_cross_or_are_short_are_refused() -> None:
     with pytest.raises(MeshError, match="3 to 2000 points, not 2"):
         polyline_mesh(((0, 0), (1, 1)), 1.0)
@@ -134,3 +153,10 @@ def test_polylines_that_cross_or_are_short_are_refused() -> None:
     for a, b, c in mesh.vertices[mesh.triangles]:
         volume += a @ np.cross(b, c) / 6
     assert volume == pytest.approx(3.0)
+
+
+def test_a_terrain_below_the_sea_has_its_heights(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="heightmaps need Pillow")
+    elevations = np.array([[-430, -400], [-410, -99999]], np.float32)  # the last one is missing
+    image.fromarray(elevations).save(tmp_path / "basin.tif")
+    assert terrain(str(tmp_path / "basin.tif")).tolist() == [[pytest.approx(2 / 3), 0], [0, 1]]

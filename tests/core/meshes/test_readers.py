@@ -313,7 +313,15 @@ def test_texture_coordinates_belong_to_corners() -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [(b"#t", b"#x"), (b"1 2 2 1", b"1 9 2 1"), (b"0 0 1 0 1 1 0 1<", b"0 0 1 0 nan 1 0 1<")]
+    "change",
+    [
+        (b"#t", b"#x"),
+        (b"1 2 2 1", b"1 9 2 1"),
+        (b"0 0 1 0 1 1 0 1<", b"0 0 1 0 nan 1 0 1<"),
+        (b"0 0 1 0 1 1 0 1<", b"0 0 1 0 -1.#IND 1 0 1<"),
+        (b'"#t" offset="1"', b'"#t" offset="-9"'),
+        (b'stride="2"', b'stride="two"'),
+    ],
 )
 def test_texture_coordinates_that_cannot_be_used_are_left_out(change: tuple[bytes, bytes]) -> None:
     (mesh,) = parse_dae(DAE_WITH_TEXTURE.replace(*change))

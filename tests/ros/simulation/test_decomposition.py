@@ -14,7 +14,7 @@ pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
 from minirospy.core.meshes.mesh import Mesh
 from minirospy.core.meshes.parts import is_hollow
 from minirospy.core.sdf.model import Collision, Inertial, Link, MeshShape, Model, Pose, Sphere, World
-from minirospy.ros.gazebo_ros.physics import Simulation
+from minirospy.ros.gazebo_ros.physics import Simulation, SimulationError
 from tests.ros.simulation.worlds import GROUND, at, single
 
 OUTER, INNER, HEIGHT, BOTTOM = 0.15, 0.13, 0.1, 0.02
@@ -96,6 +96,19 @@ def test_without_the_library_the_hull_collides(tmp_path: Path, monkeypatch: pyte
     assert height == pytest.approx(HEIGHT + 0.02, abs=2e-3)
     assert line.startswith(f"model 'tray': the mesh {tray} moves and is hollow: its convex hull collides (")
     assert "coacd" in line
+
+
+def test_a_warning_of_a_refused_model_does_not_name_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "coacd", None)
+    shapes = (MeshShape(write_tray(tmp_path)), MeshShape("/no/such.stl"))
+    collisions = tuple(Collision(f"c{index}", shape) for index, shape in enumerate(shapes))
+    simulation = Simulation(World(models=(GROUND,)))
+    with pytest.raises(SimulationError, match=r"such\.stl"):
+        simulation.add_model(Model("refused", {"link": Link("link", collisions=collisions)}))
+    simulation.add_model(single("ball", Sphere(0.1)))
+    assert simulation.warnings == []
 
 
 def test_hollow_meshes() -> None:

@@ -354,6 +354,24 @@ def test_damping_does_not_slow_a_strong_motor() -> None:
     assert abs(handle.velocity) < 0.01
 
 
+@pytest.mark.parametrize(
+    ("start", "target", "expected"), [(1.9, -1.95, 1.336), (1.9, -1.5, 1.336), (1.0, -1.5, 0.812)]
+)
+def test_damping_helps_a_motor_that_reverses(start: float, target: float, expected: float) -> None:
+    wheel = Link("wheel")  # its inertia is 1 kg m^2
+    axis = Joint("axle", "continuous", "world", "wheel", axis=Axis((0, 1, 0), damping=0.5))
+    simulation = Simulation(World(models=(Model("model", {"wheel": wheel}, {"axle": axis}),)))
+    joint = simulation.model("model").joints["axle"]
+    joint.set_state(0.0, start)
+    joint.set_velocity(target, 1.0)
+    # The motor and the damping brake: dw/dt = -1 - 0.5 w.
+    steps = 0
+    while joint.velocity > 0 and steps < 2 * expected * 1000:
+        simulation.step()
+        steps += 1
+    assert steps / 1000 == pytest.approx(expected, abs=0.003)
+
+
 def test_joint_friction_stops_a_joint() -> None:
     rotor = body("rotor", Box((1.0, 0.1, 0.1)), 2.0)
     joint = Joint("joint", "continuous", "world", "rotor", axis=Axis(friction=0.1))

@@ -21,6 +21,7 @@ from minirospy.core.sdf.model import (
     Inertial,
     Joint,
     Link,
+    Material,
     MeshShape,
     Mimic,
     Model,
@@ -29,9 +30,11 @@ from minirospy.core.sdf.model import (
     Pose,
     Sphere,
     Vector,
+    Visual,
     World,
 )
 from minirospy.ros.gazebo_ros.physics import Simulation, SimulationError, State
+from minirospy.ros.gazebo_ros.physics.shapes import Shapes
 from tests.ros.simulation.worlds import GROUND, arm, at, body, diff_drive, pendulum, single, solid, still
 
 G = 9.8
@@ -224,6 +227,9 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
         lambda: joint.set_velocity(1.0, math.nan),
         lambda: joint.set_position(math.nan),
         lambda: joint.set_state(math.nan),
+        lambda: joint.set_axis(Axis(damping=math.nan)),
+        lambda: joint.set_axis(Axis(damping=math.inf)),
+        lambda: joint.set_axis(Axis(friction=math.nan)),
         lambda: link.push((math.nan, 0.0, 0.0)),
         lambda: link.add_wrench(torque=(math.inf, 0.0, 0.0)),
         lambda: model.set_state(State(bad)),
@@ -232,6 +238,7 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
     ):
         with pytest.raises(SimulationError, match=r"^pendulum(::joint0|::rod0)?: .* is not finite$"):
             call()
+    joint.set_velocity(1.0, 1.0)
     assert simulation.step(10) == []
 
 
@@ -508,12 +515,64 @@ def test_a_model_that_mujoco_refuses_leaves_the_others(tmp_path: Path) -> None:
     simulation.add_model(still("more", MeshShape(rooms, scale=(2.0, 2.0, 2.0))))
 
 
+def test_meshes_of_a_model_that_is_refused_halfway_do_not_stay(tmp_path: Path) -> None:
+    small = [[(x * 1e-9, y * 1e-9, z * 1e-9) for x, y, z in corners] for corners in room()]
+    tiny = write_stl(tmp_path / "small.stl", small)
+    (tmp_path / "broken.obj").write_text("f 1 2 3\n")
+    links = {
+        name: Link(name, collisions=(Collision("c", MeshShape(path)),))
+        for name, path in (("first", tiny), ("second", str(tmp_path / "broken.obj")))
+    }
+    bad = Model("bad", links, is_static=True)
+    simulation = Simulation(World(models=(GROUND,)))
+    with pytest.raises(SimulationError, match=r"broken\.obj"):
+        simulation.add_model(bad)
+    simulation.add_model(single("ball", Sphere(0.1)))
+
+    simulation = Simulation(World(models=(GROUND, bad, single("ball", Sphere(0.1)))))
+    assert list(simulation.models) == ["ground", "ball"]
+    assert len(simulation.warnings) == 1
+
+
 def test_a_mesh_without_area_is_named(tmp_path: Path) -> None:
     line = write_stl(tmp_path / "line.stl", [[(0, 0, 0), (1, 0, 0), (2, 0, 0)]])
     simulation = Simulation(World(models=(GROUND,)))
     for model in (single("bad", MeshShape(line)), still("bad", MeshShape(line))):
         with pytest.raises(SimulationError, match="the mesh has no area"):
             simulation.add_model(model)
+
+
+def test_a_material_on_one_triangle_or_without_area_leaves_the_world(tmp_path: Path) -> None:
+    (tmp_path / "board.obj").write_text(
+        "mtllib board.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\n"
+        "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nf 1 2 3\nusemtl none\nf 1 2 5\n"
+    )
+    (tmp_path / "board.mtl").write_text("newmtl a\nnewmtl b\nnewmtl none\n")
+    board = Link("link", visuals=(Visual("v", MeshShape(str(tmp_path / "board.obj"))),))
+    simulation = Simulation(World(models=(GROUND, Model("board", {"link": board}, is_static=True))))
+    simulation.add_visuals()
+    simulation.add_model(single("ball", Sphere(0.1)))
+    simulation.remove_model("board")
+    assert simulation.warnings == []
+
+
+def test_a_visual_that_mujoco_refuses_leaves_the_others(tmp_path: Path) -> None:
+    ball = Link("link", visuals=(Visual("v", Sphere(0.1)), Visual("mesh", MeshShape("/no/such.dae"))))
+    bad = Link("link", visuals=(Visual("first", Sphere(0.1)), Visual("v", Sphere(math.nan))))
+    models = [Model(name, {"link": link}) for name, link in (("a", ball), ("bad", bad), ("b", ball))]
+    simulation = Simulation(World(models=tuple(models)))
+
+    simulation.add_visuals()
+
+    unread = "visual 'mesh': /no/such.dae: No such file or directory"
+    assert simulation.warnings[:2] == [f"model 'a': {unread}", f"model 'b': {unread}"]
+    (line,) = simulation.warnings[2:]
+    assert line.startswith("model 'bad' is not shown: ")
+    assert simulation.engine.model.ngeom == 2
+    simulation.step()
+    simulation.remove_model("bad")
+    simulation.add_model(Model("c", {"link": ball}))
+    assert simulation.engine.model.ngeom == 3
 
 
 def test_a_moving_mesh_collides_as_the_hulls_of_its_parts(tmp_path: Path) -> None:
@@ -589,6 +648,34 @@ def test_an_unreadable_heightmap_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "no.png").write_bytes(b"no picture")
     with pytest.raises(SimulationError, match="the heightmap cannot be read"):
         Simulation().add_model(still("terrain", Heightmap(str(tmp_path / "no.png"))))
+
+
+def test_pictures_that_are_too_large_for_pillow_are_named(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image", reason="pictures need Pillow")
+    path = str(tmp_path / "large.png")
+    image.new("1", (20000, 10000)).save(path)
+    simulation = Simulation(World(models=(GROUND,)))
+    with pytest.raises(SimulationError, match="the heightmap cannot be read"):
+        simulation.add_model(still("terrain", Heightmap(path)))
+
+    simulation.add_visuals()
+    shown = Link("link", visuals=(Visual("v", Sphere(0.1), material=Material(texture=path)),))
+    simulation.add_model(Model("ball", {"link": shown}))
+    (line,) = simulation.warnings
+    assert line.startswith(f"model 'ball': the picture {path} is not shown: ")
+
+
+def test_an_error_while_a_model_is_built_leaves_nothing_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object, **options: object) -> None:
+        raise RuntimeError("no memory")
+
+    simulation = Simulation(World(models=(GROUND,)))
+    with monkeypatch.context() as patched:
+        patched.setattr(Shapes, "add_collision", fail)
+        with pytest.raises(RuntimeError):
+            simulation.add_model(single("ball", Sphere(0.1)))
+    simulation.add_model(single("ball", Sphere(0.1)))
+    assert list(simulation.models) == ["ground", "ball"]
 
 
 def test_mass_and_joint_can_be_changed() -> None:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from gazebo_msgs.msg import ModelState
@@ -16,7 +21,13 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import Node
+from minirospy.core.sdf.model import Box, World
+from minirospy.ros.gazebo_ros.physics import Simulation, State
+from minirospy.ros.gazebo_ros.server import Server
+from minirospy.ros.gazebo_ros.window import model_names, ray_lengths
 from tests.ros.simulation.processes import BOX, Start, call, run, start_world, until, written
+from tests.ros.simulation.worlds import at as pose
+from tests.ros.simulation.worlds import still
 
 ROVER = Path(__file__).with_name("rover.urdf").read_text(encoding="utf-8")
 
@@ -206,3 +217,41 @@ def test_library_lists_its_models(
         assert properties.model_names == ["ground_plane", "my_table"]
 
     run(body)
+
+
+def test_a_folder_that_cannot_be_read_hides_no_other_models(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("hut", "secret"):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name, "model.config", "<model/>")
+    stat = os.stat
+
+    def refuse(path: Any, **options: Any) -> os.stat_result:
+        if Path(path).parent.name == "secret":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return stat(path, **options)
+
+    monkeypatch.setattr(os, "stat", refuse)
+    assert "hut" in model_names([str(tmp_path)])
+
+
+def test_rays_of_infinite_range_are_drawn_with_finite_lengths() -> None:
+    distances = np.array([2.0, 8.0, 150.0, np.inf])
+    assert ray_lengths(distances, np.inf).tolist() == [2, 8, 150, 100]
+    assert ray_lengths(distances, 5.0).tolist() == [2, 5, 5, 5]
+    assert ray_lengths(distances, 500.0).tolist() == [2, 8, 150, 500]
+
+
+def test_a_static_model_that_stays_is_not_shown_again() -> None:
+    simulation = Simulation(World(models=(still("wall", Box((1.0, 1.0, 1.0))),)))
+    wall, changes = simulation.model("wall"), []
+    server: Any = SimpleNamespace(
+        loop=SimpleNamespace(simulation=simulation, is_paused=False),
+        _window=SimpleNamespace(changed=lambda: changes.append(wall.pose.position[0])),
+    )
+    for x in (0.0, 1.0, 1.0, 2.0):
+        before = wall.pose
+        wall.set_state(State(pose(x, yaw=0.3)))
+        Server.moved(server, "wall", before)
+    assert changes == [0, 1, 2]  # the first one turns it

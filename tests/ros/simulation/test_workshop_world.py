@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import runpy
 
 import pytest
 
@@ -15,10 +16,12 @@ from sensor_msgs.msg import LaserScan
 
 from minirospy import Node
 from minirospy.board.board import Board
+from minirospy.workspace.packages import Packages
 from tests.ros.robot_state_publisher.conftest import SECONDS
 from tests.ros.simulation.processes import Start, call, run, until
 
 LEDS = range(2, 8)
+WALK = Packages().find("rpi_feros_gazebo") / "scripts" / "walk"
 GREEN, YELLOW, RED = [2, 3], [4, 5], [6, 7]
 
 
@@ -61,3 +64,11 @@ def test_a_person_walks_to_the_scanner_and_back(master: str, launch: Start) -> N
     with Board() as board:
         for leds in (GREEN, YELLOW, RED, YELLOW, GREEN):
             wait_for_lit(board, leds)
+
+
+def test_a_speed_that_cannot_be_walked_is_one_line() -> None:
+    read_speed = runpy.run_path(str(WALK))["read_speed"]
+    assert (read_speed(2), read_speed("0.5")) == (2.0, 0.5)
+    for bad in (0, -1.0, "fast", math.nan, math.inf, [1.0]):
+        with pytest.raises(ValueError, match=r"^~speed must be a number from 0\.01 \(m/s\), not "):
+            read_speed(bad)

@@ -25,7 +25,7 @@ from minirospy.core.sdf.model import (
 from minirospy.core.sdf.poses import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
-from minirospy.ros.gazebo_ros.physics.shapes import Shapes
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, Shapes
 from minirospy.ros.gazebo_ros.physics.tree import WORLD, LinkTree, plan_tree
 
 __all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits", "set_inertial"]
@@ -91,12 +91,14 @@ class Builder:
                 for joint in tree.loops:
                     self._add_loop(built, model, name, joint)
                 self._add_mimics(built, model, name)
-        except (ValueError, TypeError, OSError) as error:
+        except Exception as error:
             self.delete(built)
-            raise SimulationError(f"model '{name}': {_first_line(error)}") from error
-        except SimulationError as error:
-            self.delete(built)
-            raise SimulationError(f"model '{name}': {error}") from error.__cause__
+            self.shapes.warnings.clear()  # they would name the next model
+            if isinstance(error, SimulationError):
+                raise SimulationError(f"model '{name}': {error}") from error.__cause__
+            if isinstance(error, (ValueError, TypeError, OSError)):
+                raise SimulationError(f"model '{name}': {_first_line(error)}") from error
+            raise
         return built
 
     def add_scene(self, world: World) -> None:
@@ -143,6 +145,12 @@ class Builder:
                 except (SimulationError, ValueError, TypeError) as error:
                     warnings.append(f"model '{name}': visual '{visual.name}': {_first_line(error)}")
         return warnings + self.take_warnings(name)
+
+    def delete_visuals(self, built: BuiltModel) -> None:
+        """Delete a model's visuals."""
+        for body in built.bodies.values():
+            for geom in [each for each in body.geoms if each.group == GROUP_VISUAL]:
+                self.spec.delete(geom)
 
     def take_warnings(self, name: str) -> list[str]:
         """Return the lines about shapes of a model that was just added."""

@@ -18,7 +18,6 @@ from minirospy.workspace.folders import ros_home
 __all__ = ["Decomposition"]
 
 FOLDER = "convex_parts"  # in ROS_HOME
-MAX_PARTS = 32  # of one mesh; each costs time in each step
 CONCAVITY = 0.05  # of the mesh's size; coacd's default
 MAX_TRIANGLES = 20_000  # a finer mesh would take minutes
 
@@ -30,9 +29,9 @@ class Decomposition:
         self._warnings = warnings
         self._is_told = False
 
-    def split(self, mesh: Mesh, name: str) -> list[Mesh] | None:
-        """Return the convex parts of a connected mesh, or None if its hull must do."""
-        data = mesh.vertices.tobytes() + mesh.triangles.tobytes() + f"{MAX_PARTS} {CONCAVITY}".encode()
+    def split(self, mesh: Mesh, name: str, most: int) -> list[Mesh] | None:
+        """Return at most so many convex parts of a connected mesh, or None if its hull must do."""
+        data = mesh.vertices.tobytes() + mesh.triangles.tobytes() + f"{most} {CONCAVITY}".encode()
         path = Path(ros_home(), FOLDER, f"{hashlib.sha256(data).hexdigest()[:32]}.npz")
         try:
             with np.load(path) as kept:
@@ -40,7 +39,7 @@ class Decomposition:
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             pass
         started = time.monotonic()
-        parts = self._compute(mesh, name)
+        parts = self._compute(mesh, name, most)
         if parts:
             self._warnings.append(
                 f"the mesh {name} was split into {len(parts)} convex parts in {time.monotonic() - started:.0f} s"
@@ -48,7 +47,7 @@ class Decomposition:
             _keep(path, parts)
         return parts or None
 
-    def _compute(self, mesh: Mesh, name: str) -> list[Mesh]:
+    def _compute(self, mesh: Mesh, name: str, most: int) -> list[Mesh]:
         try:
             coacd = importlib.import_module("coacd")
         except ImportError:
@@ -61,7 +60,7 @@ class Decomposition:
                     found = coacd.run_coacd(
                         coacd.Mesh(mesh.vertices, mesh.triangles),
                         threshold=CONCAVITY,
-                        max_convex_hull=MAX_PARTS,
+                        max_convex_hull=most,
                     )
                     return [
                         Mesh(np.asarray(points, np.float64), np.zeros((0, 3), np.int32))

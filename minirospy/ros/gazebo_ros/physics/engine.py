@@ -223,7 +223,8 @@ class Engine:
         velocity, limit = self.data.qvel[dofs], self.motor_limit[dofs]
         lost = abs(damping * velocity)
         is_strong = lost < limit
-        brakes = abs(velocity) > abs(self._bias[dofs]) / self._rate
+        target = self._bias[dofs] / self._rate
+        brakes = velocity * (target - velocity) < 0
         self.motor_force[dofs] += np.where(self.model.dof_damping[dofs] > 0, 0.0, damping * velocity)
         self.model.dof_damping[dofs] = np.where(is_strong, 0.0, damping)
         left = limit + np.where(brakes, lost, -lost)

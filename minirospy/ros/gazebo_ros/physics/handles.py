@@ -242,7 +242,12 @@ class SimJoint:
             self.engine.is_stale = True
 
     def set_axis(self, axis: Axis) -> None:
-        """Change limits, damping, friction and spring, but not the direction; the world is compiled again."""
+        """Change limits, damping, friction and spring, but not the direction; the world is compiled again.
+
+        Raise SimulationError if damping or friction is not finite.
+        """
+        if not (math.isfinite(axis.damping) and math.isfinite(axis.friction)):
+            raise SimulationError(f"{self.model.name}::{self.name}: the damping or friction is not finite")
         self.axis = axis._replace(xyz=self.axis.xyz, initial_position=self.axis.initial_position)
         if self.dof >= 0:
             self.model.set_axis(self.scoped, self.record.kind, self.axis)

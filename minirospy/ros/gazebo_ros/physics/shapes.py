@@ -62,6 +62,8 @@ SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
 MAX_FRICTION = 2.0
 PART = "\t"  # separates the name of a collision from the number of its geom
 MIN_SIZE = 1e-6  # m; MuJoCo refuses sizes of zero
+MIN_VERTICES = 4  # of a mesh; MuJoCo refuses one with fewer
+MIN_AREA = 1e-14  # m^2; MuJoCo refuses a mesh with less
 WALL_THICKNESS = 0.01  # m; a robot at 10 m/s does not pass it within a step of 1 ms
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
@@ -201,7 +203,9 @@ class Shapes:
         name = geometry.path if isinstance(geometry, MeshShape) else "of a polyline"
         try:
             parts = collision_parts(
-                mesh, is_static=is_static, split=lambda part: self._decomposition.split(part, name)
+                mesh,
+                is_static=is_static,
+                split=lambda part, most: self._decomposition.split(part, name, most),
             )
         except MeshError as error:
             raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
@@ -226,7 +230,10 @@ class Shapes:
                 self._assets[key] = self._pieces(geometry, is_static=True)
             else:
                 self._assets[key] = [
-                    self._section(section) for mesh in _meshes(geometry) for section in mesh.sections()
+                    self._section(section)
+                    for mesh in _meshes(geometry)
+                    for section in mesh.sections()
+                    if _area(section) > MIN_AREA
                 ]
         return self._assets[key]
 
@@ -256,6 +263,9 @@ class Shapes:
                 # MuJoCo counts from the picture's upper left corner.
                 mesh.usertexcoord = (texcoords * (1, -1) + (0, 1)).astype(np.float32).ravel()
                 mesh.userfacetexcoord = np.arange(faces.size, dtype=np.int32)
+        lacking = MIN_VERTICES - len(vertices)
+        if lacking > 0:
+            vertices = np.concatenate([vertices, vertices[-1:].repeat(lacking, axis=0)])
         mesh.uservert = vertices.astype(np.float32).ravel()
         # An open or flat mesh has no volume; the bodies' inertias are given, so this only chooses the mesh's own frame.
         mesh.inertia = self._mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
@@ -317,6 +327,13 @@ def _wall(shape: Plane) -> _Piece:
     turn = _turn_to(shape.normal)
     behind = rotate(turn, (0.0, 0.0, -WALL_THICKNESS / 2))
     return _Piece("BOX", (x, y, WALL_THICKNESS / 2), Pose(behind, turn))
+
+
+def _area(mesh: Mesh) -> float:
+    # MuJoCo has the vertices in single precision.
+    corners = mesh.vertices.astype(np.float32)[mesh.triangles].astype(np.float64)
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(np.linalg.norm(crosses, axis=1).sum()) / 2
 
 
 def _meshes(geometry: Geometry) -> list[Mesh]:

@@ -232,7 +232,12 @@ class Simulation:
             raise SimulationError(f"model '{name}' has no links")
         if not all(map(math.isfinite, (*pose.position, *pose.orientation))):
             raise SimulationError(f"model '{name}': the pose is not finite")
-        built = self._builder.add(model, name, pose)
+        last = self._builder.shapes.last
+        try:
+            built = self._builder.add(model, name, pose)
+        except Exception:
+            self._builder.shapes.delete_after(last)
+            raise
         self.warnings += self._builder.take_warnings(name)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
@@ -358,9 +363,32 @@ class Simulation:
         if self._builder.has_visuals:
             return
         self._builder.add_scene(self.world)
+        last = self._builder.shapes.last
         for model in self._models.values():
             self.warnings += self._builder.add_visuals(model.built, model.record, model.name)
-        self.recompile()
+        try:
+            self.engine.recompile()
+        except ValueError:
+            self._delete_visuals(self._models.values(), last)
+            self._add_visuals_one_by_one()
+        self._bind()
+
+    def _add_visuals_one_by_one(self) -> None:
+        """Add the visuals of each model that MuJoCo accepts; the others are in ``warnings``."""
+        for model in self._models.values():
+            last = self._builder.shapes.last
+            self._builder.add_visuals(model.built, model.record, model.name)  # its warnings are known
+            try:
+                self.engine.recompile()
+            except ValueError as error:
+                self.warnings.append(f"model '{model.name}' is not shown: {_one_line(error)}")
+                self._delete_visuals([model], last)
+        self.engine.recompile()
+
+    def _delete_visuals(self, models: Iterable[SimModel], last: int) -> None:
+        for model in models:
+            self._builder.delete_visuals(model.built)
+        self._builder.shapes.delete_after(last)
 
     def body_poses(self) -> NDArray[np.float64]:
         """Return (n, 7) positions and orientations (x, y, z, w) in the world, by the ids of links."""

@@ -43,7 +43,11 @@ class Textures:
             from PIL import Image
         except ImportError:
             raise ValueError("textures need the library Pillow: minirospy[images]") from None
-        with Image.open(path) as picture:
+        try:
+            opened = Image.open(path)
+        except Image.DecompressionBombError as error:
+            raise ValueError(str(error)) from None
+        with opened as picture:
             width, height = picture.size
             if width * height > MAX_AREA:
                 raise ValueError(f"it has {width} x {height} pixels")
