@@ -708,6 +708,47 @@ def test_a_goal_without_a_server_ends(bridge: Running, monkeypatch: pytest.Monke
     assert "action server /fibonacci" in found["values"]
 
 
+def test_a_goal_of_another_type_than_the_servers_blocks_nobody(bridge: Running) -> None:
+    server = fibonacci_server(bridge)
+    bridge.run(bridge.bridge.rosbridge.shared.graph.look())
+    wrong, right = bridge.rosbridge(), bridge.rosbridge()
+    wrong.send(**{**FIBONACCI, "action_type": "actionlib/TestAction"}, args={"goal": 1})
+    assert wrong.next("action_result")["values"] == (
+        "Tried to register topic /fibonacci/result with type actionlib/TestActionResult but it is already established "
+        "with type actionlib_tutorials/FibonacciActionResult"
+    )
+    right.send(**FIBONACCI, args={"order": 2})
+    assert right.next("action_result")["values"] == {"sequence": [0, 1]}
+    bridge.run(server.close())
+
+
+def test_a_goal_of_another_type_than_a_waiting_goal_is_refused(bridge: Running) -> None:
+    graph = bridge.bridge.rosbridge.shared.graph
+    bridge.rosbridge().send(**FIBONACCI, args={"order": 1})
+
+    async def is_published() -> bool:
+        await graph.look()
+        return "/fibonacci/goal" in graph.snapshot.publishers
+
+    bridge.run(until(is_published))
+    client = bridge.rosbridge()
+    client.send(**{**FIBONACCI, "action_type": "actionlib/TestAction"}, args={"goal": 1})
+    assert client.next("action_result")["values"] == (
+        "/bridge publishes /fibonacci/goal as actionlib_tutorials/FibonacciActionGoal already"
+    )
+
+
+def test_an_action_has_no_type_after_a_goal_without_a_server(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_actions, "SERVER_SECONDS", 0.2)
+    wrong, right = bridge.rosbridge(), bridge.rosbridge()
+    wrong.send(**{**FIBONACCI, "action_type": "actionlib/TestAction"}, args={"goal": 1})
+    assert "timeout exceeded" in wrong.next("action_result")["values"]
+    right.send(**FIBONACCI, args={"order": 1})
+    assert "timeout exceeded" in right.next("action_result")["values"]
+
+
 def test_a_reader_sends_no_goals(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(access=Access(default_is_read=True))
     client = bridge.rosbridge()

@@ -5,6 +5,7 @@ Source: ROSBRIDGE_PROTOCOL.md in https://github.com/RobotWebTools/rosbridge_suit
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,10 @@ from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError, ROSInterruptException
 from minirospy.core.graph.goals import GoalState
 from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.tcpros import ANY
 from minirospy.web.json_text import dump_json_in_pieces
 from minirospy.web.rosbridge import conversion, protocol
-from minirospy.web.rosbridge.operation import REFUSALS, check_name
+from minirospy.web.rosbridge.operation import REFUSALS, check_name, type_conflict
 from minirospy.web.rosbridge.types import UnknownTypeError, message_class
 
 if TYPE_CHECKING:
@@ -52,21 +54,29 @@ class _Running:
             self.goal.cancel()
 
 
+@dataclass
+class _Action:
+    """An action's client, and the number of its goals that have no result yet."""
+
+    client: ActionClient[Any, Message, Message]
+    goals: int = 0
+
+
 class ClientActions:
     """The actions that one client uses. Its methods are called in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self._session = session
-        self._clients: dict[tuple[str, Any], ActionClient[Any, Message, Message]] = {}  # by (action, class)
+        self._actions: dict[tuple[str, Any], _Action] = {}  # by (name, class)
         self._goals: dict[object, _Running] = {}  # by the id of the operation
         self._count = 0  # number of running goals, also of those without an id
         self._reporter = ErrorReporter(_log, "a client's goal")
 
     def close(self) -> None:
         """Leave the topics of the actions. Goals that are running continue."""
-        for client in self._clients.values():
-            self._session.graph.spawn(client.close())
-        self._clients.clear()
+        for action in self._actions.values():
+            self._session.graph.spawn(action.client.close())
+        self._actions.clear()
         self._goals.clear()
 
     def send_goal(self, event: protocol.SendActionGoal) -> None:
@@ -116,34 +126,61 @@ class ClientActions:
         if not self._session.graph.filters.publishable(f"{resolved}/goal"):
             raise BridgeError(f"topic [{resolved}/goal] may not be published by clients")
         class_: Any = _action_class(event.type)
-        client = self._client(resolved, class_)
         message = class_().action_goal.goal
         now = self._session.graph.node.now
         conversion.fill(message, conversion.request_values(message, event.arguments), now)
 
-        goal = running.goal = client.send(message)
-        if running.is_cancelled:
-            goal.cancel()
+        action = self._action(resolved, class_)
+        action.goals += 1
         try:
-            await client.wait_for_server(SERVER_SECONDS)
+            goal = running.goal = action.client.send(message)
+            if running.is_cancelled:
+                goal.cancel()
+            await action.client.wait_for_server(SERVER_SECONDS)
             async for feedback in goal:
                 if event.feedback:
                     await self._feedback(event, feedback)
             await self._ended(event, goal)
         except TimeoutError:
             goal.cancel()  # it is not sent if a server starts later
+            if action.goals == 1:
+                await self._leave(resolved, class_)
             raise
+        finally:
+            action.goals -= 1
 
-    def _client(self, action: str, class_: Any) -> ActionClient[Any, Message, Message]:
-        key = (action, class_)
-        if key not in self._clients:
+    def _action(self, name: str, class_: Any) -> _Action:
+        key = (name, class_)
+        if key not in self._actions:
             # This imports the messages of actionlib, which most clients do not need.
             from minirospy.ros.actionlib.actionlib.aio import ActionClient
 
-            if len(self._clients) >= _MAX_ACTIONS:
+            if len(self._actions) >= _MAX_ACTIONS:
                 raise BridgeError(f"a client may use {_MAX_ACTIONS} actions")
-            self._clients[key] = ActionClient(self._session.graph.node, action, class_)
-        return self._clients[key]
+            self._check_type(name, class_)
+            try:
+                client = ActionClient(self._session.graph.node, name, class_)
+            except ValueError as error:
+                # Another goal uses the action with another type.
+                raise BridgeError(str(error)) from error
+            self._actions[key] = _Action(client)
+        return self._actions[key]
+
+    def _check_type(self, name: str, class_: Any) -> None:
+        """Raise BridgeError if the action's server has another type.
+
+        The type of the goals' topic may be that of an earlier client, but only the server publishes results.
+        """
+        topic, wanted = f"{name}/result", class_().action_result._type
+        snapshot = self._session.graph.snapshot
+        known = snapshot.types.get(topic, ANY) if topic in snapshot.publishers else ANY
+        if known not in (ANY, wanted):
+            raise type_conflict(topic, wanted, known)
+
+    async def _leave(self, name: str, class_: Any) -> None:
+        """Leave an action's topics, so that they can have another type."""
+        if action := self._actions.pop((name, class_), None):
+            await asyncio.wait([self._session.graph.spawn(action.client.close())])
 
     async def _ended(self, event: protocol.SendActionGoal, goal: ClientGoal[Message, Message]) -> None:
         from minirospy.ros.actionlib.actionlib.aio import GoalError
