@@ -48,7 +48,7 @@ class Assets:
             raise BridgeError(f"{uri}: {error.strerror}") from None
         except ValueError:
             # A file name cannot contain this character, for example a lone surrogate.
-            raise BridgeError(f"Asset URI not allowed: {ascii(uri[:200])}") from None
+            raise BridgeError(f"Asset URI not allowed: {uri[:200]!a}") from None
         size = os.fstat(file.fileno()).st_size
         if size > self._max_bytes:
             file.close()
