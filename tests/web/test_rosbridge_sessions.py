@@ -749,6 +749,18 @@ def test_an_action_has_no_type_after_a_goal_without_a_server(
     assert "timeout exceeded" in right.next("action_result")["values"]
 
 
+def test_a_goal_cancelled_before_a_server_is_there_ends_at_once(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_actions, "SERVER_SECONDS", 3600.0)
+    client = bridge.rosbridge()
+    client.send(**FIBONACCI, id="a", args={"order": 1})
+    client.send(op="cancel_action_goal", action="/fibonacci", id="a")
+    found = client.next("action_result")
+    assert (found["result"], found["status"]) == (False, 5)
+    assert found["values"] == "the goal was recalled: cancelled before a server was there"
+
+
 def test_a_reader_sends_no_goals(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(access=Access(default_is_read=True))
     client = bridge.rosbridge()

@@ -136,16 +136,19 @@ class ClientActions:
             goal = running.goal = action.client.send(message)
             if running.is_cancelled:
                 goal.cancel()
-            await action.client.wait_for_server(SERVER_SECONDS)
-            async for feedback in goal:
-                if event.feedback:
-                    await self._feedback(event, feedback)
+            server = asyncio.ensure_future(_cancel_without_server(action.client, goal))
+            try:
+                async for feedback in goal:
+                    if event.feedback:
+                        await self._feedback(event, feedback)
+                error = server.result() if server.done() else None
+                if (error or not server.done()) and action.goals == 1:
+                    await self._leave(resolved, class_)
+            finally:
+                server.cancel()
+            if error:
+                raise error
             await self._ended(event, goal)
-        except TimeoutError:
-            goal.cancel()  # it is not sent if a server starts later
-            if action.goals == 1:
-                await self._leave(resolved, class_)
-            raise
         finally:
             action.goals -= 1
 
@@ -227,6 +230,18 @@ class ClientActions:
             lambda: protocol.encode_messages(fields, event.compression, size, dump_json_in_pieces)
         )
         self._session.send_encoded(messages)
+
+
+async def _cancel_without_server(
+    client: ActionClient[Any, Message, Message], goal: ClientGoal[Message, Message]
+) -> Exception | None:
+    """Wait for a server. If there is none, cancel the goal, so that it is not sent later, and return the error."""
+    try:
+        await client.wait_for_server(SERVER_SECONDS)
+    except Exception as error:  # noqa: BLE001 - the caller raises it once the goal has ended
+        goal.cancel()
+        return error
+    return None
 
 
 def _action_class(type_: str) -> type[Message]:
