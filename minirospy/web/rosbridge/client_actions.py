@@ -66,6 +66,8 @@ class ClientActions:
     """The actions that one client uses. Its methods are called in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
+        self.goals_size = 0
+        """Bytes of memory used by the running goals."""
         self._session = session
         self._actions: dict[tuple[str, Any], _Action] = {}  # by (name, class)
         self._goals: dict[object, _Running] = {}  # by the id of the operation
@@ -84,17 +86,24 @@ class ClientActions:
             return
         if self._count >= _MAX_GOALS:
             raise BridgeError(f"{_MAX_GOALS} goals are running: wait for a result")
+        size = self._session.operation_size
         self._count += 1
+        self.goals_size += size
         running = _Running()
         if event.id is not None:
             self._goals[event.id] = running
 
         def ended(_: object) -> None:
             self._count -= 1
+            self.goals_size -= size
+            self._session.count()
             if self._goals.get(event.id) is running:
                 del self._goals[event.id]
 
-        self._session.spawn(self._send(event, running)).add_done_callback(ended)
+        work = self._send(event, running, is_large=self._session.is_large)
+        self._session.spawn(work).add_done_callback(ended)
+        # Report the memory last: if the limit is exceeded, this disconnects the client and cancels the goal's task.
+        self._session.count()
 
     def cancel_goal(self, event: protocol.CancelActionGoal) -> None:
         running = self._goals.get(event.id)
@@ -107,9 +116,9 @@ class ClientActions:
             self._session.is_allowed("topics", f"{action}/{each}", what) for each in ("goal", "result")
         )
 
-    async def _send(self, event: protocol.SendActionGoal, running: _Running) -> None:
+    async def _send(self, event: protocol.SendActionGoal, running: _Running, *, is_large: bool) -> None:
         try:
-            await self._run(event, running)
+            await self._run(event, running, is_large=is_large)
         except (*REFUSALS, ROSInterruptException, TimeoutError) as error:
             self._session.shared.log.warning(
                 "[Client %s] send_action_goal %s: %s", self._session.client.name, event.action, error
@@ -119,7 +128,7 @@ class ClientActions:
             self._reporter.report(error)
             await self._result(event, "the bridge failed on this goal", _UNKNOWN, is_result=False)
 
-    async def _run(self, event: protocol.SendActionGoal, running: _Running) -> None:
+    async def _run(self, event: protocol.SendActionGoal, running: _Running, *, is_large: bool) -> None:
         self._session.require_write("sending goals")
         check_name("action", event.action)
         resolved = self._session.graph.node.resolve(event.action)
@@ -127,8 +136,15 @@ class ClientActions:
             raise BridgeError(f"topic [{resolved}/goal] may not be published by clients")
         class_: Any = _action_class(event.type)
         message = class_().action_goal.goal
-        now = self._session.graph.node.now
-        conversion.fill(message, conversion.request_values(message, event.arguments), now)
+
+        def fill() -> None:
+            now = self._session.graph.node.now
+            conversion.fill(message, conversion.request_values(message, event.arguments), now)
+
+        if is_large:
+            await self._session.shared.in_thread(fill)
+        else:
+            fill()
 
         action = self._action(resolved, class_)
         action.goals += 1
@@ -140,7 +156,7 @@ class ClientActions:
             try:
                 async for feedback in goal:
                     if event.feedback:
-                        await self._feedback(event, feedback)
+                        await self._feedback(event, goal.id, feedback)
                 error = server.result() if server.done() else None
                 if (error or not server.done()) and action.goals == 1:
                     await self._leave(resolved, class_)
@@ -201,13 +217,20 @@ class ClientActions:
         else:
             await self._result(event, conversion.values(result), status, is_result=True)
 
-    async def _feedback(self, event: protocol.SendActionGoal, feedback: Message) -> None:
+    async def _feedback(self, event: protocol.SendActionGoal, goal_id: str, feedback: Message) -> None:
         fields: dict[str, object] = {
             "op": "action_feedback",
             "action": event.action,
             "values": conversion.values(feedback),
         }
-        await self._encode(event, fields)
+        messages = await self._encoded(event, fields)
+        # A slow client misses feedback, but no result.
+        client, key = self._session.client, ("feedback", goal_id)
+        if texts := [each for each in messages if isinstance(each, str)]:
+            client.send_texts(key, texts, newest_only=True)
+        for each in messages:
+            if isinstance(each, bytes):
+                client.send_message(key, b"", each, newest_only=True)
 
     async def _result(
         self, event: protocol.SendActionGoal, values: object, status: int, *, is_result: bool
@@ -219,17 +242,16 @@ class ClientActions:
             "status": status,
             "result": is_result,
         }
-        await self._encode(event, fields)
+        self._session.send_encoded(await self._encoded(event, fields))
 
-    async def _encode(self, event: protocol.SendActionGoal, fields: dict[str, object]) -> None:
+    async def _encoded(self, event: protocol.SendActionGoal, fields: dict[str, object]) -> list[str | bytes]:
         if event.id is not None:
             fields["id"] = event.id
         shared = self._session.shared
         size = event.fragment_size or shared.options.fragment_size
-        messages = await shared.encode(
+        return await shared.encode(
             lambda: protocol.encode_messages(fields, event.compression, size, dump_json_in_pieces)
         )
-        self._session.send_encoded(messages)
 
 
 async def _cancel_without_server(
