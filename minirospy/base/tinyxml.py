@@ -74,7 +74,7 @@ def decode_xml(data: bytes) -> tuple[str, str]:
     for encoding in ("UTF-8", *([declared[1].decode("ascii")] if declared else [])):
         try:
             return data.decode(encoding), encoding
-        except (LookupError, UnicodeDecodeError):
+        except (LookupError, UnicodeError):  # UnicodeError is raised by the encoding "undefined"
             continue
     return data.decode(_FALLBACK), _FALLBACK
 

@@ -100,7 +100,7 @@ def _parser(name: str, what: str) -> Parser:
         action="append",
         default=[],
         metavar="NAME",
-        help="a name by which browsers reach the page, as that of a proxy in front of it",
+        help="a name by which browsers reach the page, as that of a proxy in front of it; clients then need the token",
         completer="nothing",
     )
     parser.add_argument(
@@ -342,12 +342,14 @@ def _serve(
     if not is_loopback(serving.bound) and not listen:
         raise Misuse(f"--address {serving.address} lets other machines connect: add --listen")
     tokens = _tokens(Environment.read().home, must_be_kept=listen, must_be_new=embeds)
+    # A proxy makes the clients of other machines look like clients of this one.
+    requires_token = listen or bool(serving.host_name)
     access = Access(
         hosts=(*host_names(), *serving.host_name),
         origins=tuple(serving.origin),
-        read_token=tokens.read if listen or read_only else "",
+        read_token=tokens.read if requires_token or read_only else "",
         write_token="" if read_only else tokens.write,
-        requires_token=listen,
+        requires_token=requires_token,
         default_is_read=read_only,
     )
 

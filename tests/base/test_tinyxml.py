@@ -22,6 +22,12 @@ ACCEPTED: dict[str, tuple[str | bytes, str, int, str]] = {
     "two roots": ('<r n="x"/><r n="y"/>', "x", 1, "after the end of <r>"),
     "declaration without version": ('<?xml?><r n="x"/>', "x", 1, 'begin with <?xml version="1.0"'),
     "unknown encoding": (b'<?xml version="1.0" encoding="foo"?><r n="x"/>', "x", 1, "foo"),
+    "encoding of no characters": (
+        b'<?xml version="1.0" encoding="undefined"?><r n="\xe9"/>',
+        "\xe9",
+        1,
+        "read as Latin-1",
+    ),
     "value without quotes": ("<r n=x/>", "x", 1, "not in quotes"),
     "less-than sign in a value": ('<r n="a<b"/>', "a<b", 1, "write &lt;"),
     "no space between attributes": ('<r n="x"m="y"/>', "x", 1, "space is missing"),

@@ -351,13 +351,27 @@ def test_assets_are_read_from_known_packages_alone(
             f"{package.as_uri()}/%2e%2e/%2e%2e/secret.stl",
             "file://arm/meshes/a.stl",
             "file://",
+            "file:///a%00b/c.stl",
+            "file:///a\ud800/c.stl",
+            f"{package.as_uri()}/a\ud800.stl",
+            "package://a%00/b.stl",
             "https://example.org/a.stl",
+            "https://example.org/\ud800.stl",
         )
     ):
         client.send(op="fetchAsset", uri=uri, requestId=number)
         frame = client.next_binary(4)
         assert struct.unpack_from("<BIB", frame) == (4, number, 1), uri
         assert b"secret\n" not in frame
+
+
+@pytest.mark.parametrize("uri", ["file:///%5C%5Chost%5Cshare%5Cd%5Cm.stl", "file:///a%00b/c.stl"])
+def test_asset_is_refused_before_its_folder_is_read(uri: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[Path] = []
+    monkeypatch.setattr("minirospy.web.foxglove.assets.package_name", read.append)
+    with pytest.raises(BridgeError, match="not allowed"):
+        Assets(Packages()).open(uri)
+    assert read == []
 
 
 def test_asset_larger_than_the_queue_limit_is_sent(

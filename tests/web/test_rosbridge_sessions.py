@@ -33,8 +33,9 @@ from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.ros.actionlib.actionlib.aio import ActionServer, GoalError
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
-from minirospy.web.rosbridge import client_actions, png, protocol, shared
+from minirospy.web.rosbridge import client_actions, conversion, png, protocol, shared
 from minirospy.web.rosbridge.shared import RosbridgeOptions
+from minirospy.web.server.client import WebClient
 from tests.waiting import until, wait_until
 
 if TYPE_CHECKING:
@@ -706,6 +707,115 @@ def test_a_goal_without_a_server_ends(bridge: Running, monkeypatch: pytest.Monke
     found = client.next("action_result")
     assert (found["result"], found["status"], found["id"]) == (False, 0, "a")
     assert "action server /fibonacci" in found["values"]
+
+
+def test_a_goal_of_another_type_than_the_servers_blocks_nobody(bridge: Running) -> None:
+    server = fibonacci_server(bridge)
+    bridge.run(bridge.bridge.rosbridge.shared.graph.look())
+    wrong, right = bridge.rosbridge(), bridge.rosbridge()
+    wrong.send(**{**FIBONACCI, "action_type": "actionlib/TestAction"}, args={"goal": 1})
+    assert wrong.next("action_result")["values"] == (
+        "Tried to register topic /fibonacci/result with type actionlib/TestActionResult but it is already established "
+        "with type actionlib_tutorials/FibonacciActionResult"
+    )
+    right.send(**FIBONACCI, args={"order": 2})
+    assert right.next("action_result")["values"] == {"sequence": [0, 1]}
+    bridge.run(server.close())
+
+
+def test_a_goal_of_another_type_than_a_waiting_goal_is_refused(bridge: Running) -> None:
+    graph = bridge.bridge.rosbridge.shared.graph
+    bridge.rosbridge().send(**FIBONACCI, args={"order": 1})
+
+    async def is_published() -> bool:
+        await graph.look()
+        return "/fibonacci/goal" in graph.snapshot.publishers
+
+    bridge.run(until(is_published))
+    client = bridge.rosbridge()
+    client.send(**{**FIBONACCI, "action_type": "actionlib/TestAction"}, args={"goal": 1})
+    assert client.next("action_result")["values"] == (
+        "/bridge publishes /fibonacci/goal as actionlib_tutorials/FibonacciActionGoal already"
+    )
+
+
+def test_an_action_has_no_type_after_a_goal_without_a_server(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_actions, "SERVER_SECONDS", 0.2)
+    wrong, right = bridge.rosbridge(), bridge.rosbridge()
+    wrong.send(**{**FIBONACCI, "action_type": "actionlib/TestAction"}, args={"goal": 1})
+    assert "timeout exceeded" in wrong.next("action_result")["values"]
+    right.send(**FIBONACCI, args={"order": 1})
+    assert "timeout exceeded" in right.next("action_result")["values"]
+
+
+def test_a_goal_cancelled_before_a_server_is_there_ends_at_once(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_actions, "SERVER_SECONDS", 3600.0)
+    client = bridge.rosbridge()
+    client.send(**FIBONACCI, id="a", args={"order": 1})
+    client.send(op="cancel_action_goal", action="/fibonacci", id="a")
+    found = client.next("action_result")
+    assert (found["result"], found["status"]) == (False, 5)
+    assert found["values"] == "the goal was recalled: cancelled before a server was there"
+
+
+TRANSFORMS = {
+    "op": "send_action_goal",
+    "action": "/transforms",
+    "action_type": "tf2_web_republisher/TFSubscriptionAction",
+}
+
+
+def test_memory_of_a_goal_is_counted_until_it_ends(bridge: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    held: list[int] = []
+    monkeypatch.setattr(WebClient, "holds", lambda _, count: held.append(count))
+    client = bridge.rosbridge()
+    client.send(**TRANSFORMS, id="a", args={"target_frame": "a" * 10_000})
+    client.synchronize()
+    assert max(held, default=0) > 10_000
+    client.send(op="cancel_action_goal", action="/transforms", id="a")
+    client.next("action_result")
+    bridge.run(until(lambda: held[-1] == 0))
+
+
+def test_large_goal_is_converted_in_a_thread(bridge: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client_actions, "SERVER_SECONDS", 0.2)
+    threads: list[str] = []
+    fill = conversion.fill
+
+    def noting(*words: Any) -> None:
+        threads.append(threading.current_thread().name)
+        fill(*words)
+
+    monkeypatch.setattr(conversion, "fill", noting)
+    client = bridge.rosbridge()
+    client.send(**TRANSFORMS, args={"source_frames": [f"frame{number}" for number in range(30_000)]})
+    client.next("action_result")
+    assert len(threads) == 1
+    assert threads[0].startswith("rosbridge-large")
+
+
+@pytest.mark.parametrize("compression", ["none", "cbor"])
+def test_slow_client_gets_the_newest_feedback_alone(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str
+) -> None:
+    streamed: list[tuple[object, bool]] = []
+
+    def noting(_: object, key: object, *_data: object, newest_only: bool = False) -> None:
+        streamed.append((key, newest_only))
+
+    for name in ("send_texts", "send_message"):
+        monkeypatch.setattr(WebClient, name, noting)
+    server = fibonacci_server(bridge)
+    client = bridge.rosbridge()
+    client.send(**FIBONACCI, args={"order": 2}, feedback=True, compression=compression)
+    client.next("action_result")
+    assert len(streamed) == 1
+    assert streamed[0][1]
+    bridge.run(server.close())
 
 
 def test_a_reader_sends_no_goals(run_bridge: Callable[..., Running]) -> None:

@@ -42,11 +42,13 @@ class Assets:
 
     def open(self, uri: str) -> tuple[BinaryIO, int]:
         """Return an open file and its size. Raise BridgeError, with the reason, if the file may not or cannot be read."""
-        path = self._path(uri)
         try:
-            file = path.open("rb")
+            file = self._path(uri).open("rb")
         except OSError as error:
             raise BridgeError(f"{uri}: {error.strerror}") from None
+        except ValueError:
+            # A file name cannot contain this character, for example a lone surrogate.
+            raise BridgeError(f"Asset URI not allowed: {uri[:200]!a}") from None
         size = os.fstat(file.fileno()).st_size
         if size > self._max_bytes:
             file.close()
@@ -81,6 +83,9 @@ class Assets:
         xacro replaces ``$(find pkg)`` by the package's folder, so descriptions contain such URIs.
         """
         text = unquote(uri[len("file://") :])
+        # On Windows, looking up \\host\share would connect to that host.
+        if "\\" in text or "\0" in text:
+            raise BridgeError(f"Asset URI not allowed: {uri[:200]}")
         path = Path(text.lstrip("/") if os.name == "nt" else text)  # file:///C:/folder
         for folder in path.parents if path.is_absolute() and ".." not in path.parts else ():
             name = package_name(folder)

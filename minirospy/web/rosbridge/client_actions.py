@@ -5,6 +5,7 @@ Source: ROSBRIDGE_PROTOCOL.md in https://github.com/RobotWebTools/rosbridge_suit
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,10 @@ from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError, ROSInterruptException
 from minirospy.core.graph.goals import GoalState
 from minirospy.core.idl.protocols import Message
+from minirospy.core.wire.tcpros import ANY
 from minirospy.web.json_text import dump_json_in_pieces
 from minirospy.web.rosbridge import conversion, protocol
-from minirospy.web.rosbridge.operation import REFUSALS, check_name
+from minirospy.web.rosbridge.operation import REFUSALS, check_name, type_conflict
 from minirospy.web.rosbridge.types import UnknownTypeError, message_class
 
 if TYPE_CHECKING:
@@ -52,21 +54,31 @@ class _Running:
             self.goal.cancel()
 
 
+@dataclass
+class _Action:
+    """An action's client, and the number of its goals that have no result yet."""
+
+    client: ActionClient[Any, Message, Message]
+    goals: int = 0
+
+
 class ClientActions:
     """The actions that one client uses. Its methods are called in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
+        self.goals_size = 0
+        """Bytes of memory used by the running goals."""
         self._session = session
-        self._clients: dict[tuple[str, Any], ActionClient[Any, Message, Message]] = {}  # by (action, class)
+        self._actions: dict[tuple[str, Any], _Action] = {}  # by (name, class)
         self._goals: dict[object, _Running] = {}  # by the id of the operation
         self._count = 0  # number of running goals, also of those without an id
         self._reporter = ErrorReporter(_log, "a client's goal")
 
     def close(self) -> None:
         """Leave the topics of the actions. Goals that are running continue."""
-        for client in self._clients.values():
-            self._session.graph.spawn(client.close())
-        self._clients.clear()
+        for action in self._actions.values():
+            self._session.graph.spawn(action.client.close())
+        self._actions.clear()
         self._goals.clear()
 
     def send_goal(self, event: protocol.SendActionGoal) -> None:
@@ -74,17 +86,24 @@ class ClientActions:
             return
         if self._count >= _MAX_GOALS:
             raise BridgeError(f"{_MAX_GOALS} goals are running: wait for a result")
+        size = self._session.operation_size
         self._count += 1
+        self.goals_size += size
         running = _Running()
         if event.id is not None:
             self._goals[event.id] = running
 
         def ended(_: object) -> None:
             self._count -= 1
+            self.goals_size -= size
+            self._session.count()
             if self._goals.get(event.id) is running:
                 del self._goals[event.id]
 
-        self._session.spawn(self._send(event, running)).add_done_callback(ended)
+        work = self._send(event, running, is_large=self._session.is_large)
+        self._session.spawn(work).add_done_callback(ended)
+        # Report the memory last: if the limit is exceeded, this disconnects the client and cancels the goal's task.
+        self._session.count()
 
     def cancel_goal(self, event: protocol.CancelActionGoal) -> None:
         running = self._goals.get(event.id)
@@ -97,9 +116,9 @@ class ClientActions:
             self._session.is_allowed("topics", f"{action}/{each}", what) for each in ("goal", "result")
         )
 
-    async def _send(self, event: protocol.SendActionGoal, running: _Running) -> None:
+    async def _send(self, event: protocol.SendActionGoal, running: _Running, *, is_large: bool) -> None:
         try:
-            await self._run(event, running)
+            await self._run(event, running, is_large=is_large)
         except (*REFUSALS, ROSInterruptException, TimeoutError) as error:
             self._session.shared.log.warning(
                 "[Client %s] send_action_goal %s: %s", self._session.client.name, event.action, error
@@ -109,41 +128,78 @@ class ClientActions:
             self._reporter.report(error)
             await self._result(event, "the bridge failed on this goal", _UNKNOWN, is_result=False)
 
-    async def _run(self, event: protocol.SendActionGoal, running: _Running) -> None:
+    async def _run(self, event: protocol.SendActionGoal, running: _Running, *, is_large: bool) -> None:
         self._session.require_write("sending goals")
         check_name("action", event.action)
         resolved = self._session.graph.node.resolve(event.action)
         if not self._session.graph.filters.publishable(f"{resolved}/goal"):
             raise BridgeError(f"topic [{resolved}/goal] may not be published by clients")
         class_: Any = _action_class(event.type)
-        client = self._client(resolved, class_)
         message = class_().action_goal.goal
-        now = self._session.graph.node.now
-        conversion.fill(message, conversion.request_values(message, event.arguments), now)
 
-        goal = running.goal = client.send(message)
-        if running.is_cancelled:
-            goal.cancel()
+        def fill() -> None:
+            now = self._session.graph.node.now
+            conversion.fill(message, conversion.request_values(message, event.arguments), now)
+
+        if is_large:
+            await self._session.shared.in_thread(fill)
+        else:
+            fill()
+
+        action = self._action(resolved, class_)
+        action.goals += 1
         try:
-            await client.wait_for_server(SERVER_SECONDS)
-            async for feedback in goal:
-                if event.feedback:
-                    await self._feedback(event, feedback)
+            goal = running.goal = action.client.send(message)
+            if running.is_cancelled:
+                goal.cancel()
+            server = asyncio.ensure_future(_cancel_without_server(action.client, goal))
+            try:
+                async for feedback in goal:
+                    if event.feedback:
+                        await self._feedback(event, goal.id, feedback)
+                error = server.result() if server.done() else None
+                if (error or not server.done()) and action.goals == 1:
+                    await self._leave(resolved, class_)
+            finally:
+                server.cancel()
+            if error:
+                raise error
             await self._ended(event, goal)
-        except TimeoutError:
-            goal.cancel()  # it is not sent if a server starts later
-            raise
+        finally:
+            action.goals -= 1
 
-    def _client(self, action: str, class_: Any) -> ActionClient[Any, Message, Message]:
-        key = (action, class_)
-        if key not in self._clients:
+    def _action(self, name: str, class_: Any) -> _Action:
+        key = (name, class_)
+        if key not in self._actions:
             # This imports the messages of actionlib, which most clients do not need.
             from minirospy.ros.actionlib.actionlib.aio import ActionClient
 
-            if len(self._clients) >= _MAX_ACTIONS:
+            if len(self._actions) >= _MAX_ACTIONS:
                 raise BridgeError(f"a client may use {_MAX_ACTIONS} actions")
-            self._clients[key] = ActionClient(self._session.graph.node, action, class_)
-        return self._clients[key]
+            self._check_type(name, class_)
+            try:
+                client = ActionClient(self._session.graph.node, name, class_)
+            except ValueError as error:
+                # Another goal uses the action with another type.
+                raise BridgeError(str(error)) from error
+            self._actions[key] = _Action(client)
+        return self._actions[key]
+
+    def _check_type(self, name: str, class_: Any) -> None:
+        """Raise BridgeError if the action's server has another type.
+
+        The type of the goals' topic may be that of an earlier client, but only the server publishes results.
+        """
+        topic, wanted = f"{name}/result", class_().action_result._type
+        snapshot = self._session.graph.snapshot
+        known = snapshot.types.get(topic, ANY) if topic in snapshot.publishers else ANY
+        if known not in (ANY, wanted):
+            raise type_conflict(topic, wanted, known)
+
+    async def _leave(self, name: str, class_: Any) -> None:
+        """Leave an action's topics, so that they can have another type."""
+        if action := self._actions.pop((name, class_), None):
+            await asyncio.wait([self._session.graph.spawn(action.client.close())])
 
     async def _ended(self, event: protocol.SendActionGoal, goal: ClientGoal[Message, Message]) -> None:
         from minirospy.ros.actionlib.actionlib.aio import GoalError
@@ -161,13 +217,20 @@ class ClientActions:
         else:
             await self._result(event, conversion.values(result), status, is_result=True)
 
-    async def _feedback(self, event: protocol.SendActionGoal, feedback: Message) -> None:
+    async def _feedback(self, event: protocol.SendActionGoal, goal_id: str, feedback: Message) -> None:
         fields: dict[str, object] = {
             "op": "action_feedback",
             "action": event.action,
             "values": conversion.values(feedback),
         }
-        await self._encode(event, fields)
+        messages = await self._encoded(event, fields)
+        # A slow client misses feedback, but no result.
+        client, key = self._session.client, ("feedback", goal_id)
+        if texts := [each for each in messages if isinstance(each, str)]:
+            client.send_texts(key, texts, newest_only=True)
+        for each in messages:
+            if isinstance(each, bytes):
+                client.send_message(key, b"", each, newest_only=True)
 
     async def _result(
         self, event: protocol.SendActionGoal, values: object, status: int, *, is_result: bool
@@ -179,17 +242,28 @@ class ClientActions:
             "status": status,
             "result": is_result,
         }
-        await self._encode(event, fields)
+        self._session.send_encoded(await self._encoded(event, fields))
 
-    async def _encode(self, event: protocol.SendActionGoal, fields: dict[str, object]) -> None:
+    async def _encoded(self, event: protocol.SendActionGoal, fields: dict[str, object]) -> list[str | bytes]:
         if event.id is not None:
             fields["id"] = event.id
         shared = self._session.shared
         size = event.fragment_size or shared.options.fragment_size
-        messages = await shared.encode(
+        return await shared.encode(
             lambda: protocol.encode_messages(fields, event.compression, size, dump_json_in_pieces)
         )
-        self._session.send_encoded(messages)
+
+
+async def _cancel_without_server(
+    client: ActionClient[Any, Message, Message], goal: ClientGoal[Message, Message]
+) -> Exception | None:
+    """Wait for a server. If there is none, cancel the goal, so that it is not sent later, and return the error."""
+    try:
+        await client.wait_for_server(SERVER_SECONDS)
+    except Exception as error:  # noqa: BLE001 - the caller raises it once the goal has ended
+        goal.cancel()
+        return error
+    return None
 
 
 def _action_class(type_: str) -> type[Message]:

@@ -157,6 +157,7 @@ class RosbridgeSession:
             + self._fragments.size
             + self.budget.taken
             + self._services.calls_size
+            + self._actions.goals_size
             + self._publications.latched_size
         )
 

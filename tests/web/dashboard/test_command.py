@@ -128,6 +128,28 @@ def test_host_name_of_a_proxy_is_accepted(started: list[subprocess.Popen[str]]) 
     assert statuses == [200, 403]
 
 
+def test_clients_behind_a_proxy_need_the_token(started: list[subprocess.Popen[str]]) -> None:
+    link = link_of(
+        started,
+        *("-m", "minirospy", "dashboard", "--no-browser", "--port", "0", "--host-name", "robots.example"),
+    )
+    handshake = {
+        "Connection": "Upgrade",
+        "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+        "Sec-WebSocket-Protocol": "foxglove.sdk.v1",
+    }
+    statuses = []
+    for host in ("robots.example", "127.0.0.1"):
+        for token in ({}, {"Authorization": f"Bearer {link.partition('token=')[2]}"}):
+            connection = HTTPConnection("127.0.0.1", urlsplit(link).port, timeout=60)
+            connection.request("GET", "/", headers={"Host": host, **handshake, **token})
+            statuses.append(connection.getresponse().status)
+            connection.close()
+    assert statuses == [401, 101, 401, 101]
+
+
 @pytest.mark.parametrize(
     ("run", "words", "text"),
     [
