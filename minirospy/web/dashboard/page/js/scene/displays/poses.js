@@ -147,14 +147,15 @@ export class Odometry extends LastMessage {
     if (!isFinitePose(pose)) throw new Error(t("Message contained invalid floating point values (nans or infs)"));
     const now = fromMessage(pose);
     const trail = Math.min(MAX_KEPT, this.number("Trail"));
+    const most = Math.min(MAX_KEPT, this.number("Keep", 100) || MAX_KEPT);
     let isNew = true;
     if (this.last) {
       const moved = Math.hypot(...now.p.map((value, index) => value - this.last.p[index]));
       const turned =
         2 * Math.acos(Math.min(1, Math.abs(now.q.reduce((sum, value, index) => sum + value * this.last.q[index], 0))));
       isNew = moved >= this.number("Position Tolerance", 0.1) || turned >= this.number("Angle Tolerance", 0.1);
-      // A single arrow is where the robot is, and not where it was last.
-      if (!isNew && trail <= 0) return;
+      // A single arrow with a trail is where the robot is; others, or one alone, are where it was when they were added.
+      if (!isNew && (trail <= 0 || most > 1)) return;
     }
     if (isNew) this.last = now;
     if (trail > 0) this.follow(message.header, now.p, trail, isNew);
@@ -167,7 +168,6 @@ export class Odometry extends LastMessage {
       group.add(this.ball);
     }
     this.addAt(message.header, group);
-    const most = Math.min(MAX_KEPT, this.number("Keep", 100) || MAX_KEPT);
     this.keep(this.line ? most + 1 : most);
   }
 
