@@ -23,8 +23,8 @@ from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 
-RVIZ_NAMES = {"3d"}
-"""The views that mostly have the names of RViz's displays and tools, which are not translated."""
+RVIZ_NAMES = {"3d", "simulation"}
+"""The views with a 3D scene: the names of RViz's displays and settings, and of quantities, are not translated."""
 
 PAGE = Path(minirospy.web.dashboard.__file__).parent / "page"
 
