@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
+import { deflateSync } from "node:zlib";
 
 import { decompressed } from "../../../minirospy/web/dashboard/page/js/compressed.js";
 import { COLOR_MAPS, pixelsOf } from "../../../minirospy/web/dashboard/page/js/pixels.js";
@@ -43,6 +44,43 @@ test("PNG files of 16 bits keep their values", async () => {
   }
   assert.equal(deepPng(new Uint8Array(100)), null);
   await assert.rejects(valuesOfPng(fileOf("gray").subarray(0, 60)));
+});
+
+test("a small PNG file that inflates without end is read as far as its size", async () => {
+  const file = fileOf("gray");
+  const head = file.slice(0, 33);
+  new DataView(head.buffer).setUint32(16, 1);
+  new DataView(head.buffer).setUint32(20, 1);
+  const bomb = deflateSync(new Uint8Array(50_000_000));
+  const chunk = new Uint8Array(12 + bomb.length);
+  new DataView(chunk.buffer).setUint32(0, bomb.length);
+  chunk.set(
+    [..."IDAT"].map((letter) => letter.charCodeAt(0)),
+    4,
+  );
+  chunk.set(bomb, 8);
+
+  const Inflater = globalThis.DecompressionStream;
+  let inflated = 0;
+  globalThis.DecompressionStream = class {
+    constructor(format) {
+      const { readable, writable } = new Inflater(format);
+      const count = new TransformStream({
+        transform(data, controller) {
+          inflated += data.length;
+          controller.enqueue(data);
+        },
+      });
+      Object.assign(this, { readable: readable.pipeThrough(count), writable });
+    }
+  };
+  try {
+    const values = await valuesOfPng(Uint8Array.from([...head, ...chunk]));
+    assert.deepEqual([...values], [0, 0]);
+  } finally {
+    globalThis.DecompressionStream = Inflater;
+  }
+  assert.ok(inflated < 5_000_000, `${inflated} bytes`);
 });
 
 test("a compressed image of 16 bits is an image of numbers or of colors", async () => {

@@ -29,8 +29,23 @@ export async function valuesOfPng(data) {
     at += 12 + length;
   }
   const stream = new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate"));
-  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-  return unfiltered(bytes, width * channels * 2, height, channels * 2);
+  const row = width * channels * 2;
+  return unfiltered(await firstBytes(stream, (row + 1) * height), row, height, channels * 2);
+}
+
+/** Return the first bytes of a stream, at most `most`. A small file may inflate to gigabytes. */
+async function firstBytes(stream, most) {
+  const reader = stream.getReader();
+  const chunks = [];
+  let size = 0;
+  while (size < most) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    chunks.push(value);
+    size += value.length;
+  }
+  await reader.cancel();
+  return new Uint8Array(await new Blob(chunks).arrayBuffer());
 }
 
 /** Undo the filter of each row; `size` is the number of bytes of a pixel. */
