@@ -110,7 +110,7 @@ def start_controllers(names: list[str]) -> None:
 
 
 def measure(case: Case, seconds: float, node: list[str]) -> dict[str, float]:
-    """Run a case, in a process with a node and a master of its own."""
+    """Run a case, in a process with a node and a new master."""
     import psutil
     import rospy
     from control_msgs.msg import JointTrajectoryControllerState

@@ -180,7 +180,7 @@ def move_arm() -> None:
 
 
 def measure(case: Case, seconds: float, command: list[str]) -> dict[str, float]:
-    """Run a case, in a process with a node and a master of its own."""
+    """Run a case, in a process with a node and a new master."""
     import psutil
     import rospy
     from gazebo_msgs.srv import GetPhysicsProperties, GetWorldProperties, SetPhysicsProperties
@@ -274,7 +274,7 @@ def run_case(name: str, seconds: float, profile: str) -> None:
 
 
 def main() -> int:
-    """Measure the cases, each with a master of its own; return the exit status."""
+    """Measure the cases, each with a new master; return the exit status."""
     if sys.argv[1:2] == ["--node"]:
         return run_node(sys.argv[2], sys.argv[3:])
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])

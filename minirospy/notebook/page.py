@@ -80,7 +80,7 @@ def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterabl
 
 
 def _start() -> _Dashboard:
-    # In a group of its own: an interrupt of a cell goes to the kernel's whole group.
+    # In a new process group: an interrupt of a cell goes to the kernel's whole group.
     group: dict[str, Any] = {"start_new_session": True}
     if sys.platform == "win32":
         group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}

@@ -58,7 +58,7 @@ class Grant(Enum):
 class Refusal(NamedTuple):
     """The reason why a request is refused: the HTTP status, and one line for the user.
 
-    ``names_option``: the text names an option for the owner of the bridge, who reads it only in the bridge's terminal.
+    ``names_option``: the text names an option of the bridge. Only the bridge's terminal shows it, for the bridge's owner.
     """
 
     status: int

@@ -225,7 +225,7 @@ def test_models_are_pushed_dragged_and_have_contacts(serve: Serve, browse: Brows
     page.click(".sim-bar button", "Reset world")
     wait_until(lambda: world.place("box_0")[1] == pytest.approx(0, abs=1e-3))
 
-    # The tool Push moves it away from the viewer, who is at +x and +y.
+    # The tool Push moves it away from the viewpoint at +x and +y.
     page.click(".tools button", "Push")
     point_at(page, "box_0")
     mouse(page, "mousePressed", 0, -10, 1)

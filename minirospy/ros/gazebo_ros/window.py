@@ -68,7 +68,7 @@ RAY_COLOR = ColorRGBA(0.1, 0.45, 1.0, 0.45)
 
 
 class Window:
-    """Publishes in a thread of its own, which asks the simulation's thread for its data between two steps."""
+    """Publishes in a separate thread, which asks the simulation's thread for its data between two steps."""
 
     def __init__(
         self, loop: SimulationLoop, plugins: PluginHost, world: World, model_folders: Iterable[str]
