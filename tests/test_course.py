@@ -84,6 +84,10 @@ def test_links_resolve() -> None:
         ("$ printf 'one\\ntwo\\nthree\\n'\none\n...\nthree\n", None),
         ("$ printf 'one\\ntwo\\nthree\\n'\none\nthree\n", "prints"),
         ("$ echo 1234567890.5\n1111111111.1\n", None),
+        (
+            "$ echo old > ~/pose\n$ rostopic() { cat ~/pose; echo new > ~/pose; }\n$ rostopic echo -n 1 /pose\nnew\n",
+            None,
+        ),
     ],
 )
 def test_player_types_commands_and_compares_output(page: str, printed: str | None, tmp_path: Path) -> None:

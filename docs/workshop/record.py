@@ -61,8 +61,10 @@ PLACES = {"laptop": "127.0.0.1", "192.168.65.50": "127.0.0.2", "192.168.65.60": 
 """The computers of the pages, and who plays them."""
 
 LOOKS = re.compile(
-    r"(rosnode|rostopic|rosservice|rosparam) (list|info|type|find|get)\b|minirospy board (get|list)\b"
+    r"(rosnode|rostopic|rosservice|rosparam) (list|info|type|find|get)\b"
+    r"|rostopic echo -n\b|minirospy board (get|list)\b"
 )
+"""What only looks: it is typed again until it prints what the page shows, because other programs may need time."""
 TIME = re.compile(r"\b1\d{9}\.\d+")
 REDRAWN = re.compile(r"\r\x1b\[2K(?:\x1b\[1A\x1b\[2K)+")
 """How a program goes back to redraw its picture: in the record, the new one follows the old one."""
