@@ -19,7 +19,7 @@ _TOKEN = re.compile(
     r"|<!\[CDATA\[.*?\]\]>"
     r"|(?P<declaration><\?xml\b.*?\?>)"
     r"|<\?.*?\?>"
-    r"|<!DOCTYPE[^>\[]*(?:\[[^\]]*\])?[^>]*>"
+    r"|<!DOCTYPE(?=(?P<doctype>[^>\[]*))(?P=doctype)(?:\[[^\]]*\])?[^>]*>"  # lookahead: without it, quadratic time
     r"|(?P<end></[^\s<>]+\s*>)"
     r"|<(?P<tag>[A-Za-z_][^\s/>]*)(?P<attributes>(?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(?P<close>/?)>"
     r"|(?P<text>[^<]+)"
