@@ -1,16 +1,16 @@
 """Write recorded.json: what the C++ classes of ros_controllers, control_toolbox and ros_control compute for random numbers.
 
-    python tests/core/control/make_recorded.py ROS_CONTROLLERS.git CONTROL_TOOLBOX.git ROS_CONTROL.git
+    python -m tests.core.control.make_recorded ROS_CONTROLLERS.git CONTROL_TOOLBOX.git ROS_CONTROL.git
 
 The arguments are git directories with the branch noetic-devel. It needs g++, and the headers of roscpp and Boost.
 """
 
 from __future__ import annotations
 
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
+
+from tests.core.control.compiled import output, read_file
 
 BRANCH = "noetic-devel"
 SOURCES = {
@@ -244,35 +244,13 @@ int main() {
 
 def main() -> None:
     """Compile and run."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for path, target in SOURCES.items():
-            package = path.partition("/")[0]
-            number = 1 if package.endswith("_controller") else 3 if package.endswith("_interface") else 2
-            repository = sys.argv[number]
-            show = ["git", f"--git-dir={repository}", "show", f"{BRANCH}:{path}"]
-            HEADERS[target] = subprocess.run(show, capture_output=True, text=True, check=True).stdout
-        for path, text in {**HEADERS, "main.cpp": MAIN}.items():
-            (folder / path).parent.mkdir(exist_ok=True)
-            (folder / path).write_text(text)
-        libraries = (
-            "roscpp rostime rosconsole roscpp_serialization xmlrpcpp boost_thread boost_system pthread"
-        )
-        sources = [str(each) for each in folder.glob("*.cpp")]
-        program = str(folder / "program")
-        subprocess.run(
-            [
-                "g++",
-                "-w",
-                f"-I{folder}",
-                *sources,
-                "-o",
-                program,
-                *(f"-l{each}" for each in libraries.split()),
-            ],
-            check=True,
-        )
-        recorded = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    files = dict(HEADERS)
+    for path, target in SOURCES.items():
+        package = path.partition("/")[0]
+        number = 1 if package.endswith("_controller") else 3 if package.endswith("_interface") else 2
+        files[target] = read_file(sys.argv[number], BRANCH, path)
+    libraries = "roscpp rostime rosconsole roscpp_serialization xmlrpcpp boost_thread boost_system pthread"
+    recorded = output({**files, "main.cpp": MAIN}, [f"-l{each}" for each in libraries.split()])
     (Path(__file__).parent / "recorded.json").write_text(recorded)
 
 

@@ -1,6 +1,6 @@
 """Write recorded_grippers.json: what ROS's GripperActionController does with goals drawn at random.
 
-    python tests/core/control/make_recorded_grippers.py ROS_CONTROLLERS.git
+    python -m tests.core.control.make_recorded_grippers ROS_CONTROLLERS.git
 
 The argument is a git directory with the branch noetic-devel. The controller is compiled with headers that replace ROS's nodes,
 actions and hardware; a goal's outcome is reported immediately, not at action_monitor_rate. It needs g++ and roscpp's headers.
@@ -8,10 +8,10 @@ actions and hardware; a goal's outcome is reported immediately, not at action_mo
 
 from __future__ import annotations
 
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
+
+from tests.core.control.compiled import list_files, output, read_file
 
 BRANCH = "noetic-devel"
 FOLDER = "gripper_action_controller/include/"
@@ -263,25 +263,11 @@ int main() {
 
 def main(repository: str) -> None:
     """Compile and run."""
-    show = ["git", f"--git-dir={repository}"]
-    listed = subprocess.run(
-        [*show, "ls-tree", "-r", "--name-only", BRANCH, FOLDER], capture_output=True, text=True, check=True
-    )
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        files = dict.fromkeys(EMPTY, "#include <stubs.h>\n")
-        for path in listed.stdout.split():
-            shown = subprocess.run(
-                [*show, "show", f"{BRANCH}:{path}"], capture_output=True, text=True, check=True
-            )
-            files[path[len(FOLDER) :]] = shown.stdout
-        for path, text in {**files, "stubs.h": STUBS, "main.cpp": MAIN}.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_text(text)
-        program = str(folder / "program")
-        words = ["-w", f"-I{folder}", str(folder / "main.cpp"), "-o", program, "-lrostime", "-lpthread"]
-        subprocess.run(["g++", "-std=c++17", *words], check=True)
-        recorded = subprocess.run([program], stdout=subprocess.PIPE, text=True, check=True).stdout
+    files = dict.fromkeys(EMPTY, "#include <stubs.h>\n")
+    for path in list_files(repository, BRANCH, FOLDER):
+        files[path.removeprefix(FOLDER)] = read_file(repository, BRANCH, path)
+    files |= {"stubs.h": STUBS, "main.cpp": MAIN}
+    recorded = output(files, ["-lrostime", "-lpthread"])
     (Path(__file__).parent / "recorded_grippers.json").write_text(recorded)
 
 

@@ -1,6 +1,6 @@
 """Write recorded_trajectories.json: what ROS's JointTrajectoryController does with messages drawn at random.
 
-    python tests/core/control/make_recorded_trajectories.py ROS_CONTROLLERS.git
+    python -m tests.core.control.make_recorded_trajectories ROS_CONTROLLERS.git
 
 The argument is a git directory with the branch noetic-devel. The controller is compiled with headers that replace ROS's nodes,
 actions and hardware. It needs g++, and the headers of roscpp, actionlib and Boost.
@@ -8,10 +8,10 @@ actions and hardware. It needs g++, and the headers of roscpp, actionlib and Boo
 
 from __future__ import annotations
 
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
+
+from tests.core.control.compiled import list_files, output, read_file
 
 BRANCH = "noetic-devel"
 FOLDER = "joint_trajectory_controller/include/"
@@ -478,26 +478,13 @@ int main(int count, char** words) {
 
 def main(repository: str, runs: int = 50) -> None:
     """Compile and run."""
-    show = ["git", f"--git-dir={repository}"]
-    listed = subprocess.run(
-        [*show, "ls-tree", "-r", "--name-only", BRANCH, FOLDER], capture_output=True, text=True, check=True
+    files = dict.fromkeys(EMPTY, "#include <stubs.h>\n")
+    for path in list_files(repository, BRANCH, FOLDER):
+        files[path.removeprefix(FOLDER)] = read_file(repository, BRANCH, path)
+    files |= {"stubs.h": STUBS, "main.cpp": MAIN}
+    recorded = output(
+        files, ["-lrostime", "-lxmlrpcpp", "-lboost_thread", "-lboost_system", "-lpthread"], str(runs)
     )
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        files = dict.fromkeys(EMPTY, "#include <stubs.h>\n")
-        for path in listed.stdout.split():
-            shown = subprocess.run(
-                [*show, "show", f"{BRANCH}:{path}"], capture_output=True, text=True, check=True
-            )
-            files[path[len(FOLDER) :]] = shown.stdout
-        for path, text in {**files, "stubs.h": STUBS, "main.cpp": MAIN}.items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_text(text)
-        program = str(folder / "program")
-        words = ["-w", f"-I{folder}", str(folder / "main.cpp"), "-o", program]
-        libraries = ["-lrostime", "-lxmlrpcpp", "-lboost_thread", "-lboost_system", "-lpthread"]
-        subprocess.run(["g++", "-std=c++17", *words, *libraries], check=True)
-        recorded = subprocess.run([program, str(runs)], capture_output=True, text=True, check=True).stdout
     (Path(__file__).parent / "recorded_trajectories.json").write_text(recorded)
 
 

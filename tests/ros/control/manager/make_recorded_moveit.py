@@ -1,6 +1,6 @@
 """Write recorded_moveit.json: the messages that MoveIt's controller managers publish, with minirospy's controllers.
 
-    python tests/ros/control/manager/make_recorded_moveit.py MOVEIT.git
+    python -m tests.ros.control.manager.make_recorded_moveit MOVEIT.git
 
 The argument is a git directory with the branch master. MoveIt's files are compiled unmodified, with headers that replace
 pluginlib. It needs g++, gencpp, and the headers of roscpp, actionlib and Boost.
@@ -15,6 +15,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from tests.core.control.compiled import compile_program, read_file
 
 BRANCH = "master"
 ROOT = Path(__file__).parents[4]
@@ -47,9 +49,13 @@ INCLUDED = (
 COMPILED = (
     "moveit_core/utils/src/xmlrpc_casts.cpp",
     "moveit_plugins/moveit_simple_controller_manager/src/follow_joint_trajectory_controller_handle.cpp",
+)
+PLUGINS = (
     "moveit_plugins/moveit_simple_controller_manager/src/moveit_simple_controller_manager.cpp",
     "moveit_plugins/moveit_ros_control_interface/src/controller_manager_plugin.cpp",
 )
+"""Files that MAIN includes, because they define classes that it uses."""
+
 HEADERS = {
     "pluginlib/class_list_macros.hpp": "#define PLUGINLIB_EXPORT_CLASS(...)\n",
     "pluginlib/class_loader.hpp": "",
@@ -57,8 +63,8 @@ HEADERS = {
 
 MAIN = r"""
 #include <ros/ros.h>
-#include "moveit_simple_controller_manager.cpp"
-#include "controller_manager_plugin.cpp"
+#include "moveit_simple_controller_manager.ipp"
+#include "controller_manager_plugin.ipp"
 
 typedef moveit_controller_manager::MoveItControllerHandlePtr Handle;
 
@@ -216,23 +222,14 @@ def main() -> None:
 def _compile(folder: Path, repository: str) -> Path:
     for package in PACKAGES:
         _generate(package, folder)
+    files = dict(HEADERS)
     for path in (*INCLUDED, *COMPILED):
-        show = ["git", f"--git-dir={repository}", "show", f"{BRANCH}:{path}"]
-        text = subprocess.run(show, capture_output=True, text=True, check=True).stdout
-        HEADERS[path.partition("/include/")[2] or Path(path).name] = text
-    for path, text in {**HEADERS, "main.cpp": MAIN}.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text)
-
+        files[path.partition("/include/")[2] or Path(path).name] = read_file(repository, BRANCH, path)
+    for path in PLUGINS:
+        files[f"{Path(path).stem}.ipp"] = read_file(repository, BRANCH, path)
     flags = ["pkg-config", "--cflags", "--libs", "actionlib", "roscpp"]
     flags = subprocess.run(flags, capture_output=True, text=True, check=True).stdout.split()
-    sources = [
-        folder / each
-        for each in ("main.cpp", "xmlrpc_casts.cpp", "follow_joint_trajectory_controller_handle.cpp")
-    ]
-    program = folder / "program"
-    subprocess.run(["g++", "-w", "-std=c++17", f"-I{folder}", *sources, "-o", program, *flags], check=True)
-    return program
+    return compile_program(folder, {**files, "main.cpp": MAIN}, flags)
 
 
 def _generate(package: str, folder: Path) -> None:
