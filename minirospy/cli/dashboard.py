@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from minirospy.web.dashboard.codes import Codes
     from minirospy.web.tokens import Tokens
 
-__all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
+__all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
@@ -401,20 +401,22 @@ def _serve(
         _announce(serving, started.dashboard.port, view, fields, tokens, started.dashboard.codes)
 
     if embeds:
-        import threading
-
-        threading.Thread(target=_end_with_input, name="minirospy-stdin", daemon=True).start()
+        end_with_stdin()
     return run(node_name or anonymous_name("minirospy_dashboard"), arguments, start, announce)
 
 
-def _end_with_input() -> None:
-    """End this process, as by SIGTERM, when its standard input ends."""
+def end_with_stdin() -> None:
+    """Start a thread that ends this process, as by SIGTERM, when its standard input closes."""
     import os
     import signal
+    import threading
 
-    while os.read(0, 4096):
-        pass
-    signal.raise_signal(signal.SIGTERM)
+    def watch() -> None:
+        while os.read(0, 4096):
+            pass
+        signal.raise_signal(signal.SIGTERM)
+
+    threading.Thread(target=watch, name="minirospy-stdin", daemon=True).start()
 
 
 def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
