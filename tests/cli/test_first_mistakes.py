@@ -326,9 +326,12 @@ def test_type_that_a_wrong_publisher_left_behind(master: str) -> None:
 )
 def test_callback_that_fails(callback: str, note: str, master: str) -> None:
     code = (
+        "import logging, threading; logged = threading.Event(); handler = logging.Handler()\n"
+        "handler.emit = lambda record: 'bad callback' in record.getMessage() and logged.set()\n"
         "import rospy; from std_msgs.msg import Int32; rospy.init_node('x')\n"
+        "logging.getLogger('rosout').addHandler(handler)\n"
         "rospy.Publisher('/a', Int32, queue_size=1, latch=True).publish(5)\n"
-        f"rospy.Subscriber('/a', Int32, {callback}); rospy.sleep(1)\n"
+        f"rospy.Subscriber('/a', Int32, {callback}); logged.wait(30)\n"
     )
     done = typed("python", "-c", code)
     lines = [line for line in done.stderr.splitlines() if line]
