@@ -22,7 +22,8 @@ class Connection(NamedTuple):
     ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` is the topic; ``id`` is unique in the node.
     ``endpoint_id`` is the URI of the publisher's Slave API, or the name of the subscribing node. ``callerid_pub``,
     ``header``, ``type`` and ``md5sum`` have the values that the publisher sent; they are empty if this node is the publisher.
-    ``stat_bytes`` and ``stat_num_msg`` count the bytes and messages received or sent.
+    ``stat_bytes`` and ``stat_num_msg`` count the bytes and messages received or sent. ``transport_type`` is always TCPROS;
+    :meth:`get_transport_info` names a Unix socket.
     """
 
     link: InLink | OutLink
@@ -58,7 +59,7 @@ def connection_to_publisher(link: InLink, topic: str) -> Connection:
         "i",
         link.uri,
         link.number,
-        link.transport,
+        "TCPROS",
         link.received_bytes,
         link.received,
         callerid_pub=header.get("callerid", "unknown"),
@@ -72,4 +73,4 @@ def connection_to_publisher(link: InLink, topic: str) -> Connection:
 
 def connection_to_subscriber(link: OutLink, topic: str) -> Connection:
     """Return the publisher's end of a link, as a Connection."""
-    return Connection(link, topic, "o", link.peer, link.number, link.transport, link.sent_bytes, link.sent)
+    return Connection(link, topic, "o", link.peer, link.number, "TCPROS", link.sent_bytes, link.sent)

@@ -125,16 +125,19 @@ class SlaveApi:
         return [SUCCESS, "", [publications, subscriptions, []]]
 
     def get_bus_info(self, caller_id: str) -> Answer:
-        """Return one row per connection: [id, peer, direction, transport, topic, connected, text]."""
+        """Return one row per connection: [id, peer, direction, transport, topic, connected, text].
+
+        The transport is TCPROS also for a Unix socket, as programs expect: both carry the same frames. The text says which it is.
+        """
         rows: list[list[object]] = []
         for publication in list(self._node.publications.values()):
             for out in publication.links:
                 what = connection_text(out)
-                rows.append([out.number, out.peer, "o", out.transport, publication.topic, True, what])
+                rows.append([out.number, out.peer, "o", "TCPROS", publication.topic, True, what])
         for subscription in list(self._node.subscriptions.values()):
             for link in subscription.links:
                 what = connection_text(link)
-                rows.append([link.number, link.uri, "i", link.transport, subscription.topic, True, what])
+                rows.append([link.number, link.uri, "i", "TCPROS", subscription.topic, True, what])
         return [SUCCESS, "bus info", rows]
 
     def get_master_uri(self, caller_id: str) -> Answer:

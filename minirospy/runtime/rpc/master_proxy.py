@@ -28,7 +28,8 @@ class SystemState(NamedTuple):
 class BusConnection(NamedTuple):
     """One connection, as a node reports it.
 
-    ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them.
+    ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them. ``transport`` is UNIXROS if
+    ``info`` begins with that name: a node reports TCPROS for it (docs/transports.md).
     """
 
     id: object
@@ -209,7 +210,11 @@ class SlaveProxy:
 
     def get_bus_info(self) -> list[BusConnection]:
         """Return the node's connections."""
-        return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
+        connections = [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
+        return [
+            each._replace(transport="UNIXROS") if str(each.info).startswith("UNIXROS ") else each
+            for each in connections
+        ]
 
     def get_bus_stats(self) -> list[object]:
         """Return the statistics that the node reports."""

@@ -120,7 +120,8 @@ def test_both_sides_have_to_want_it(
             await until(lambda: box.bodies)
             assert (publication.links[0].transport, subscription.links[0].transport) == (transport, transport)
             ((_, _, rows), (_, _, others)) = (SlaveApi(node).get_bus_info("/c") for node in (a, b))
-            assert [row[3] for row in rows + others] == [transport, transport]
+            assert [row[3] for row in rows + others] == ["TCPROS", "TCPROS"]
+            assert all(row[6].startswith(f"{transport} connection ") for row in rows + others)
 
     run(scene)
 
