@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.translate_course import COURSE, GERMAN, english_pages, pieces, read_catalogue, translate
+from tools.translate_course import COURSE, GERMAN, english_pages, main, pieces, read_catalogue, translate
 
 FENCE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 
@@ -201,6 +201,19 @@ def test_changed_sentence_is_named_and_keeps_its_old_translation_as_fuzzy(course
     assert translate(course, write=True) == []
 
 
+def test_new_text_takes_the_translation_from_another_page_or_a_compendium(
+    course: Path, tmp_path: Path
+) -> None:
+    (course / "topics.md").write_text(TOPICS + "\nType this:\n\nStop.\n\nWait.\n", encoding="utf-8")
+    compendium = tmp_path / "more.po"
+    compendium.write_text('msgid "Stop."\nmsgstr "Halt."\n', encoding="utf-8")
+    left = translate(course, write=True, compendium=compendium)
+    assert left == ["docs/workshop/topics.md:22: not translated: Wait."]
+    assert (
+        (course / "de" / "topics.md").read_text(encoding="utf-8").endswith("\nTippe das:\n\nHalt.\n\nWait.\n")
+    )
+
+
 def test_new_page_and_removed_page_are_named(course: Path) -> None:
     (course / "bags.md").write_text("# Bags\n", encoding="utf-8")
     (course / "setup.md").unlink()
@@ -232,6 +245,19 @@ def test_new_page_and_removed_page_are_named(course: Path) -> None:
 def test_fault_in_a_translation_is_named(course: Path, english: str, german: str, fault: str) -> None:
     put(course, "topics", english, german)
     assert fault in translate(course, write=True)[0]
+
+
+def test_catalogue_that_cannot_be_read_is_named_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compendium = tmp_path / "more.po"
+    compendium.write_text('msgid "Stop."\nmsgst "Halt."\n', encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["--check", "--compendium", str(tmp_path / "none.po")])
+    assert "none.po does not exist" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["--check", "--compendium", str(compendium)])
+    assert "more.po (line 2)" in capsys.readouterr().err
 
 
 def test_hand_edited_german_page_is_named(course: Path) -> None:

@@ -6,7 +6,8 @@ A link to a page that has a translation leads to the German page, any other link
 
 The program also brings the catalogues up to date: it adds new English text, and removes text that is no longer used. If a
 sentence has changed, its entry keeps the old translation and is marked "fuzzy", until it has been translated again and the
-mark is removed. The exit status is 1, and each such place is printed, until all is translated; the German page shows the
+mark is removed. New text that another page has, too, or the catalogue ``--compendium FILE.po``, takes the translation from
+there. The exit status is 1, and each place to translate is printed, until all is translated; the German page shows the
 English text until then. ``--check`` only prints; a test does that, too.
 """
 
@@ -132,17 +133,21 @@ def _switch(page: str) -> str:
     return f"English | [Deutsch](de/{page})"
 
 
-def updated(catalogue: polib.POFile, page: list[Piece]) -> polib.POFile:
-    """Return the catalogue of a page: known translations, and entries to translate for what is new."""
+def updated(catalogue: polib.POFile, page: list[Piece], compendium: Mapping[str, str]) -> polib.POFile:
+    """Return the catalogue of a page: known translations, and entries to translate for what is new.
+
+    ``compendium`` has translations by English text: those of other pages.
+    """
     texts = dict.fromkeys(piece.text for piece in page if piece.kind in ("heading", "prose"))
     known = {entry.msgid: entry for entry in catalogue if not entry.obsolete}
     stale = {text: entry for text, entry in known.items() if text not in texts and entry.msgstr}
     new = polib.POFile(wrapwidth=WRAP_WIDTH)
     new.metadata = dict(METADATA)
     for text in texts:
-        entry = known.get(text)
-        if entry is None:
-            entry = polib.POEntry(msgid=text)
+        entry = known.get(text) or polib.POEntry(msgid=text)
+        if not entry.msgstr and text in compendium:
+            entry.msgstr = compendium[text]
+        elif text not in known:
             for old in difflib.get_close_matches(text, stale, n=1, cutoff=MIN_SIMILARITY):
                 entry.msgstr, entry.previous_msgid = stale[old].msgstr, old
                 entry.flags.append("fuzzy")
@@ -236,16 +241,25 @@ def read_catalogue(path: Path) -> polib.POFile:
     return polib.pofile(str(path), encoding="utf-8", wrapwidth=WRAP_WIDTH)
 
 
-def translate(course: Path = COURSE, *, write: bool) -> list[str]:
-    """Check all pages of a course, or bring its catalogues and German pages up to date; return what is left to do."""
+def translate(course: Path = COURSE, *, write: bool, compendium: Path | None = None) -> list[str]:
+    """Check all pages of a course, or bring its catalogues and German pages up to date; return what is left to do.
+
+    ``compendium`` is one more catalogue to take translations from.
+    """
     german = course / "de"
     parts = {
         page: pieces((course / page).read_text(encoding="utf-8"), page) for page in english_pages(course)
     }
     catalogues = {page: read_catalogue(german / Path(page).with_suffix(".po")) for page in parts}
+    more = [read_catalogue(compendium)] if compendium else []
     if write:
         german.mkdir(exist_ok=True)
-        catalogues = {page: updated(catalogues[page], parts[page]) for page in parts}
+        known = {
+            entry.msgid: entry.msgstr
+            for catalogue in [*catalogues.values(), *more]
+            for entry in catalogue.translated_entries()
+        }
+        catalogues = {page: updated(catalogues[page], parts[page], known) for page in parts}
         for page, catalogue in catalogues.items():
             _write(german / Path(page).with_suffix(".po"), f"{catalogue}\n")
 
@@ -279,7 +293,16 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument(
         "--check", action="store_true", help="write nothing, only print what is left to translate"
     )
-    left = translate(write=not parser.parse_args(argv).check)
+    parser.add_argument(
+        "--compendium", metavar="FILE", type=Path, help="a catalogue to take translations of new text from"
+    )
+    arguments = parser.parse_args(argv)
+    if arguments.compendium and not arguments.compendium.exists():
+        parser.error(f"{arguments.compendium} does not exist")
+    try:
+        left = translate(write=not arguments.check, compendium=arguments.compendium)
+    except OSError as error:
+        parser.error(str(error))
     print("\n".join(left) or "the course is complete in German")
     return bool(left)
 
