@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tools.site_hooks import PAGES, link_on_site
+from tools.site_hooks import FILES, PAGES, link_on_site
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -73,6 +73,7 @@ def test_no_link_is_broken(page: Path) -> None:
         ("README.md", "docs/pictures/first.webp", "pictures/first.webp"),
         ("README.md", "docs/security.md#one-word", "security.md#one-word"),
         ("README.md", "CONTRIBUTING.md", "CONTRIBUTING.md"),
+        ("README.md", "LICENSE", "LICENSE.txt"),
         ("CONTRIBUTING.md", "README.md#install", "overview.md#install"),
         ("CONTRIBUTING.md", "tests/README.md", "tests.md"),
         ("tests/README.md", "../docs/bags.md", "bags.md"),
@@ -85,3 +86,12 @@ def test_no_link_is_broken(page: Path) -> None:
 )
 def test_link_leads_to_the_same_page_on_the_site(page: str, target: str, expected: str) -> None:
     assert link_on_site(target, page) == expected
+
+
+def test_each_linked_file_outside_the_documentation_is_on_the_site() -> None:
+    for page in ALL:
+        prose = re.sub(r"`[^`\n]*`", "", _prose(page))
+        for target in re.findall(r"\]\((?!https?:|mailto:|#)([^)\s#]+)", prose):
+            file = (page.parent / target).resolve()
+            name = file.relative_to(ROOT).as_posix()
+            assert file.is_relative_to(DOCS) or name in {**PAGES, **FILES}, f"{page.name}: {target}"

@@ -20,12 +20,15 @@ PAGES = {
 }
 """Pages outside docs/, with their names on the site (README.md would become its start page)."""
 
+FILES = {"LICENSE": "LICENSE.txt"}
+"""Files outside docs/ that pages link to, with their names on the site."""
+
 _LINK = re.compile(r"(\]\()(?!https?:|#|mailto:)([^)\s]+)(\))")
 
 
 def place_on_site(page: str) -> str:
     """Return the site path of a source file."""
-    return PAGES.get(page, page.removeprefix("docs/"))
+    return {**PAGES, **FILES}.get(page, page.removeprefix("docs/"))
 
 
 def link_on_site(target: str, page: str) -> str:
@@ -46,10 +49,10 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages outside docs/."""
+    """Add the pages and files outside docs/."""
     from mkdocs.structure.files import File
 
-    for page, place in PAGES.items():
+    for page, place in {**PAGES, **FILES}.items():
         files.append(File.generated(config, place, content=(ROOT / page).read_text(encoding="utf-8")))
     return files
 
