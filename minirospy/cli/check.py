@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
 from collections.abc import Sequence
@@ -69,6 +70,11 @@ def _parser() -> Parser:
     )
     add("--name", metavar="NAME", help="your name in the teacher's table, from now on", completer="nothing")
     add(
+        "--share",
+        action="store_true",
+        help="show your board and your nodes on the teacher's page until Ctrl-C",
+    )
+    add(
         "--class",
         dest="shows_class",
         action="store_true",
@@ -83,6 +89,7 @@ def _check(
     patience: float,
     join: str | None,
     name: str | None,
+    share: bool,
     shows_class: bool,
 ) -> int:
     if not 0.1 <= patience <= 100:
@@ -98,11 +105,21 @@ def _check(
         join_class(record, join or "", name or "")
         record.write()
         print(f"{record.to_parameter()['student']}: results go to {record.master or environment.master_uri}")
-        if exercise is None:
+        if exercise is None and not share:
             return 0
+    if exercise is not None and (share or shows_class):
+        raise Misuse(f"--{'share' if share else 'class'} takes no exercise")
+    if share:
+        from minirospy.course.share import share as share_state
+
+        print(
+            "Your board and your nodes are on the teacher's page, which only shows them; Ctrl-C ends it.",
+            flush=True,
+        )
+        with contextlib.suppress(KeyboardInterrupt):
+            share_state(record, environment)
+        return 0
     if shows_class:
-        if exercise is not None:
-            raise Misuse("--class takes no exercise")
         return _show_class(record.master or environment.master_uri)
     if exercise is None:
         return _list(record)

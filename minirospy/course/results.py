@@ -1,7 +1,7 @@
 """What a computer has passed: a file in ROS_HOME, and a parameter at the master that the class shares.
 
-The parameter ``/minirospy_class/COMPUTER`` is one dictionary, which a single call replaces. A parameter stays at the master
-after the check has ended, so that the teacher's page shows it whenever it is opened.
+The parameter ``/minirospy_class/STUDENT`` is a dictionary: the student's name, and the exercises. A parameter stays at the
+master after the check has ended, so that the teacher's page shows it whenever it is opened.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import re
 import socket
 import tempfile
 import time
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,7 @@ from minirospy.base.environment import Environment, split_uri
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcRefused, UsageError
 from minirospy.base.escape import escaped
 from minirospy.course.checker import Report
+from minirospy.course.exercise import built_in_names
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["CLASS_PARAMETER", "Record", "Result", "Student", "class_table", "gather", "join", "publish"]
@@ -66,6 +68,11 @@ class Record:
             pass
         return record
 
+    @property
+    def class_parameter(self) -> str:
+        """Return the name of this computer's parameter at the class's master."""
+        return f"{CLASS_PARAMETER}/{parameter_key(self.student or default_name())}"
+
     def add(self, report: Report) -> None:
         """Add the result of a check."""
         name = report.exercise.name
@@ -93,7 +100,8 @@ class Record:
             raise MinirospyError(f"{self.path} cannot be written: {error.strerror}") from error
 
     def to_parameter(self) -> dict[str, Any]:
-        """Return the record as the value of a parameter."""
+        """Return the record as the value of a parameter. ``number`` is an exercise's place in the course."""
+        numbers = {name: number for number, name in enumerate(built_in_names())}
         return {
             "student": self.student or default_name(),
             "exercises": {
@@ -102,6 +110,7 @@ class Record:
                     "ever": each.ever,
                     "time": each.time,
                     "failures": list(each.failures),
+                    "number": numbers.get(name, len(numbers)),
                 }
                 for name, each in self.results.items()
             },
@@ -162,16 +171,21 @@ def send(record: Record, uri: str) -> None:
     """Send the record to a master. Raise MasterUnreachableError if it does not respond."""
     master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=_SECONDS)
     try:
-        master.set_param(
-            f"{CLASS_PARAMETER}/{parameter_key(record.student or default_name())}", record.to_parameter()
-        )
+        # One call for each part: what the computer shows now (share.py) stays.
+        for part, value in record.to_parameter().items():
+            master.set_param(f"{record.class_parameter}/{part}", value)
     finally:
         master.close()
 
 
 def parameter_key(name: str) -> str:
-    """Return a name as the last part of a parameter's name: letters, digits and underscores, and a letter first."""
-    text = re.sub(r"\W", "_", name, flags=re.ASCII)
+    """Return a name as the last part of a parameter's name: letters, digits and underscores, and a letter first.
+
+    A checksum keeps names apart that differ only in other characters, such as Jörg and Jürg.
+    """
+    text = re.sub(r"\W", "_", name, flags=re.ASCII)[:_MAX_NAME]
+    if text != name:
+        text = f"{text}_{zlib.crc32(name.encode()):08x}"
     return text if text[:1].isalpha() else f"c_{text}"
 
 

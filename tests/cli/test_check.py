@@ -104,7 +104,8 @@ def test_result_is_at_the_master(command: Command, master: str, question: str) -
     assert command("check", "--name", "Anna B.").out == f"Anna B.: results go to {master}\n"
     assert command("check", question, "map").status == 1
     [student] = gather(master)
-    assert (student.key, student.name) == ("Anna_B_", "Anna B.")
+    assert student.key.startswith("Anna_B__")
+    assert student.name == "Anna B."
     assert not student.results["question"].passed
     assert abs(student.results["question"].time - time.time()) < 600
     assert student.results["question"].failures == ("What?: your answer is [map]",)

@@ -44,8 +44,11 @@ export function robotsOf(topics) {
   return [...found].sort();
 }
 
-/** Return the layout of a classroom: boards in a grid, below them for each robot what drives it or what it has. */
-export function classroom({ boards, topics }) {
+/**
+ * Return the layout of a classroom: the class if there is one, boards in a grid, below them for each robot what drives
+ * it or what it has.
+ */
+export function classroom({ boards, topics, hasClass = false }) {
   const names = new Set(topics);
   const query = (words) => new URLSearchParams(words).toString();
   const cells = boards.slice(0, MAX_ROBOTS).map((board) => `board?${query({ board })}`);
@@ -56,7 +59,7 @@ export function classroom({ boards, topics }) {
       if (names.has(`${space}/cmd_vel`)) return `teleop?${query({ topic: `${space}/cmd_vel` })}`;
       return `topics?${query({ filter: `${space}/` })}`;
     });
-  const rows = [...grid(cells), ...grid(robots)];
+  const rows = [...(hasClass ? ["class"] : []), ...grid(cells), ...grid(robots)];
   return rows.length ? `column(${[...rows, "console"].join(",")})` : "row(board,console)";
 }
 
