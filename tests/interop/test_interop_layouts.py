@@ -139,15 +139,13 @@ def test_classroom_is_made_of_boards_and_robots() -> None:
     ]
     body = f"return classroom({{ boards: ['a', 'b c'], topics: {json.dumps(topics)} }})"
     assert run_script("classroom", "js/presets.js", body) == (
-        "column(row(board?board=a,board?board=b+c),"
+        "column(class,row(board?board=a,board?board=b+c),"
         "row(plot?path=%2Fblue%2Fbutton_state&window=30,topics?filter=%2Fgreen%2F),row(teleop?topic=%2Fred%2Fcmd_vel),console)"
     )
     assert (
         run_script("classroom", "js/presets.js", "return classroom({ boards: [], topics: [] })")
-        == "row(board,console)"
+        == "column(class,row(board,console))"
     )
-    body = "return classroom({ boards: ['a'], topics: [], hasClass: true })"
-    assert run_script("classroom", "js/presets.js", body) == "column(class,row(board?board=a),console)"
 
 
 CLASS = {

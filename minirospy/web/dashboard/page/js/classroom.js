@@ -1,6 +1,6 @@
 // The table of a class, from the parameters below /minirospy_class that `minirospy check` sets. Pure.
 
-export const ROOT = "/minirospy_class/";
+const ROOT = "/minirospy_class/";
 const MAX_STUDENTS = 200;
 const NAME = /^[A-Za-z0-9_]{1,64}$/;
 

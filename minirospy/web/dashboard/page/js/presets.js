@@ -45,10 +45,10 @@ export function robotsOf(topics) {
 }
 
 /**
- * Return the layout of a classroom: the class if there is one, boards in a grid, below them for each robot what drives
- * it or what it has.
+ * Return the layout of a classroom: the table of the class, boards in a grid, below them for each robot what drives it
+ * or what it has. The table is there before the first result, because the teacher opens the page first.
  */
-export function classroom({ boards, topics, hasClass = false }) {
+export function classroom({ boards, topics }) {
   const names = new Set(topics);
   const query = (words) => new URLSearchParams(words).toString();
   const cells = boards.slice(0, MAX_ROBOTS).map((board) => `board?${query({ board })}`);
@@ -59,8 +59,8 @@ export function classroom({ boards, topics, hasClass = false }) {
       if (names.has(`${space}/cmd_vel`)) return `teleop?${query({ topic: `${space}/cmd_vel` })}`;
       return `topics?${query({ filter: `${space}/` })}`;
     });
-  const rows = [...(hasClass ? ["class"] : []), ...grid(cells), ...grid(robots)];
-  return rows.length ? `column(${[...rows, "console"].join(",")})` : "row(board,console)";
+  const rows = [...grid(cells), ...grid(robots)];
+  return `column(${["class", ...(rows.length ? [...rows, "console"] : ["row(board,console)"])].join(",")})`;
 }
 
 /** Return rows of about as many cells as there are rows, three at most. */

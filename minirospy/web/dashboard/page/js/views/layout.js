@@ -3,7 +3,6 @@
 import { Dock } from "../dock.js";
 import { download, fill, h, setText } from "../dom.js";
 import { Layout, MAX_PANES } from "../layout.js";
-import { ROOT } from "../classroom.js";
 import { PRESETS, classroom } from "../presets.js";
 import { t } from "../texts.js";
 
@@ -150,11 +149,7 @@ export class Layouts {
       }),
     ]);
     for (const end of endings) end();
-    return {
-      boards: boards ?? [],
-      topics: [...this.link.channels.keys(), ...this.link.graph.subscribed.keys()],
-      hasClass: [...this.link.parameters.keys()].some((name) => name.startsWith(ROOT)),
-    };
+    return { boards: boards ?? [], topics: [...this.link.channels.keys(), ...this.link.graph.subscribed.keys()] };
   }
 
   showStart() {
