@@ -14,6 +14,7 @@ from minirospy.command.parser import Misuse, Parser
 from minirospy.command.verbs import Command
 
 if TYPE_CHECKING:
+    from minirospy.base.environment import Environment
     from minirospy.course.checker import Finding, Report
     from minirospy.course.exercise import Exercise
     from minirospy.course.results import Record
@@ -70,6 +71,12 @@ def _parser() -> Parser:
     )
     add("--name", metavar="NAME", help="your name in the teacher's table, from now on", completer="nothing")
     add(
+        "--snapshot",
+        metavar="FILE.zip",
+        help="write the workspace, `minirospy doctor` and your results into a file, for help",
+        completer="files",
+    )
+    add(
         "--share",
         action="store_true",
         help="show your board and your nodes on the teacher's page until Ctrl-C",
@@ -89,6 +96,7 @@ def _check(
     patience: float,
     join: str | None,
     name: str | None,
+    snapshot: str | None,
     share: bool,
     shows_class: bool,
 ) -> int:
@@ -107,8 +115,10 @@ def _check(
         print(f"{record.to_parameter()['student']}: results go to {record.master or environment.master_uri}")
         if exercise is None and not share:
             return 0
-    if exercise is not None and (share or shows_class):
-        raise Misuse(f"--{'share' if share else 'class'} takes no exercise")
+    if exercise is not None and (share or shows_class or snapshot is not None):
+        raise Misuse(f"--{'share' if share else 'class' if shows_class else 'snapshot'} takes no exercise")
+    if snapshot is not None:
+        return _write_snapshot(snapshot, environment)
     if share:
         from minirospy.course.share import share as share_state
 
@@ -158,6 +168,20 @@ def _run(word: str, work: list[str], patience: float, record: Record, master_uri
     except MinirospyError as error:
         warn(f"the result is stored, but not sent to the master {master_uri}: {error}")
     return 0 if report.passed else NOT_PASSED
+
+
+def _write_snapshot(name: str, environment: Environment) -> int:
+    from pathlib import Path
+
+    from minirospy.course.snapshot import write_snapshot
+
+    count, large = write_snapshot(Path(name), environment)
+    for file in large:
+        warn(f"{file} is left out: it is too large")
+    print(
+        f"{name}: {count} files of the workspace, the output of minirospy doctor, your results. Read it before you send it."
+    )
+    return 0
 
 
 def _ask(question: str) -> str:
