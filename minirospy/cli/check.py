@@ -71,6 +71,11 @@ def _parser() -> Parser:
     )
     add("--name", metavar="NAME", help="your name in the teacher's table, from now on", completer="nothing")
     add(
+        "--one-master",
+        action="store_true",
+        help='with --join: print the variables for a class with one master: eval "$(minirospy check --join URI --one-master)"',
+    )
+    add(
         "--snapshot",
         metavar="FILE.zip",
         help="write the workspace, `minirospy doctor` and your results into a file, for help",
@@ -96,6 +101,7 @@ def _check(
     patience: float,
     join: str | None,
     name: str | None,
+    one_master: bool,
     snapshot: str | None,
     share: bool,
     shows_class: bool,
@@ -107,11 +113,16 @@ def _check(
 
     environment = Environment.read()
     record = Record.read(environment)
+    if one_master and join is None:
+        raise Misuse("--one-master needs --join URI")
     if join is not None or name is not None:
         from minirospy.course.results import join as join_class
 
         join_class(record, join or "", name or "")
         record.write()
+        if one_master:
+            _print_exports(record)
+            return 0
         print(f"{record.to_parameter()['student']}: results go to {record.master or environment.master_uri}")
         if exercise is None and not share:
             return 0
@@ -170,6 +181,21 @@ def _run(word: str, work: list[str], patience: float, record: Record, master_uri
     return 0 if report.passed else NOT_PASSED
 
 
+def _print_exports(record: Record) -> None:
+    """Print the commands for a shell that make this terminal use the class's master, in the student's own namespace."""
+    import shlex
+
+    from minirospy.course.results import address_towards
+
+    values = {
+        "ROS_MASTER_URI": record.master,
+        "ROS_IP": address_towards(record.master),
+        "ROS_NAMESPACE": record.class_parameter.rpartition("/")[2],
+    }
+    for name, value in values.items():
+        print(f"export {name}={shlex.quote(value)}")
+
+
 def _write_snapshot(name: str, environment: Environment) -> int:
     from pathlib import Path
 
@@ -190,15 +216,20 @@ def _ask(question: str) -> str:
 
 
 def _tell(finding: Finding) -> None:
-    print(finding, flush=True)
+    from minirospy.base.escape import escaped
+
+    # A finding may quote what the student's program has printed.
+    print(escaped(str(finding)), flush=True)
 
 
 def _conclude(report: Report) -> None:
     """Print the last lines of programs that failed, and the result."""
+    from minirospy.base.escape import escaped
+
     for name, lines in report.output.items():
         print(f"The last lines of {name}:" if lines else f"{name} printed nothing.")
         for line in lines:
-            print(f"    {line}")
+            print(f"    {escaped(line)}")
     tried = [finding for finding in report.findings if finding.holds is not None]
     if report.passed:
         print(f"Passed: all {len(tried)} points hold.")

@@ -25,7 +25,17 @@ from minirospy.course.checker import Report
 from minirospy.course.exercise import built_in_names
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
-__all__ = ["CLASS_PARAMETER", "Record", "Result", "Student", "class_table", "gather", "join", "publish"]
+__all__ = [
+    "CLASS_PARAMETER",
+    "Record",
+    "Result",
+    "Student",
+    "address_towards",
+    "class_table",
+    "gather",
+    "join",
+    "publish",
+]
 
 CLASS_PARAMETER = "/minirospy_class"
 _MAX_FAILURES = 5  # sentences of a failed check that the teacher sees
@@ -176,6 +186,19 @@ def send(record: Record, uri: str) -> None:
             master.set_param(f"{record.class_parameter}/{part}", value)
     finally:
         master.close()
+
+
+def address_towards(uri: str) -> str:
+    """Return the address of this computer in the network of a master. Raise MinirospyError if there is no route to it."""
+    host, port, _ = split_uri(uri)
+    try:
+        family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        # Connecting a UDP socket sends nothing; it selects the address.
+        with socket.socket(family, kind, number) as probe:
+            probe.connect(address)
+            return str(probe.getsockname()[0])
+    except OSError as error:
+        raise MinirospyError(f"there is no route to {host}: {error.strerror or error}") from error
 
 
 def parameter_key(name: str) -> str:

@@ -116,6 +116,18 @@ def test_result_is_at_the_master(command: Command, master: str, question: str) -
     assert command("check", "--class").out == "         question\nAnna B.  yes\n"
 
 
+def test_one_master_is_one_command(command: Command, master: str) -> None:
+    result = command("check", "--join", master, "--name", "Jörg", "--one-master")
+    assert result.status == 0
+    names = dict(line.removeprefix("export ").split("=", 1) for line in result.out.splitlines())
+    assert names["ROS_MASTER_URI"] == master
+    assert names["ROS_IP"] in ("127.0.0.1", "::1")
+    # ROS accepts the namespace, and the shell needs no quotes.
+    assert names["ROS_NAMESPACE"].startswith("J_rg_")
+    assert names["ROS_NAMESPACE"].replace("_", "a").isalnum()
+    assert command("check", "--one-master").status == 2
+
+
 def test_class_has_another_master_than_the_robot(
     command: Command, master: str, question: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
