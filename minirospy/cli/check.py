@@ -185,11 +185,13 @@ def _print_exports(record: Record) -> None:
     """Print the commands for a shell that make this terminal use the class's master, in the student's own namespace."""
     import shlex
 
-    from minirospy.course.results import address_towards
+    from minirospy.base.environment import split_uri
+    from minirospy.introspect.doctor.reach import own_address_towards
 
     values = {
         "ROS_MASTER_URI": record.master,
-        "ROS_IP": address_towards(record.master),
+        # The master has just answered, so there is a route to it.
+        "ROS_IP": own_address_towards(split_uri(record.master)[0]),
         "ROS_NAMESPACE": record.class_parameter.rpartition("/")[2],
     }
     for name, value in values.items():

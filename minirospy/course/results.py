@@ -188,19 +188,6 @@ def send(record: Record, uri: str) -> None:
         master.close()
 
 
-def address_towards(uri: str) -> str:
-    """Return the address of this computer in the network of a master. Raise MinirospyError if there is no route to it."""
-    host, port, _ = split_uri(uri)
-    try:
-        family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        # Connecting a UDP socket sends nothing; it selects the address.
-        with socket.socket(family, kind, number) as probe:
-            probe.connect(address)
-            return str(probe.getsockname()[0])
-    except OSError as error:
-        raise MinirospyError(f"there is no route to {host}: {error.strerror or error}") from error
-
-
 def parameter_key(name: str) -> str:
     """Return a name as the last part of a parameter's name: letters, digits and underscores, and a letter first.
 
