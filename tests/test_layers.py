@@ -18,7 +18,7 @@ PACKAGE = Path(__file__).parents[1] / "minirospy"
 
 LAYERS = [
     {"cli"},
-    {"notebook"},
+    {"notebook", "course"},
     {"web", "fleet", "ros2"},
     {"zenoh"},
     {"ros"},
@@ -63,7 +63,7 @@ SIMULATION_PACKAGES = [
 ]
 """The packages of the simulation, which depend on each other."""
 LEAVES = {
-    **{room: [room] for room in ("web", "fleet", "ros2", "notebook")},
+    **{room: [room] for room in ("web", "fleet", "ros2", "notebook", "course")},
     "ROS packages": [f"ros/{package}" for package in OPTIONAL_PACKAGES],
     "ros_control": ["core/control", *(f"ros/{package}" for package in CONTROL_PACKAGES)],
     "gazebo_ros_control": ["ros/gazebo_ros_control"],
@@ -161,6 +161,7 @@ PURE_FILES = (
         )
     }
     | {PACKAGE / "web" / "dashboard" / "views.py"}
+    | {PACKAGE / "course" / name for name in ("exercise.py", "wording.py")}
     | {PACKAGE / "ros" / "turtlesim" / name for name in ("canvas.py", "square.py", "world.py")}
 )
 IMPURE_MODULES = {"asyncio", "socket", "threading", "select", "selectors", "subprocess"}

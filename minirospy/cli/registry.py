@@ -91,6 +91,7 @@ COMMANDS = (
           "console, plots, graph and board in a browser (as rqt)"),
     Entry("ros.roswtf.commands.doctor", "main", "DOCTOR", "", "doctor",
           "what is wrong here, in the network, in the graph (as roswtf)"),
+    Entry("cli.check", "main", "COMMAND", "", "check", "check your program for an exercise of the course"),
     Entry("cli.completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),
     # Shells call this command; users do not.
     Entry("cli.completion.complete", "main", "", "", "complete"),

@@ -342,6 +342,7 @@ def test_the_other_name_of_each_command() -> None:
         "make": "catkin_make",
         "demo": "",
         "board": "",
+        "check": "",
         "shell": "",
         "complete": "",
         "doctor": "",

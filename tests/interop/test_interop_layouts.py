@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3
 
 from minirospy.board.board import Board
+from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.page_modules import needs_node, run_script
@@ -137,13 +139,52 @@ def test_classroom_is_made_of_boards_and_robots() -> None:
     ]
     body = f"return classroom({{ boards: ['a', 'b c'], topics: {json.dumps(topics)} }})"
     assert run_script("classroom", "js/presets.js", body) == (
-        "column(row(board?board=a,board?board=b+c),"
+        "column(class,row(board?board=a,board?board=b+c),"
         "row(plot?path=%2Fblue%2Fbutton_state&window=30,topics?filter=%2Fgreen%2F),row(teleop?topic=%2Fred%2Fcmd_vel),console)"
     )
     assert (
         run_script("classroom", "js/presets.js", "return classroom({ boards: [], topics: [] })")
-        == "row(board,console)"
+        == "column(class,row(board,console))"
     )
+
+
+CLASS = {
+    "/minirospy_class/ben/student": "Ben",
+    "/minirospy_class/ben/exercises/move_light/passed": False,
+    "/minirospy_class/ben/exercises/move_light/ever": False,
+    "/minirospy_class/ben/exercises/move_light/number": 6,
+    "/minirospy_class/ben/exercises/move_light/failures": ["The LED lights: it stays dark"],
+    "/minirospy_class/anna/student": "<b>Anna</b>",
+    "/minirospy_class/anna/exercises/count/passed": False,
+    "/minirospy_class/anna/exercises/count/ever": True,
+    "/minirospy_class/anna/exercises/count/number": 2,
+    "/minirospy_class/anna/now/leds": "000001",
+    "/minirospy_class/anna/now/buttons": "00",
+    "/minirospy_class/anna/now/nodes": ["/my_led", "/my_button"],
+    "/minirospy_class/anna/now/beat": 1,
+    "/minirospy_class/hostile/now/leds": "<img>",
+    "/minirospy_class/hostile/exercises/__proto__/passed": True,
+    "/minirospy_class/hostile/student": 5,
+    "/minirospy_class/bad name/student": "x",
+    "/robot/name": "Rosie",
+}
+"""What students' computers set at the class's master, and what a hostile node may set."""
+
+
+@needs_node
+def test_class_is_read_from_parameters() -> None:
+    body = f"""
+      const {{ exercises, students }} = classTable(new Map(Object.entries({json.dumps(CLASS)})));
+      return [exercises, students.map((s) => [s.name, Object.fromEntries(s.results), s.leds, s.nodes.length])];
+    """
+    exercises, students = run_script("classTable", "js/classroom.js", body)
+    assert exercises == ["count", "move_light", "__proto__"]
+    dark = {"passed": False, "ever": False, "failures": ["The LED lights: it stays dark"]}
+    assert students[:2] == [
+        ["<b>Anna</b>", {"count": {"passed": False, "ever": True, "failures": []}}, "000001", 2],
+        ["Ben", {"move_light": dark}, "", 0],
+    ]
+    assert [name for name, *_ in students] == ["<b>Anna</b>", "Ben", "hostile"]
 
 
 @needs_node
@@ -453,6 +494,28 @@ def test_classroom_shows_the_boards_side_by_side(
                 f" e.querySelector('select[aria-label=Board]').value === '{board.name}'"
                 " && e.querySelector('.lit[aria-label=\"LED GPIO 7 red on\"]'))"
             )
+
+
+@needs_chromium
+def test_classroom_shows_the_exercises_of_each_student(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    master = MasterProxy(os.environ["ROS_MASTER_URI"], "/students")
+    with contextlib.closing(master):
+        for name, value in CLASS.items():
+            if " " not in name:
+                master.set_param(name, value)
+        page = browse(address(served, "layout?preset=classroom"), width=1400, height=900)
+        page.wait_text(".class-table th[scope=row]", "<b>Anna</b>")
+        page.wait_text(".class-table .class-yes", "passed")
+        page.wait_text(".class-table .class-no", "not yet")
+        page.wait_text(".class-failures li", "The LED lights: it stays dark")
+        page.wait("return document.querySelectorAll('.class-led.red').length === 1")
+        # The next result is shown at once, and nothing on this page acts on a student's computer.
+        master.set_param("/minirospy_class/ben/exercises/move_light/ever", True)
+        page.wait("return document.querySelectorAll('.class-yes').length >= 2")
+        assert page.evaluate("document.querySelectorAll('[data-view=class] button').length") == 0
 
 
 @needs_chromium

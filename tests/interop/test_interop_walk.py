@@ -52,6 +52,7 @@ SEEN = {
     "trajectory": (".joint .name", "shoulder"),
     "smach": (".smach-state", "DOCK"),
     "diagnostics": (".report", "Battery"),
+    "class": (".class-table th", "Anna"),
 }
 """A selector for each view, and a text that the selected element shows for the scene in any language."""
 
@@ -116,6 +117,7 @@ def furnish(served: Served) -> None:
 
     async def others() -> None:
         await served.node_of_dashboard.set_param("/robot_description", robot_scene.description())
+        await served.node_of_dashboard.set_param("/minirospy_class/anna/student", "Anna")
         await server.serve("/set_led_state", SetBool, lambda request: (request.data, "set"))
 
     server = served.node("led")

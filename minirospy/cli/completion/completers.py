@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from minirospy.workspace.packages import Packages
 
 __all__ = [
-    "LIVE_SECONDS", "Completer", "Cursor", "Text", "bag_files", "build_targets", "files", "folders", "kinds", "launch_files",
+    "LIVE_SECONDS", "Completer", "Cursor", "Text", "bag_files",
+    "build_targets", "exercise_work", "exercises", "files", "folders", "kinds", "launch_files",
     "launch_nodes", "launch_words", "loggers", "machines", "message_text", "message_types", "nodes",
     "nothing", "on_one_line", "package_file", "package_file_and_target", "package_folders", "package_names",
     "package_path", "parameter_value", "parameters", "pins", "prototype_types", "request_text",
@@ -154,6 +155,24 @@ def files(cursor: Cursor) -> Iterable[str]:
 def bag_files(cursor: Cursor) -> Iterable[str]:
     """Return local bag files and folders."""
     return [name for name in files(cursor) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
+
+
+def exercises(cursor: Cursor) -> Iterable[str]:
+    """Return the exercises of the course, and local YAML files."""
+    from minirospy.course.exercise import built_in_names
+
+    return [*built_in_names(), *(name for name in files(cursor) if name.endswith(("/", ".yaml", ".yml")))]
+
+
+def exercise_work(cursor: Cursor) -> Iterable[str]:
+    """Return local files and folders; after a package's name and a slash, the package's programs and launch files."""
+    package, slash, _ = cursor.word.partition("/")
+    found = list(files(cursor))
+    if slash and not found and package:
+        folder = _packages().find(package)
+        names = {*_packages().executables(package), *_names_below(folder, _LAUNCH)}
+        found = [f"{package}/{name}" for name in sorted(names)]
+    return [*found, *(f"{name}/" for name in _packages().names())] if not slash else found
 
 
 def folders(cursor: Cursor) -> Iterable[str]:

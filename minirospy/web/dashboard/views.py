@@ -37,6 +37,7 @@ VIEWS = (
     "trajectory",
     "smach",
     "diagnostics",
+    "class",
     "panels",
     "layout",
 )

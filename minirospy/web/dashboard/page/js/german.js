@@ -992,4 +992,13 @@ export const GERMAN = {
   "Put the joint there (m or rad)": "Das Gelenk dorthin stellen (m oder rad)",
   "Apply this force (N or N m)": "Diese Kraft wirken lassen (N oder N m)",
   "{name}: {why}": "{name}: {why}",
+  // the class
+  "Class": "Klasse",
+  "Student": "Name",
+  "passed": "geschafft",
+  "not yet": "noch nicht",
+  "no LED is lit": "keine LED leuchtet",
+  "{count} students, {passed} exercises passed": "{count} Teilnehmende, {passed} Aufgaben geschafft",
+  "No results yet. Each student types `minirospy check --join {uri} --name NAME` once.":
+    "Noch keine Ergebnisse. Alle tippen einmal `minirospy check --join {uri} --name NAME`.",
 };

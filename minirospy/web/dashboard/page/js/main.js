@@ -10,6 +10,7 @@ import { fill, h, setText, watchPresses } from "./dom.js";
 import { Actions } from "./views/actions.js";
 import { Bag } from "./views/bag.js";
 import { Board } from "./views/board.js";
+import { Class } from "./views/class.js";
 import { Console } from "./views/console.js";
 import { Controllers } from "./views/controllers.js";
 import { Diagnostics } from "./views/diagnostics.js";
@@ -61,6 +62,7 @@ const VIEWS = {
   trajectory: ["Trajectory", Trajectory, "Drive"],
   smach: ["State machines", Smach, "System"],
   diagnostics: ["Diagnostics", Diagnostics, "Look"],
+  class: ["Class", Class, "System"],
   panels: ["Panels", Panels, "Look"],
   layout: ["Layouts", Layouts, "Look"],
 };

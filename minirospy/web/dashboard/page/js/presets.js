@@ -44,7 +44,10 @@ export function robotsOf(topics) {
   return [...found].sort();
 }
 
-/** Return the layout of a classroom: boards in a grid, below them for each robot what drives it or what it has. */
+/**
+ * Return the layout of a classroom: the table of the class, boards in a grid, below them for each robot what drives it
+ * or what it has. The table is there before the first result, because the teacher opens the page first.
+ */
 export function classroom({ boards, topics }) {
   const names = new Set(topics);
   const query = (words) => new URLSearchParams(words).toString();
@@ -57,7 +60,7 @@ export function classroom({ boards, topics }) {
       return `topics?${query({ filter: `${space}/` })}`;
     });
   const rows = [...grid(cells), ...grid(robots)];
-  return rows.length ? `column(${[...rows, "console"].join(",")})` : "row(board,console)";
+  return `column(${["class", ...(rows.length ? [...rows, "console"] : ["row(board,console)"])].join(",")})`;
 }
 
 /** Return rows of about as many cells as there are rows, three at most. */

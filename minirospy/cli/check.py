@@ -1,0 +1,284 @@
+"""`minirospy check`: run a student's program on a new master and a new virtual board, and print what holds and what does not."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFoundError, SourceError
+from minirospy.command.command import RosText, WordedError, warn
+from minirospy.command.parser import Misuse, Parser
+from minirospy.command.verbs import Command
+
+if TYPE_CHECKING:
+    from minirospy.base.environment import Environment
+    from minirospy.course.checker import Finding, Report
+    from minirospy.course.exercise import Exercise
+    from minirospy.course.results import Record
+
+__all__ = ["COMMAND", "main"]
+
+NOT_PASSED = 1
+NOT_CHECKED = 3
+
+_EPILOG = """\
+Exit status: 0 passed, 1 not passed, 2 usage error, 3 the check itself could not run (no such exercise or program, an error in
+the exercise's file), 130 interrupted."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; return 0 if the exercise is passed, 1 if not, 2 for usage errors, 3 if it could not be checked."""
+    return COMMAND.main(argv)
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        "minirospy check",
+        "Check your program for an exercise of the course. It runs on a new master and a new virtual board, so that nothing "
+        "that runs is disturbed. Without arguments, list the exercises and those that you have passed.",
+        epilog=_EPILOG,
+    )
+    add = parser.add_argument
+    add(
+        "exercise",
+        nargs="?",
+        help="the exercise, or the YAML file of your own: ./my_exercise.yaml",
+        completer="exercises",
+    )
+    add(
+        "work",
+        nargs="*",
+        metavar="FILE",
+        help="your programs or launch file, as FILE or PACKAGE/PROGRAM (those that the page names), or your answers",
+        completer="exercise_work",
+    )
+    add(
+        "--patience",
+        type=float,
+        default=1.0,
+        metavar="N",
+        help="multiply all time limits: 3 for a slow computer",
+        completer="nothing",
+    )
+    add(
+        "--join",
+        metavar="URI",
+        help="send your results to the teacher's master from now on: http://192.168.65.50:11311",
+        completer="nothing",
+    )
+    add("--name", metavar="NAME", help="your name in the teacher's table, from now on", completer="nothing")
+    add(
+        "--one-master",
+        action="store_true",
+        help='with --join: print the variables for a class with one master: eval "$(minirospy check --join URI --one-master)"',
+    )
+    add(
+        "--snapshot",
+        metavar="FILE.zip",
+        help="write the workspace, `minirospy doctor` and your results into a file, for help",
+        completer="files",
+    )
+    add(
+        "--share",
+        action="store_true",
+        help="show your board and your nodes on the teacher's page until Ctrl-C",
+    )
+    add(
+        "--class",
+        dest="shows_class",
+        action="store_true",
+        help="print the results of all students at the master",
+    )
+    return parser
+
+
+def _check(
+    exercise: str | None,
+    work: list[str],
+    patience: float,
+    join: str | None,
+    name: str | None,
+    one_master: bool,
+    snapshot: str | None,
+    share: bool,
+    shows_class: bool,
+) -> int:
+    if not 0.1 <= patience <= 100:
+        raise Misuse("--patience takes a number from 0.1 to 100")
+    from minirospy.base.environment import Environment
+    from minirospy.course.results import Record
+
+    environment = Environment.read()
+    record = Record.read(environment)
+    if one_master and join is None:
+        raise Misuse("--one-master needs --join URI")
+    if join is not None or name is not None:
+        from minirospy.course.results import join as join_class
+
+        join_class(record, join or "", name or "")
+        record.write()
+        if one_master:
+            _print_exports(record)
+            return 0
+        print(f"{record.to_parameter()['student']}: results go to {record.master or environment.master_uri}")
+        if exercise is None and not share:
+            return 0
+    if exercise is not None and (share or shows_class or snapshot is not None):
+        raise Misuse(f"--{'share' if share else 'class' if shows_class else 'snapshot'} takes no exercise")
+    if snapshot is not None:
+        return _write_snapshot(snapshot, environment)
+    if share:
+        from minirospy.course.share import share as share_state
+
+        print(
+            "Your board and your nodes are on the teacher's page, which only shows them; Ctrl-C ends it.",
+            flush=True,
+        )
+        with contextlib.suppress(KeyboardInterrupt):
+            share_state(record, environment)
+        return 0
+    if shows_class:
+        return _show_class(record.master or environment.master_uri)
+    if exercise is None:
+        return _list(record)
+    try:
+        return _run(exercise, work, patience, record, environment.master_uri)
+    except (NotFoundError, SourceError) as error:
+        raise WordedError(error, RosText("", NOT_CHECKED)) from error
+
+
+def _run(word: str, work: list[str], patience: float, record: Record, master_uri: str) -> int:
+    from minirospy.base.environment import Environment
+    from minirospy.course.checker import check, words_of
+    from minirospy.course.exercise import find_exercise
+    from minirospy.course.results import publish
+
+    exercise = find_exercise(word)
+    programs, answers = words_of(exercise, work)
+    print(f"{exercise.name}: {exercise.title}", flush=True)
+    if exercise.live and exercise.task and not exercise.questions:
+        print(exercise.task, flush=True)
+    report = check(
+        exercise,
+        programs,
+        answers=answers,
+        ask=_ask if sys.stdin.isatty() else None,
+        patience=patience,
+        tell=_tell,
+    )
+    _conclude(report)
+    record.add(report)
+    record.write()
+    try:
+        publish(record, Environment.read())
+    except MasterUnreachableError as error:
+        warn(f"the result is stored, but not sent to the teacher: {error}")
+    except MinirospyError as error:
+        warn(f"the result is stored, but not sent to the master {master_uri}: {error}")
+    return 0 if report.passed else NOT_PASSED
+
+
+def _print_exports(record: Record) -> None:
+    """Print the commands for a shell that make this terminal use the class's master, in the student's own namespace."""
+    import shlex
+
+    from minirospy.base.environment import split_uri
+    from minirospy.introspect.doctor.reach import own_address_towards
+
+    values = {
+        "ROS_MASTER_URI": record.master,
+        # The master has just answered, so there is a route to it.
+        "ROS_IP": own_address_towards(split_uri(record.master)[0]),
+        "ROS_NAMESPACE": record.class_parameter.rpartition("/")[2],
+    }
+    for name, value in values.items():
+        print(f"export {name}={shlex.quote(value)}")
+
+
+def _write_snapshot(name: str, environment: Environment) -> int:
+    from pathlib import Path
+
+    from minirospy.course.snapshot import write_snapshot
+
+    count, large = write_snapshot(Path(name), environment)
+    for file in large:
+        warn(f"{file} is left out: it is too large")
+    print(
+        f"{name}: {count} files of the workspace, the output of minirospy doctor, your results. Read it before you send it."
+    )
+    return 0
+
+
+def _ask(question: str) -> str:
+    print(f"{question} ", end="", flush=True)
+    return sys.stdin.readline()
+
+
+def _tell(finding: Finding) -> None:
+    from minirospy.base.escape import escaped
+
+    # A finding may quote what the student's program has printed.
+    print(escaped(str(finding)), flush=True)
+
+
+def _conclude(report: Report) -> None:
+    """Print the last lines of programs that failed, and the result."""
+    from minirospy.base.escape import escaped
+
+    for name, lines in report.output.items():
+        print(f"The last lines of {name}:" if lines else f"{name} printed nothing.")
+        for line in lines:
+            print(f"    {escaped(line)}")
+    tried = [finding for finding in report.findings if finding.holds is not None]
+    if report.passed:
+        print(f"Passed: all {len(tried)} points hold.")
+    else:
+        skipped = len(report.findings) - len(tried)
+        more = f", {skipped} were not tried" if skipped else ""
+        print(f"Not passed: {len(report.failures)} of {len(tried)} points do not hold{more}.")
+
+
+def _list(record: Record) -> int:
+    from minirospy.course.exercise import built_in_names, find_exercise
+
+    exercises = [find_exercise(name) for name in built_in_names()]
+    width = max(len(exercise.name) for exercise in exercises)
+    passed = 0
+    for exercise in exercises:
+        result = record.results.get(exercise.name)
+        passed += bool(result and result.ever)
+        print(f"{_state(record, exercise):<10} {exercise.name:<{width}}  {exercise.title} ({exercise.page})")
+    print(f"{passed} of {len(exercises)} passed on this computer. Check one: minirospy check EXERCISE [FILE]")
+    return 0
+
+
+def _state(record: Record, exercise: Exercise) -> str:
+    result = record.results.get(exercise.name)
+    return "-" if result is None else "passed" if result.ever else "not passed"
+
+
+def _show_class(uri: str) -> int:
+    from minirospy.base.escape import escaped
+    from minirospy.course.exercise import built_in_names
+    from minirospy.course.results import class_table, gather
+
+    students = gather(uri)
+    if not students:
+        print(f"No results at {uri} yet: students type `minirospy check --join {uri} --name NAME` once.")
+        return 0
+    table = [[escaped(cell) for cell in row] for row in class_table(students, built_in_names())]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for row in table:
+        print("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())
+    for student in students:
+        for name, result in student.results.items():
+            if not result.passed and result.failures:
+                when = time.strftime("%H:%M", time.localtime(result.time))
+                print(escaped(f"{student.name}, {name}, {when}: {result.failures[0]}"))
+    return 0
+
+
+COMMAND = Command("minirospy check", _parser, _check, interrupted=130)

@@ -1,0 +1,245 @@
+"""What a computer has passed: a file in ROS_HOME, and a parameter at the master that the class shares.
+
+The parameter ``/minirospy_class/STUDENT`` is a dictionary: the student's name, and the exercises. A parameter stays at the
+master after the check has ended, so that the teacher's page shows it whenever it is opened.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import socket
+import tempfile
+import time
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from minirospy.base.environment import Environment, split_uri
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcRefused, UsageError
+from minirospy.base.escape import escaped
+from minirospy.course.checker import Report
+from minirospy.course.exercise import built_in_names
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+__all__ = [
+    "CLASS_PARAMETER",
+    "Record",
+    "Result",
+    "Student",
+    "address_towards",
+    "class_table",
+    "gather",
+    "join",
+    "publish",
+]
+
+CLASS_PARAMETER = "/minirospy_class"
+_MAX_FAILURES = 5  # sentences of a failed check that the teacher sees
+_MAX_LETTERS = 300  # characters of such a sentence
+_MAX_NAME = 60  # characters of a student's name
+_SECONDS = 3.0  # timeout for the class's master: a check must not wait for a computer that has left
+
+
+@dataclass(frozen=True)
+class Result:
+    """The last result of one exercise: when (seconds since 1970), and what did not hold. ``ever`` is true once it was passed."""
+
+    passed: bool
+    time: float
+    ever: bool = False
+    failures: tuple[str, ...] = ()
+
+
+@dataclass
+class Record:
+    """The results of this computer, the student's name, and the URI of the class's master (empty: ROS_MASTER_URI)."""
+
+    path: Path
+    student: str = ""
+    master: str = ""
+    results: dict[str, Result] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, environment: Environment) -> Record:
+        """Read the record; an unreadable file counts as empty, because a check must not fail for it."""
+        record = cls(environment.home / "minirospy_class.json")
+        try:
+            found = json.loads(record.path.read_text(encoding="utf-8"))
+            record.student = str(found.get("student", ""))
+            record.master = str(found.get("master", ""))
+            record.results = {
+                str(name): _result_of(each) for name, each in dict(found.get("exercises", {})).items()
+            }
+        except (OSError, ValueError, TypeError, AttributeError, KeyError):
+            pass
+        return record
+
+    @property
+    def class_parameter(self) -> str:
+        """Return the name of this computer's parameter at the class's master."""
+        return f"{CLASS_PARAMETER}/{parameter_key(self.student or default_name())}"
+
+    def add(self, report: Report) -> None:
+        """Add the result of a check."""
+        name = report.exercise.name
+        before = self.results.get(name)
+        # A student's program may print control characters, which XML-RPC cannot send.
+        failures = tuple(
+            escaped(f"{each.sentence}: {each.observed}")[:_MAX_LETTERS] for each in report.failures
+        )
+        self.results[name] = Result(
+            report.passed,
+            time.time(),
+            report.passed or bool(before and before.ever),
+            failures[:_MAX_FAILURES],
+        )
+
+    def write(self) -> None:
+        """Write the file, completely or not at all. Raise MinirospyError if it cannot be written."""
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name)
+            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+                json.dump({**self.to_parameter(), "master": self.master}, stream, indent=1)
+            os.replace(name, self.path)
+        except OSError as error:
+            raise MinirospyError(f"{self.path} cannot be written: {error.strerror}") from error
+
+    def to_parameter(self) -> dict[str, Any]:
+        """Return the record as the value of a parameter. ``number`` is an exercise's place in the course."""
+        numbers = {name: number for number, name in enumerate(built_in_names())}
+        return {
+            "student": self.student or default_name(),
+            "exercises": {
+                name: {
+                    "passed": each.passed,
+                    "ever": each.ever,
+                    "time": each.time,
+                    "failures": list(each.failures),
+                    "number": numbers.get(name, len(numbers)),
+                }
+                for name, each in self.results.items()
+            },
+        }
+
+
+@dataclass(frozen=True)
+class Student:
+    """A row of the class's table: the results of a computer. ``key`` is the last part of its parameter's name."""
+
+    key: str
+    name: str
+    results: Mapping[str, Result]
+
+
+def default_name() -> str:
+    """Return the name in the class's table if the student has given none: that of the board or of the computer."""
+    return os.environ.get("MINIROSPY_BOARD") or socket.gethostname().partition(".")[0]
+
+
+def join(record: Record, uri: str, name: str) -> None:
+    """Store the class's master and the student's name for all later checks.
+
+    Raise UsageError if the URI is not one, MasterUnreachableError if no master responds there.
+    """
+    if uri:
+        if "://" not in uri:
+            uri = f"http://{uri}" if ":" in uri else f"http://{uri}:11311"
+        try:
+            split_uri(uri)
+        except ValueError:
+            raise UsageError(
+                f"[{uri}] is not the URI of a master, such as http://192.168.65.50:11311"
+            ) from None
+        record.master = uri
+    if name:
+        record.student = escaped(name)[:_MAX_NAME]
+    if uri:
+        send(record, uri)
+
+
+def publish(record: Record, environment: Environment) -> str:
+    """Send the record to the class's master. Return its URI, or an empty string if there is no such master.
+
+    Raise MasterUnreachableError only if the student has joined a class whose master does not respond.
+    """
+    uri = record.master or environment.master_uri
+    try:
+        send(record, uri)
+    except MasterUnreachableError:
+        if record.master:
+            raise
+        return ""
+    return uri
+
+
+def send(record: Record, uri: str) -> None:
+    """Send the record to a master. Raise MasterUnreachableError if it does not respond."""
+    master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=_SECONDS)
+    try:
+        # One call for each part: what the computer shows now (share.py) stays.
+        for part, value in record.to_parameter().items():
+            master.set_param(f"{record.class_parameter}/{part}", value)
+    finally:
+        master.close()
+
+
+def parameter_key(name: str) -> str:
+    """Return a name as the last part of a parameter's name: letters, digits and underscores, and a letter first.
+
+    A checksum keeps names apart that differ only in other characters, such as Jörg and Jürg.
+    """
+    text = re.sub(r"\W", "_", name, flags=re.ASCII)[:_MAX_NAME]
+    if text != name:
+        text = f"{text}_{zlib.crc32(name.encode()):08x}"
+    return text if text[:1].isalpha() else f"c_{text}"
+
+
+def gather(uri: str) -> list[Student]:
+    """Return the students whose results a master has, sorted by name. Raise MasterUnreachableError if it does not respond.
+
+    A value that is not a record, which any node may have set, is left out.
+    """
+    master = MasterProxy(uri, f"/class_{os.getpid()}", timeout=_SECONDS)
+    try:
+        found = master.get_param(CLASS_PARAMETER)
+    except RpcRefused:
+        found = {}
+    finally:
+        master.close()
+    students = []
+    for key, value in found.items() if isinstance(found, dict) else ():
+        try:
+            results = {str(name): _result_of(each) for name, each in value["exercises"].items()}
+            students.append(Student(str(key), str(value["student"])[:_MAX_NAME], results))
+        except (KeyError, TypeError, ValueError, AttributeError):
+            continue
+    return sorted(students, key=lambda student: student.name.lower())
+
+
+def class_table(students: list[Student], names: list[str]) -> list[list[str]]:
+    """Return the rows of the class's table, with its head: yes, no (not passed yet), or nothing (not tried)."""
+    used = [name for name in names if any(name in student.results for student in students)]
+    used += sorted({name for student in students for name in student.results} - set(names))
+    marks = {student.key: [_mark(student.results.get(name)) for name in used] for student in students}
+    return [["", *used], *([student.name, *marks[student.key]] for student in students)]
+
+
+def _mark(result: Result | None) -> str:
+    return "" if result is None else "yes" if result.ever else "no"
+
+
+def _result_of(found: Mapping[str, Any]) -> Result:
+    failures = found.get("failures", [])
+    texts = (
+        tuple(str(each)[:_MAX_LETTERS] for each in failures[:_MAX_FAILURES])
+        if isinstance(failures, list)
+        else ()
+    )
+    return Result(
+        bool(found["passed"]), float(found.get("time", 0.0)), bool(found.get("ever", found["passed"])), texts
+    )

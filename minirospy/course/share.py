@@ -1,0 +1,67 @@
+"""Show a student's board and nodes in the class's table: `minirospy check --share`.
+
+The state goes to the class's master as a parameter, in one direction only: the teacher's page cannot change anything on the
+student's computer.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcError
+from minirospy.board.board import Board
+from minirospy.board.model import BUTTONS, LEDS
+from minirospy.course.results import Record
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+__all__ = ["share"]
+
+_POLL_SECONDS = 0.2  # an LED that blinks faster than 2.5 Hz is shown at some of its states
+_BEAT_SECONDS = 3.0  # the page shows a computer as gone after three beats without one
+_ASK_SECONDS = 2.0  # timeout for a master that does not answer
+
+
+def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:
+    """Send the state of the board and the number of nodes until ``ended()`` is true.
+
+    Raise MasterUnreachableError if the class's master does not respond at the start; later losses are retried.
+    """
+    uri = record.master or environment.master_uri
+    with (
+        Board() as board,
+        contextlib.closing(MasterProxy(uri, "/check_share", timeout=_ASK_SECONDS)) as master,
+    ):
+        master.get_pid()
+        beat, sent, due = 0, "", 0.0
+        while not ended():
+            pins = "".join(str(board.get(pin)) for pin in (*LEDS, *BUTTONS))
+            now = time.monotonic()
+            if pins != sent or now >= due:
+                beat += 1
+                state = {
+                    "leds": pins[: len(LEDS)],
+                    "buttons": pins[len(LEDS) :],
+                    "nodes": _nodes(environment),
+                    "beat": beat,
+                }
+                # The teacher's computer may be away for a moment: the next beat tries again.
+                with contextlib.suppress(MasterUnreachableError, RpcError):
+                    master.set_param(f"{record.class_parameter}/now", state)
+                    sent = pins
+                due = now + _BEAT_SECONDS
+            time.sleep(_POLL_SECONDS)
+
+
+def _nodes(environment: Environment) -> list[str]:
+    """Return the names of the nodes at the student's own master, at most ten."""
+    master = MasterProxy(environment.master_uri, "/check_share", timeout=_ASK_SECONDS)
+    try:
+        state = master.get_system_state()
+    except (MinirospyError, RpcError):
+        return []
+    finally:
+        master.close()
+    return sorted({node for table in state for nodes in table.values() for node in nodes} - {"/rosout"})[:10]

@@ -1,0 +1,96 @@
+"""A snapshot of a student's workspace for help: sources, the output of `minirospy doctor`, and the results, in one zip file."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError
+from minirospy.course.results import Record
+
+__all__ = ["write_snapshot"]
+
+_MAX_FILE_BYTES = 1_000_000  # bags, models and videos are left out
+_MAX_FILES = 2000
+_LEFT_OUT = frozenset(
+    {".git", "__pycache__", "node_modules", ".venv", "venv", "build", "devel", "install", "logs"}
+)
+_VARIABLES = (
+    "ROS_MASTER_URI",
+    "ROS_IP",
+    "ROS_HOSTNAME",
+    "ROS_NAMESPACE",
+    "ROS_PACKAGE_PATH",
+    "MINIROSPY_BOARD",
+    "MINIROSPY_LOCAL",
+)
+_DOCTOR_SECONDS = 60.0
+
+
+def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]]:
+    """Write the snapshot; return the number of the workspace's files in it, and the files that are too large.
+
+    The workspace is the folders of ROS_PACKAGE_PATH. Hidden files, which may be keys and passwords, and build folders are left
+    out. Raise MinirospyError if there is no workspace, or if the file exists or cannot be written.
+    """
+    roots = [root for root in environment.package_path if root.is_dir() and os.access(root, os.W_OK)]
+    if not roots:
+        raise MinirospyError("no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`")
+    count, large = 0, []
+    try:
+        with zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED) as archive:
+            for number, root in enumerate(roots, 1):
+                prefix = root.parent.name if len(roots) == 1 else f"{number}_{root.parent.name}"
+                for path in _files(root):
+                    if path.stat().st_size > _MAX_FILE_BYTES or count >= _MAX_FILES:
+                        large.append(str(path))
+                        continue
+                    archive.write(path, f"{prefix}/{path.relative_to(root).as_posix()}")
+                    count += 1
+            archive.writestr("doctor.txt", _doctor())
+            archive.writestr("results.json", json.dumps(Record.read(environment).to_parameter(), indent=1))
+            variables = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
+            archive.writestr(
+                "variables.txt", "".join(f"{name}={value}\n" for name, value in variables.items())
+            )
+    except FileExistsError:
+        raise MinirospyError(f"{file} exists: name another file") from None
+    except OSError as error:
+        raise MinirospyError(f"{file} cannot be written: {error.strerror}") from error
+    return count, large
+
+
+def _files(root: Path) -> list[Path]:
+    """Return the files below a folder, sorted, without links out of it."""
+    found = []
+    for folder, inner, names in os.walk(root):
+        inner[:] = sorted(each for each in inner if each not in _LEFT_OUT and not each.startswith("."))
+        for name in sorted(names):
+            path = Path(folder, name)
+            with contextlib.suppress(OSError):
+                if not name.startswith(".") and path.is_file() and not path.is_symlink():
+                    found.append(path)
+    return found
+
+
+def _doctor() -> str:
+    """Return the output of `minirospy doctor`."""
+    command = [sys.executable, "-m", "minirospy", "doctor"]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            check=False,
+            timeout=_DOCTOR_SECONDS,
+        )
+    except subprocess.TimeoutExpired as error:
+        return (error.stdout or b"").decode(errors="replace") + "\nminirospy doctor did not end\n"
+    return done.stdout.decode(errors="replace")

@@ -1,0 +1,125 @@
+// Class: the students at this master, their boards, and the exercises that each has passed. Only shows.
+
+import { classTable } from "../classroom.js";
+import { h, refill, setText } from "../dom.js";
+import { t } from "../texts.js";
+
+const COLORS = ["green", "green", "yellow", "yellow", "red", "red"]; // of the board's LEDs
+const GONE_MS = 10000; // without a beat of `minirospy check --share`, which come every three seconds
+
+export class Class {
+  constructor(link, words, main) {
+    this.link = link;
+    this.beats = new Map(); // key -> {beat, at}
+    this.count = h("span", { class: "muted" });
+    this.head = h("tr", {});
+    this.body = h("tbody", {});
+    this.table = h("table", { class: "goals class-table" }, h("thead", {}, this.head), this.body);
+    this.empty = h("p", { class: "empty" });
+    this.failed = h("ul", { class: "class-failures" });
+    main.append(
+      h("div", { class: "bar" }, this.count),
+      h(
+        "div",
+        {
+          class: "panel scroll",
+          tabindex: "0",
+          role: "region",
+          "aria-label": t("Class"),
+        },
+        this.table,
+        this.empty,
+        this.failed,
+      ),
+    );
+    this.ending = link.watch(["parameters"], () => this.update());
+    this.timer = setInterval(() => this.update(), GONE_MS / 2);
+  }
+
+  close() {
+    clearInterval(this.timer);
+    this.ending();
+  }
+
+  update() {
+    const { exercises, students } = classTable(this.link.parameters);
+    const now = performance.now();
+    for (const { key, beat } of students) {
+      if (this.beats.get(key)?.beat !== beat) this.beats.set(key, { beat, at: now });
+    }
+    // Nothing is drawn again that has not changed, so that what a person has selected stays.
+    const isLive = (student) => student.beat > 0 && now - this.beats.get(student.key).at < GONE_MS;
+    const live = students.filter(isLive).map(({ key }) => key);
+    const all = JSON.stringify([exercises, students.map((each) => [each, [...each.results]]), live]);
+    if (all === this.drawn) return;
+    this.drawn = all;
+    const passed = students.flatMap(({ results }) => [...results.values()].filter(({ ever }) => ever)).length;
+    setText(
+      this.count,
+      t("{count} students, {passed} exercises passed", {
+        count: students.length,
+        passed,
+      }),
+    );
+    this.table.hidden = !students.length;
+    setText(
+      this.empty,
+      students.length
+        ? ""
+        : t("No results yet. Each student types `minirospy check --join {uri} --name NAME` once.", { uri: "URI" }),
+    );
+    refill(this.head, [
+      h("th", { scope: "col" }, t("Student")),
+      h("th", { scope: "col" }, t("Board")),
+      ...exercises.map((name) => h("th", { scope: "col" }, name)),
+    ]);
+    refill(
+      this.body,
+      students.map((student) =>
+        h(
+          "tr",
+          {},
+          h("th", { scope: "row" }, student.name),
+          h("td", { title: student.nodes.join("\n") }, live.includes(student.key) ? board(student) : ""),
+          exercises.map((name) => mark(student.results.get(name))),
+        ),
+      ),
+    );
+    refill(
+      this.failed,
+      students.flatMap((student) =>
+        [...student.results]
+          .filter(([, { passed: isPassed, failures }]) => !isPassed && failures.length)
+          .map(([name, { failures }]) => h("li", {}, h("b", {}, `${student.name}, ${name}: `), failures[0])),
+      ),
+    );
+  }
+}
+
+function board(student) {
+  const lit = [...student.leds].map((level, index) =>
+    h("span", {
+      class: level === "1" ? `class-led ${COLORS[index]}` : "class-led",
+      "aria-hidden": "true",
+    }),
+  );
+  const on = [...student.leds].flatMap((level, index) => (level === "1" ? [`GPIO ${index + 2}`] : []));
+  const nodes = t("{count} nodes", { count: student.nodes.length });
+  return [
+    h("span", { role: "img", "aria-label": on.join(", ") || t("no LED is lit") }, lit),
+    h("span", { class: "muted" }, nodes),
+  ];
+}
+
+function mark(result) {
+  if (!result) return h("td", {}, "");
+  const text = result.ever ? t("passed") : t("not yet");
+  return h(
+    "td",
+    {
+      class: result.ever ? "class-yes" : "class-no",
+      title: result.failures.join("\n"),
+    },
+    text,
+  );
+}

@@ -1,0 +1,168 @@
+"""`minirospy check`: its output, exit status, record and the class's table."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from minirospy.base.environment import Environment
+from minirospy.course.exercise import built_in_names
+from minirospy.course.results import CLASS_PARAMETER, Record, gather
+from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+from .conftest import Command
+
+PASSES = "name: {}\ntitle: A title\nlive: true\nsteps:\n- {{answer: 'What?', equals: odom, hint: Look.}}\n"
+
+
+@pytest.fixture
+def question(tmp_path: Path) -> str:
+    file = tmp_path / "question.yaml"
+    file.write_text(PASSES.format("question"))
+    return str(file)
+
+
+def test_list_names_each_exercise_and_its_state(command: Command) -> None:
+    result = command("check")
+    assert result.status == 0
+    assert [line.split()[:2] for line in result.out.splitlines()[:-1]] == [
+        ["-", name] for name in built_in_names()
+    ]
+    assert result.out.splitlines()[-1].startswith(f"0 of {len(built_in_names())} passed")
+    assert command("check", "missing_frame", "odom").status == 0
+    result = command("check")
+    assert "passed     missing_frame" in result.out
+    assert f"1 of {len(built_in_names())} passed" in result.out
+
+
+def test_passed_exercise_stays_passed(command: Command) -> None:
+    assert command("check", "missing_frame", "laser").status == 1
+    assert "not passed missing_frame" in command("check").out
+    assert command("check", "missing_frame", "odom").status == 0
+    assert command("check", "missing_frame", "laser").status == 1
+    assert "passed     missing_frame" in command("check").out
+
+
+def test_output_of_a_check(command: Command, question: str) -> None:
+    assert command("check", question, "odom") == (
+        0,
+        "question: A title\nWhat?: yes\nPassed: all 1 points hold.\n",
+        "",
+    )
+    assert command("check", question, "map") == (
+        1,
+        "question: A title\nWhat?: no, your answer is [map]. Look.\nNot passed: 1 of 1 points do not hold.\n",
+        "",
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "error"),
+    [
+        (["nope"], 3, "exercise [nope] not found"),
+        (["./nope.yaml"], 3, "there is no such file"),
+        (["count", "nope.py"], 3, "nope.py"),
+        (["move_light"], 2, "move_light takes up to 2 files"),
+        (["count", "a.py", "b.py"], 2, "count takes one file"),
+        (["count", "--patience", "0"], 2, "--patience takes a number from 0.1 to 100"),
+        (["count", "--class"], 2, "--class takes no exercise"),
+        (["--join", "http://"], 2, "is not the URI of a master"),
+        (["--join", "http://localhost:1"], 1, "no ROS master answers at http://localhost:1"),
+        (["--class"], 1, "no ROS master answers"),
+    ],
+)
+def test_errors_are_one_line(words: list[str], status: int, error: str, command: Command) -> None:
+    result = command("check", *words)
+    assert result.status == status, result
+    assert error in result.err
+    assert result.err.count("\n") == 1
+
+
+def test_exercise_with_a_mistake_is_not_checked(command: Command, tmp_path: Path) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text("name: x\ntitle: y\nsteps:\n- pres: 11\n")
+    result = command("check", str(file))
+    assert result.status == 3
+    assert result.err.startswith(f"minirospy check: ERROR: {file}: step 1: [pres] is not a kind of step")
+
+
+def test_unreadable_record_counts_as_empty(command: Command) -> None:
+    Record.read(Environment.read()).path.write_text("{broken")
+    assert "0 of" in command("check").out
+    assert command("check", "missing_frame", "odom").status == 0
+    assert json.loads(Record.read(Environment.read()).path.read_text())["exercises"]["missing_frame"][
+        "passed"
+    ]
+
+
+def test_result_is_at_the_master(command: Command, master: str, question: str) -> None:
+    assert "No results" in command("check", "--class").out
+    assert command("check", "--name", "Anna B.").out == f"Anna B.: results go to {master}\n"
+    assert command("check", question, "map").status == 1
+    [student] = gather(master)
+    assert student.key.startswith("Anna_B__")
+    assert student.name == "Anna B."
+    assert not student.results["question"].passed
+    assert abs(student.results["question"].time - time.time()) < 600
+    assert student.results["question"].failures == ("What?: your answer is [map]",)
+    out = command("check", "--class").out.splitlines()
+    assert out[:2] == ["         question", "Anna B.  no"]
+    assert out[2].startswith("Anna B., question, ")
+    assert command("check", question, "odom").status == 0
+    assert command("check", "--class").out == "         question\nAnna B.  yes\n"
+
+
+def test_one_master_is_one_command(command: Command, master: str) -> None:
+    result = command("check", "--join", master, "--name", "Jörg", "--one-master")
+    assert result.status == 0
+    names = dict(line.removeprefix("export ").split("=", 1) for line in result.out.splitlines())
+    assert names["ROS_MASTER_URI"] == master
+    assert names["ROS_IP"] in ("127.0.0.1", "::1")
+    # ROS accepts the namespace, and the shell needs no quotes.
+    assert names["ROS_NAMESPACE"].startswith("J_rg_")
+    assert names["ROS_NAMESPACE"].replace("_", "a").isalnum()
+    assert command("check", "--one-master").status == 2
+
+
+def test_class_has_another_master_than_the_robot(
+    command: Command, master: str, question: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With twenty masters, each laptop's own master is not the class's."""
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
+    assert command("check", "--join", master.removeprefix("http://"), "--name", "Ben").status == 0
+    assert command("check", question, "odom").status == 0
+    assert [student.name for student in gather(master)] == ["Ben"]
+
+
+def test_master_that_has_gone_does_not_fail_the_check(command: Command, question: str) -> None:
+    record = Record.read(Environment.read())
+    record.master = "http://localhost:1"
+    record.write()
+    result = command("check", question, "odom")
+    assert result.status == 0
+    assert result.err.startswith(
+        "WARNING: the result is stored, but not sent to the teacher: no ROS master answers"
+    )
+
+
+def test_values_that_are_no_record_are_left_out(command: Command, master: str, question: str) -> None:
+    assert command("check", question, "odom").status == 0
+    proxy = MasterProxy(master, "/hostile")
+    for key, value in {"a": 5, "b": {"student": "x"}, "c": {"student": "x", "exercises": [1]}}.items():
+        proxy.set_param(f"{CLASS_PARAMETER}/{key}", value)
+    proxy.set_param(f"{CLASS_PARAMETER}/d", {"student": "red\nblue", "exercises": {"e": {"passed": True}}})
+    proxy.close()
+    result = command("check", "--class")
+    assert result.status == 0
+    assert "red\\nblue" in result.out
+    assert len(gather(master)) == 2
+
+
+def test_environment_of_the_command_is_left_alone(command: Command, question: str) -> None:
+    before = dict(os.environ)
+    command("check", question, "odom")
+    assert dict(os.environ) == before

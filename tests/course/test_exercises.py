@@ -1,0 +1,243 @@
+"""Each exercise of the course has a check: the page's own solution passes, an empty and a wrong program fail with a hint."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from minirospy.board.board import Board
+from minirospy.course.checker import Report, check, words_of
+from minirospy.course.exercise import Exercise, built_in_names, find_exercise
+
+from .conftest import PAGES
+
+EXERCISES = [find_exercise(name) for name in built_in_names()]
+WITH_PROGRAM = [exercise.name for exercise in EXERCISES if not exercise.live]
+PATIENCE = 8.0  # multiplies the time limits: tests run on loaded machines
+
+BALL = """
+import rospy
+import RPi.GPIO as GPIO
+from std_msgs.msg import Int32
+
+def on_ball(message):
+    {line}
+
+rospy.init_node("my_ball_leds")
+GPIO.setmode(GPIO.BCM)
+GPIO.setup((2, 7), GPIO.OUT)
+rospy.Subscriber("/ball", Int32, on_ball)
+rospy.spin()
+GPIO.cleanup()
+"""
+
+
+def solution_of(exercise: Exercise, folder: Path) -> list[str]:
+    """Return the page's solution as the words of a command line."""
+    if exercise.name == "ball":
+        page = (PAGES / exercise.page).read_text(encoding="utf-8")
+        line = re.search(r"the callback is one line, `(.+?)`", page)
+        assert line
+        file = folder / "ball.py"
+        file.write_text(BALL.format(line=line[1]))
+        return [str(file)]
+    assert exercise.solution
+    return list(exercise.solution)
+
+
+def failed(report: Report) -> str:
+    return "\n".join(map(str, report.findings)) + f"\n{report.output}"
+
+
+def test_each_exercise_of_the_pages_has_a_check() -> None:
+    """Count the headings, so that a new exercise on a page needs a file."""
+    headings = {
+        page.name: len(re.findall(r"^## Exercise", page.read_text(encoding="utf-8"), re.MULTILINE))
+        for page in PAGES.glob("*.md")
+    }
+    pages = [exercise.page for exercise in EXERCISES]
+    assert {page: pages.count(page) for page in headings} == headings
+
+
+def test_each_file_is_in_the_order_and_has_its_name() -> None:
+    folder = Path(sys.modules[Exercise.__module__].__file__ or "").parent / "exercises"
+    assert sorted(path.stem for path in folder.glob("*.yaml")) == sorted(built_in_names())
+    assert [exercise.name for exercise in EXERCISES] == built_in_names()
+
+
+@pytest.mark.parametrize("exercise", EXERCISES, ids=built_in_names())
+def test_each_page_names_the_command(exercise: Exercise) -> None:
+    text = (PAGES / exercise.page).read_text(encoding="utf-8")
+    assert f"`minirospy check {exercise.name}" in text
+
+
+@pytest.mark.parametrize("exercise", EXERCISES, ids=built_in_names())
+def test_each_expectation_has_a_hint(exercise: Exercise) -> None:
+    assert [step for step in exercise.steps if step.is_expectation and not step.hint] == []
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("name", WITH_PROGRAM)
+def test_solution_of_the_page_passes(name: str, workspace: Path) -> None:
+    exercise = find_exercise(name)
+    report = check(exercise, solution_of(exercise, workspace), patience=PATIENCE)
+    assert report.passed, failed(report)
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("name", WITH_PROGRAM)
+def test_empty_program_fails_with_a_hint(name: str, tmp_path: Path) -> None:
+    exercise = find_exercise(name)
+    file = tmp_path / ("empty.launch" if "launch file" in exercise.work[0].about else "empty.py")
+    file.write_text("<launch/>\n" if file.suffix == ".launch" else "")
+    report = check(exercise, [str(file)], patience=0.3)
+    assert not report.passed
+    assert report.failures
+    assert report.failures[0].hint, failed(report)
+
+
+# The program's text, or a replacement in the page's solution; and the hint of the first failure.
+WRONG = {
+    "count": (("rospy.Rate(2)", "rospy.Rate(20)"), "rospy.Rate(2)"),
+    "frequency": (('rospy.get_param("/publish_frequency", 10)', "10"), "Read the parameter"),
+    "warnings": (("message.level >= Log.WARN", "True"), "The levels are numbers"),
+    "square": (("math.pi / 2", "0.0"), "turn for one second"),
+    "ball": (("< 80, message.data >= 80", "< 80, message.data >= 0"), "Are both pins set up"),
+    "scanner_button": (("NEAR = 0.2", "NEAR = 2.0"), "The limit is 0.2 m"),
+    "move_light": (("(1 if request.data else -1)", "(1)"), "False moves the light to the left"),
+    "traffic_light": (('("yellow", (4, 5))', '("yellow", (4, 6))'), "The foot of a person at 0.45 m"),
+    "stop_when_near": (("client.cancel_goal()", "pass"), "client.cancel_goal()"),
+    "scanner_launch": (("led_actuator.py", "run_debug.py"), "Start your LED's node"),
+    "run_parameters": (("$(arg parameters)", "$(dirname)/other.yaml"), "number_of_runs and led_frequency"),
+}
+
+
+def test_there_is_a_wrong_program_for_each_exercise() -> None:
+    assert sorted(WRONG) == sorted(WITH_PROGRAM)
+
+
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize("name", WITH_PROGRAM)
+def test_wrong_program_fails_with_the_hint_for_its_mistake(
+    name: str, workspace: Path, tmp_path: Path
+) -> None:
+    from minirospy.course.programs import find_command
+    from minirospy.workspace.packages import Packages
+
+    exercise = find_exercise(name)
+    (before, after), hint = WRONG[name]
+    words = solution_of(exercise, workspace)
+    changed = 0
+    for number, word in enumerate(words):
+        source = Path(find_command(word, Packages())[-1])
+        text = source.read_text(encoding="utf-8")
+        if before in text:
+            changed += 1
+            file = tmp_path / source.name
+            file.write_text(text.replace(before, after))
+            (tmp_path / "other.yaml").write_text("number_of_runs: 2\n")
+            words[number] = str(file)
+    assert changed, "the solution does not contain the text to replace"
+    report = check(exercise, words, patience=1.0)
+    assert not report.passed
+    assert any(hint in failure.hint for failure in report.failures), failed(report)
+
+
+def run_later(*words: str) -> threading.Thread:
+    """Run commands of minirospy, one after the other, while a check watches."""
+
+    def run() -> None:
+        for word in words:
+            time.sleep(0.5)
+            subprocess.run([sys.executable, "-m", "minirospy", *word.split()], check=True)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread
+
+
+def test_commands_of_the_page_light_the_led_of_the_own_board() -> None:
+    with Board():
+        typed = run_later("board set 4 1", "board set 4 0")
+        report = check(find_exercise("board"), [])
+        typed.join()
+    assert report.passed, failed(report)
+
+
+def test_nothing_typed_fails_with_the_command_to_type() -> None:
+    report = check(find_exercise("board"), [], patience=0.01)
+    assert [finding.holds for finding in report.findings] == [False, True]
+    assert "minirospy board set 4 1" in str(report.findings[0])
+
+
+def test_package_is_created_and_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    package = tmp_path / "rpi_feros_bringup_test"
+
+    def type_commands() -> None:
+        package.mkdir()
+        (package / "package.xml").write_text("<package><name>rpi_feros_bringup_test</name></package>")
+        time.sleep(2)
+        (package / "package.xml").unlink()
+        package.rmdir()
+
+    typed = threading.Thread(target=type_commands)
+    typed.start()
+    report = check(find_exercise("package"), [])
+    typed.join()
+    assert report.passed, failed(report)
+    report = check(find_exercise("package"), [], patience=0.01)
+    assert "catkin_create_pkg" in report.failures[0].hint
+
+
+@pytest.mark.parametrize(
+    ("answer", "holds"), [("odom", True), (" /odom\n", True), ("laser", False), ("", False)]
+)
+def test_answer_to_a_question_is_compared(answer: str, holds: bool) -> None:
+    exercise = find_exercise("missing_frame")
+    assert words_of(exercise, [answer]) == ([], [answer])
+    report = check(exercise, [], answers=[answer])
+    assert report.passed == holds
+    assert holds or "read the exception" in report.failures[0].hint
+
+
+def test_question_without_an_answer_is_asked() -> None:
+    asked = []
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return "odom\n"
+
+    assert check(find_exercise("missing_frame"), [], ask=ask).passed
+    assert asked == ["Which frame is missing if my_object.py starts before my_odom.py?"]
+    assert not check(find_exercise("missing_frame"), []).passed
+
+
+@pytest.mark.timeout(300)
+def test_scanner_of_the_class_is_measured(master: str) -> None:
+    """The answers are compared with the measured rate and the registered address."""
+    command = [
+        sys.executable,
+        "-m",
+        "minirospy",
+        "launch",
+        "sick_safetyscanners",
+        "sick_safetyscanners.launch",
+    ]
+    exercise = find_exercise("scanner_for_all")
+    launch = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        report = check(exercise, [], answers=["33", "localhost"], patience=PATIENCE)
+        wrong = check(exercise, [], answers=["about 100 Hz", "192.168.65.50"])
+    finally:
+        launch.terminate()
+        launch.wait()
+    assert [finding.holds for finding in wrong.findings] == [False, False]
+    assert "rostopic hz" in wrong.findings[0].hint
+    assert report.passed, failed(report)

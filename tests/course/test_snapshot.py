@@ -1,0 +1,63 @@
+"""`minirospy check --snapshot`: what a student sends for help, and what stays private."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from minirospy.base.environment import Environment
+from minirospy.base.errors import MinirospyError
+from minirospy.course.snapshot import write_snapshot
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    source = tmp_path / "catkin_ws" / "src"
+    for name, text in {
+        "rpi_test/package.xml": "<package/>",
+        "rpi_test/scripts/my_led.py": "import rospy\n",
+        "rpi_test/.env": "PASSWORD=secret\n",
+        ".git/config": "token\n",
+        "rpi_test/__pycache__/x.pyc": "x",
+        "rpi_test/big.bag": "x" * 1_000_001,
+    }.items():
+        file = source / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(source))
+    return source
+
+
+def test_snapshot_has_the_sources_the_doctor_and_the_results(workspace: Path, tmp_path: Path) -> None:
+    file = tmp_path / "anna.zip"
+    count, large = write_snapshot(file, Environment.read())
+    assert count == 2
+    assert large == [str(workspace / "rpi_test" / "big.bag")]
+    with zipfile.ZipFile(file) as archive:
+        assert sorted(archive.namelist()) == [
+            "catkin_ws/rpi_test/package.xml",
+            "catkin_ws/rpi_test/scripts/my_led.py",
+            "doctor.txt",
+            "results.json",
+            "variables.txt",
+        ]
+        assert "minirospy" in archive.read("doctor.txt").decode()
+        assert json.loads(archive.read("results.json"))["exercises"] == {}
+        assert f"ROS_PACKAGE_PATH={workspace}" in archive.read("variables.txt").decode()
+
+
+def test_file_that_exists_is_kept(workspace: Path, tmp_path: Path) -> None:
+    file = tmp_path / "anna.zip"
+    file.write_text("mine")
+    with pytest.raises(MinirospyError, match="exists: name another file"):
+        write_snapshot(file, Environment.read())
+    assert file.read_text() == "mine"
+
+
+def test_terminal_without_a_workspace_is_told_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(MinirospyError, match=r"source WORKSPACE/devel/setup.bash"):
+        write_snapshot(tmp_path / "anna.zip", Environment.read())
+    assert not (tmp_path / "anna.zip").exists()
