@@ -25,15 +25,24 @@ from minirospy.core.sdf.model import (
 from minirospy.core.sdf.poses import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
-from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, Shapes
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, SOLREF, Shapes
 from minirospy.ros.gazebo_ros.physics.tree import WORLD, LinkTree, plan_tree
 
-__all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits", "set_inertial"]
+__all__ = [
+    "MOTOR_DAMPING",
+    "Builder",
+    "BuiltModel",
+    "axis_names",
+    "count_substeps",
+    "has_limits",
+    "set_inertial",
+]
 
 FIXED_KINDS = ("fixed",)
 MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
 MIN_RANGE = 1e-5  # MuJoCo refuses a range of length zero
 MAX_LIGHTS = 8  # of OpenGL
+MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer ones MuJoCo softens contacts, and wheels slip
 VISUAL = "\tvisual"  # separates the names of visuals from those of collisions
 MOTOR_DAMPING = (
     0.9999  # MuJoCo's largest impedance: rows of joint friction and motors are as hard as it allows
@@ -75,9 +84,9 @@ class Builder:
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity of the next compilation."""
-        self.spec.option.timestep = physics.step
+        self._substep = physics.step / count_substeps(physics.step)
+        self.spec.option.timestep = self._substep
         self.spec.option.gravity = physics.gravity
-        self._step = physics.step
 
     def add(self, model: Model, name: str, pose: Pose) -> BuiltModel:
         """Add a model at a pose. Raise SimulationError if a part of it cannot be simulated; then nothing is added."""
@@ -218,7 +227,7 @@ class Builder:
             row = body.add_joint(name=axis_name, type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE)
             row.pos = joint.pose.position
             row.axis = _direction(joint, axis)
-            row.solref_friction = [-1 / self._step, -1 / self._step]
+            row.solref_friction = [-1 / self._substep, -1 / self._substep]
             row.solimp_friction = [MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0]
             row.solref_limit = [0.005, 1.0]
             row.solimp_limit = [0.95, 0.99, 0.001, 0.5, 2.0]
@@ -309,6 +318,11 @@ def set_inertial(body: Any, inertial: Inertial) -> None:
     inertia = principal_inertia(inertial)
     body.mass, body.inertia = inertia.mass, inertia.moments
     body.ipos, body.iquat = inertia.pose.position, _wxyz(inertia.pose.orientation)
+
+
+def count_substeps(step: float) -> int:
+    """Return the number of MuJoCo's steps in a step (s) of the world."""
+    return max(1, math.ceil(step / MAX_SUBSTEP - 1e-9))
 
 
 def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:

@@ -1,7 +1,9 @@
-"""MuJoCo's compiled model and data, one step at a time, with motors as in ODE.
+"""MuJoCo's compiled model and data, one substep at a time, with motors as in ODE.
 
-After each step the positions of bodies, the contacts and the velocities belong to the new time: a step is the second half of
-``mj_step`` (forces, solver, integration) and the first half of the next one.
+A step of the world consists of substeps, because MuJoCo's contacts become soft if its step is long.
+
+After each substep the positions of bodies, the contacts and the velocities belong to the new time: a substep is the second half
+of ``mj_step`` (forces, solver, integration) and the first half of the next one.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from minirospy.core.sdf.model import Physics
-from minirospy.ros.gazebo_ros.physics.builder import MOTOR_DAMPING, Builder
+from minirospy.ros.gazebo_ros.physics.builder import MOTOR_DAMPING, Builder, count_substeps
 from minirospy.ros.gazebo_ros.physics.library import load_mujoco
 from minirospy.ros.gazebo_ros.physics.shapes import GROUP_COLLISION, GROUP_RAY_ONLY
 
@@ -35,7 +37,7 @@ class Engine:
     def __init__(self, builder: Builder, physics: Physics) -> None:
         self.mujoco = load_mujoco()
         self._builder = builder
-        self.physics = physics
+        self._set_step(physics)
         self.model: Any = builder.spec.compile()
         self.data: Any = self.mujoco.MjData(self.model)
         self.generation = 0  # grows with each compilation: ids of bodies and joints change
@@ -49,6 +51,11 @@ class Engine:
         self.joint_wrenches: NDArray[np.float64] = np.zeros((1, 6))
         self._has_normals = "normal:" in (self.mujoco.mj_multiRay.__doc__ or "")
         self._size_arrays()
+
+    def _set_step(self, physics: Physics) -> None:
+        self.physics = physics
+        self.substeps = count_substeps(physics.step)  # in a step of the world
+        self.substep = physics.step / self.substeps  # s
 
     def _size_arrays(self) -> None:
         count = self.model.nv
@@ -70,7 +77,7 @@ class Engine:
         self._set_friction_rows()
 
     def _set_friction_rows(self) -> None:
-        rate = 1 / self.physics.step
+        rate = 1 / self.substep
         self._rate = rate / MOTOR_DAMPING
         self.model.dof_solref[:] = (-rate, -rate)
         self.model.dof_solimp[:] = (MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0)
@@ -85,8 +92,8 @@ class Engine:
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity."""
-        self.physics = physics
-        self.model.opt.timestep = physics.step
+        self._set_step(physics)
+        self.model.opt.timestep = self.substep
         self.model.opt.gravity[:] = physics.gravity
         self._builder.set_physics(physics)
         self._set_friction_rows()
@@ -112,12 +119,12 @@ class Engine:
             self.mujoco.mj_step1(self.model, self.data)
             self._forget_details()
 
-    def step(self) -> None:
-        """Advance by one step."""
+    def advance(self, left: int = 1) -> None:
+        """Advance by one substep; ``left`` is the number of substeps until the end of the world's step, with this one."""
         model, data, mujoco = self.model, self.data, self.mujoco
         self.refresh()
         if self._followers.size:
-            self._follow()
+            self._follow(left)
         rows = slice(data.ne, data.ne + data.nf)
         dofs = data.efc_id[rows] if data.nf else None
         if dofs is not None:
@@ -135,7 +142,7 @@ class Engine:
             self.motor_force[dofs] = data.efc_force[rows]
         if self._damped.size:
             self._limit_damped()
-        if self.records_details:
+        if self.records_details and left == 1:
             self._record()
         mujoco.mj_step1(model, data)
 
@@ -178,7 +185,7 @@ class Engine:
         speed = abs(data.qvel[swinging]).max()
         if speed < MIN_SWING:
             return None
-        change = data.qacc * self.physics.step
+        change = data.qacc * self.substep
         if abs(change[swinging]).max() > 0.1 * speed:
             return None
         velocities = data.qvel.copy()
@@ -206,12 +213,12 @@ class Engine:
                 result.append(dof)
         return np.array(result, np.intp)
 
-    def _follow(self) -> None:
-        """Give position motors the velocity that reaches the target with this step."""
+    def _follow(self, left: int) -> None:
+        """Give position motors the velocity that reaches the target with the last of ``left`` substeps."""
         dofs = self._followers
         lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
-        limit, step = self.max_velocity[dofs], self.physics.step
-        self._bias[dofs] = np.clip(lacking, -limit * step, limit * step) * (self._rate / step)
+        limit = self.max_velocity[dofs]
+        self._bias[dofs] = np.clip(lacking / (left * self.substep), -limit, limit) * self._rate
 
     def _limit_damped(self) -> None:
         """Set the damping of joints with motors, and the force that their motors have left.

@@ -41,6 +41,7 @@ __all__ = [
     "GROUP_RAY_ONLY",
     "GROUP_VISUAL",
     "PART",
+    "SOLREF",
     "Shapes",
     "friction",
 ]
