@@ -90,6 +90,28 @@ def test_a_name_is_used_once() -> None:
             "/no/such.stl: No such file",
         ),
         (Model("bad", {"a": Link("a")}, pose=at(x=math.nan)), "the pose is not finite"),
+        *(
+            (
+                Model("bad", {"a": Link("a")}, {"j": Joint("j", "revolute", "world", "a", axis=axis)}),
+                f"model 'bad': joint 'j' has a {text}",
+            )
+            for axis, text in (
+                (Axis(damping=math.nan), "pose, axis, damping, friction or spring that is not finite"),
+                (Axis(damping=math.inf), "pose, axis, damping, friction or spring that is not finite"),
+                (Axis(friction=math.inf), "pose, axis, damping, friction or spring that is not finite"),
+                (
+                    Axis(spring_stiffness=math.inf),
+                    "pose, axis, damping, friction or spring that is not finite",
+                ),
+                (
+                    Axis(initial_position=math.nan),
+                    "pose, axis, damping, friction or spring that is not finite",
+                ),
+                (Axis(effort=math.nan), "limit that is NaN"),
+                (Axis(velocity=math.nan), "limit that is NaN"),
+                (Axis(lower=math.nan), "limit that is NaN"),
+            )
+        ),
         (Model("bad", {"a": Link("a", Pose((math.nan, 0, 0)))}), "model 'bad': link 'a' has a pose"),
     ],
 )
@@ -230,6 +252,8 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
         lambda: joint.set_axis(Axis(damping=math.nan)),
         lambda: joint.set_axis(Axis(damping=math.inf)),
         lambda: joint.set_axis(Axis(friction=math.nan)),
+        lambda: joint.set_axis(Axis(lower=math.nan)),
+        lambda: joint.set_axis(Axis(upper=math.nan)),
         lambda: link.push((math.nan, 0.0, 0.0)),
         lambda: link.add_wrench(torque=(math.inf, 0.0, 0.0)),
         lambda: model.set_state(State(bad)),

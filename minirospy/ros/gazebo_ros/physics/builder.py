@@ -236,10 +236,10 @@ class Builder:
     def set_axis(self, name: str, kind: str, axis: Axis) -> None:
         """Set the limits and the passive forces of one of MuJoCo's joints."""
         row = self.spec.joint(name)
-        _set_first(row, "damping", _number(axis.damping))
-        _set_first(row, "stiffness", _number(axis.spring_stiffness))
+        _set_first(row, "damping", max(axis.damping, 0.0))
+        _set_first(row, "stiffness", max(axis.spring_stiffness, 0.0))
         row.springref = axis.spring_reference
-        row.frictionloss = _number(axis.friction)
+        row.frictionloss = max(axis.friction, 0.0)
         row.limited = kind != "continuous" and has_limits(axis)
         if row.limited:
             lower, upper = sorted((axis.lower, axis.upper))
@@ -366,7 +366,7 @@ def _is_steep(pose: Pose, collision: Collision) -> bool:
 
 
 def _check_numbers(link: Link, joint: Joint | None) -> None:
-    """Raise SimulationError if a pose or an inertia is not finite: MuJoCo accepts NaN."""
+    """Raise SimulationError if a number is not finite, or a joint's limit is NaN: MuJoCo accepts NaN."""
     inertial = link.inertial
     values = [*link.pose.position, *link.pose.orientation, inertial.mass, *inertial.inertia]
     values += [*inertial.pose.position, *inertial.pose.orientation]
@@ -374,10 +374,20 @@ def _check_numbers(link: Link, joint: Joint | None) -> None:
         values += [*collision.pose.position, *collision.pose.orientation]
     if not all(map(math.isfinite, values)):
         raise SimulationError(f"link '{link.name}' has a pose or inertia that is not finite")
-    if joint is not None and not all(
-        map(math.isfinite, (*joint.pose.position, *joint.axis.xyz, *joint.axis2.xyz))
-    ):
-        raise SimulationError(f"joint '{joint.name}' has a pose or axis that is not finite")
+    if joint is None:
+        return
+    values = [*joint.pose.position]
+    limits: list[float] = []
+    for axis in (joint.axis, joint.axis2):
+        values += [*axis.xyz, axis.damping, axis.friction, axis.spring_stiffness]
+        values += [axis.spring_reference, axis.initial_position]
+        limits += [axis.lower, axis.upper, axis.effort, axis.velocity]
+    if not all(map(math.isfinite, values)):
+        raise SimulationError(
+            f"joint '{joint.name}' has a pose, axis, damping, friction or spring that is not finite"
+        )
+    if any(map(math.isnan, limits)):
+        raise SimulationError(f"joint '{joint.name}' has a limit that is NaN")
 
 
 def _direction(joint: Joint, axis: Axis) -> Vector:
@@ -393,10 +403,6 @@ def _set_first(row: Any, name: str, value: float) -> None:
         setattr(row, name, value)
     else:
         getattr(row, name)[0] = value
-
-
-def _number(value: float) -> float:
-    return max(value, 0.0) if math.isfinite(value) else 0.0
 
 
 def _wxyz(rotation: Quaternion) -> Quaternion:
