@@ -330,6 +330,40 @@ def test_rays_begin_at_the_smallest_range() -> None:
     assert simulation.cast_rays(at(), forward, 1.0, min_range=0.1).distances[0] == math.inf
 
 
+def test_rays_that_leave_a_housing_meet_what_is_behind_it() -> None:
+    """Hidden: the housing and the ball in it. Not hidden: a wall that is nearer than the smallest range."""
+    models = (
+        GROUND,
+        still("housing", Cylinder(0.05, 0.07), at(z=0.5)),
+        still("ball", Sphere(0.02), at(x=0.1, z=0.5)),
+        still("wall", Box((0.1, 9.0, 9.0)), at(x=2.05)),
+        still("near", Box((0.1, 9.0, 9.0)), at(y=-0.2)),
+        still("far", Box((0.1, 9.0, 9.0)), at(x=-3.05)),
+    )
+    simulation = Simulation(World(models=models))
+    groups = simulation.engine.model.geom_group.copy()
+    angles = np.linspace(-math.pi, math.pi, 720, endpoint=False)
+    directions = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+
+    hits = simulation.cast_rays(at(z=0.5), directions, 20.0, min_range=0.3)
+
+    with np.errstate(divide="ignore"):
+        expected = np.where(np.cos(angles) > 0, 2.0 / np.cos(angles), -3.0 / np.cos(angles))
+    is_seen = np.sin(angles) >= 0
+    inside = is_seen & (expected < 4.5)
+    assert hits.distances[inside] == pytest.approx(expected[inside], abs=1e-3)
+    assert {each.partition("::")[0] for each, seen in zip(hits.collisions, inside, strict=True) if seen} == {
+        "wall",
+        "far",
+    }
+    # Each ray is as if it had been cast alone.
+    for index in range(0, 720, 30):
+        alone = simulation.cast_rays(at(z=0.5), directions[index : index + 1], 20.0, min_range=0.3)
+        assert alone.distances[0] == hits.distances[index]
+        assert alone.collisions[0] == hits.collisions[index]
+    assert (simulation.engine.model.geom_group == groups).all()
+
+
 def test_rays_see_wheels_as_cylinders() -> None:
     simulation = Simulation(World(models=(diff_drive(),)))
     hit = simulation.cast_rays(at(y=1.0, z=0.02), np.array([[0.0, -1.0, 0.0]]), 5.0)

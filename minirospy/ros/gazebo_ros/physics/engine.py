@@ -74,6 +74,7 @@ class Engine:
         dofs, positions = self.model.jnt_dofadr, self.model.jnt_qposadr
         self.position_of_dof[dofs] = positions
         self._swinging = self._find_swinging()
+        self._ray_counts = self._count_ray_geoms()
         self._set_friction_rows()
 
     def _set_friction_rows(self) -> None:
@@ -156,23 +157,44 @@ class Engine:
         excluded_body: int,
     ) -> None:
         """Write each ray's first geom and its distance, or -1. ``vectors`` are (n, 3) unit vectors in world axes."""
-        count = len(vectors)
         # Newer versions have an argument for normals.
         normals = (None,) if self._has_normals else ()
-        self.mujoco.mj_multiRay(
-            self.model,
-            self.data,
-            origin,
-            vectors.ravel(),
-            RAY_GROUPS,
-            True,
-            excluded_body,
-            ids,
-            distances,
-            *normals,
-            count,
-            max_range,
-        )
+        # MuJoCo looks at all geoms for each ray; a room of one mesh has thousands that no ray hits, behind the one that it does.
+        counts = self.model.body_geomnum
+        all_counts = counts.copy()
+        counts[:] = self._ray_counts
+        try:
+            self.mujoco.mj_multiRay(
+                self.model,
+                self.data,
+                origin,
+                vectors.ravel(),
+                RAY_GROUPS,
+                True,
+                excluded_body,
+                ids,
+                distances,
+                *normals,
+                len(vectors),
+                max_range,
+            )
+        finally:
+            counts[:] = all_counts
+
+    def _count_ray_geoms(self) -> NDArray[np.int32]:
+        """Return how many of each body's geoms rays need: those until the last one that they can hit."""
+        model = self.model
+        counts = np.zeros(model.nbody, np.int32)
+        geoms = np.flatnonzero(RAY_GROUPS[model.geom_group])
+        bodies = model.geom_bodyid[geoms]
+        np.maximum.at(counts, bodies, geoms - model.body_geomadr[bodies] + 1)
+        return counts
+
+    def geoms_within(self, point: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
+        """Return the geoms that lie within a distance (m) of a point in the world."""
+        radii = self.model.geom_rbound  # 0: the geom is infinite
+        away = np.linalg.norm(self.data.geom_xpos - point, axis=1)
+        return np.flatnonzero((radii > 0) & (away + radii < distance))
 
     def _coriolis_correction(self) -> NDArray[np.float64] | None:
         """Return the difference of Coriolis and centrifugal forces between the last velocities and those half a step later.

@@ -19,7 +19,7 @@ from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
-from minirospy.ros.gazebo_ros.physics.shapes import PART
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, PART
 from minirospy.ros.gazebo_ros.physics.states import Contact, LostModel, RayHits, Wrench
 
 if TYPE_CHECKING:
@@ -330,16 +330,20 @@ class Simulation:
             origin = np.array(pose.position)
             vectors = np.ascontiguousarray(directions @ _matrix(pose).T)
             body = engine.model.body(exclude).id if exclude else -1
+            # MuJoCo casts many rays from one point only. What lies within the smallest range, such as the housing, is hidden.
+            inner = engine.geoms_within(origin, min_range)
+            groups = engine.model.geom_group
+            shown = groups[inner]
+            groups[inner] = GROUP_VISUAL
             engine.cast(origin, vectors, ids, distances, max_range, body)
-            if min_range > 0:
-                for index in np.flatnonzero((distances >= 0) & (distances < min_range)):
-                    start = origin + min_range * vectors[index]
-                    found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
-                    engine.cast(
-                        start, vectors[index : index + 1].copy(), found, hit, max_range - min_range, body
-                    )
-                    ids[index] = found[0]
-                    distances[index] = hit[0] + min_range if hit[0] >= 0 else -1.0
+            groups[inner] = shown
+            # Another near geom, such as a wall, is passed by single rays that begin at the smallest range.
+            for index in np.flatnonzero((distances >= 0) & (distances < min_range)).tolist():
+                start = origin + min_range * vectors[index]
+                found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
+                engine.cast(start, vectors[index : index + 1].copy(), found, hit, max_range - min_range, body)
+                ids[index] = found[0]
+                distances[index] = hit[0] + min_range if hit[0] >= 0 else -1.0
         missed = (distances < 0) | (distances > max_range)
         distances[missed] = np.inf
         ids[missed] = -1
