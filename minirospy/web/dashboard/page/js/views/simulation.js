@@ -576,6 +576,7 @@ export class Simulation {
   jointRow({ name, position }) {
     const shown = h("span", { class: "num" });
     const field = this.field(name, position.toFixed(2));
+    field.setAttribute("aria-label", name); // the robot's word, which is not translated
     const send = h(
       "button",
       { type: "button", class: "small", onclick: () => this.act(() => this.moveJoint(name, field)) },
@@ -663,7 +664,7 @@ export class Simulation {
       const sizes = Object.fromEntries(
         Object.entries(this.sizeFields).map(([name, field]) => [
           name,
-          readNumber(field.value, name, { least: 0, most: 1000, isAbove: true }),
+          readNumber(field.value, t(name), { least: 0, most: 1000, isAbove: true }),
         ]),
       );
       xml = shapeSdf(kind, sizes, rgbOf(this.color.value));
