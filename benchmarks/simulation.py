@@ -59,6 +59,13 @@ ROBOT = """<robot name="robot">
 </robot>"""
 """A robot with the sensors and rates of a TurtleBot3 Burger."""
 
+POINTS = """<gazebo reference="scan"><sensor type="ray" name="points"><update_rate>10</update_rate><ray><scan>
+    <horizontal><samples>1875</samples><min_angle>-3.14159</min_angle><max_angle>3.14159</max_angle></horizontal>
+    <vertical><samples>16</samples><min_angle>-0.2618</min_angle><max_angle>0.2618</max_angle></vertical></scan>
+    <range><min>0.3</min><max>131</max></range></ray>
+    <plugin name="points" filename="libgazebo_ros_velodyne_laser.so"><topicName>points</topicName></plugin></sensor></gazebo>"""
+"""A scanner with the rays and the rate of a VLP-16."""
+
 WHEEL = """<link name="{side}_wheel"><inertial><mass value="0.03"/>
     <inertia ixx="2e-5" ixy="0" ixz="0" iyy="2e-5" iyz="0" izz="2e-5"/></inertial>
     <collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.033" length="0.018"/></geometry></collision></link>
@@ -67,13 +74,14 @@ WHEEL = """<link name="{side}_wheel"><inertial><mass value="0.03"/>
 
 
 class Case(NamedTuple):
-    """``target``: what is aimed at. ``robots``: with wheels; 0: an arm."""
+    """``target``: what is aimed at. ``robots``: with wheels; 0: an arm. ``has_points``: whether they have a 3D scanner."""
 
     name: str
     target: str
     world: str
     robots: int
     is_fast: bool = False
+    has_points: bool = False
 
 
 TURTLEBOT = "worlds/turtlebot3_world.world"
@@ -82,15 +90,15 @@ CASES = {
     "fast": Case("turtlebot3 world, as fast as it goes", "factor > 5", TURTLEBOT, 1, is_fast=True),
     "arm": Case("arm of 7 joints, effort control at 1 kHz", "CPU < 100", "worlds/empty.world", 0),
     "robots": Case("20 robots in one world", "factor 1", "worlds/empty.world", 20),
+    "points": Case("turtlebot3 world, 16 x 1875 points", "factor 1", TURTLEBOT, 1, has_points=True),
     "start": Case("roslaunch to the first scan", "< 6 s", TURTLEBOT, 1),
 }
 
 
-def robot() -> str:
+def robot(*, has_points: bool = False) -> str:
     """Return the URDF of the robot with wheels."""
-    return ROBOT.format(
-        wheels="".join(WHEEL.format(side=s, y=y) for s, y in (("left", 0.08), ("right", -0.08)))
-    )
+    wheels = "".join(WHEEL.format(side=s, y=y) for s, y in (("left", 0.08), ("right", -0.08)))
+    return ROBOT.format(wheels=wheels).replace("</robot>", f"{POINTS if has_points else ''}</robot>")
 
 
 def arm() -> str:
@@ -133,15 +141,18 @@ def move_robots(case: Case, count: Callable[[object], None]) -> None:
     import rospy
     from geometry_msgs.msg import Twist, Vector3
     from nav_msgs.msg import Odometry
-    from sensor_msgs.msg import Imu, LaserScan
+    from sensor_msgs.msg import Imu, LaserScan, PointCloud2
 
     for number in range(case.robots):
         namespace = f"/r{number}" if case.robots > 1 else ""
         x, y = (1.5 * (number % 5), 1.5 * (number // 5)) if case.robots > 1 else (-2.0, -0.5)
-        spawn(f"robot{number}", robot(), namespace or "/", x, y)
+        text = robot(has_points=case.has_points)
+        spawn(f"robot{number}", text, namespace or "/", x, y)
         for topic, kind in (("imu", Imu), ("odom", Odometry)):
             rospy.Subscriber(f"{namespace}/{topic}", kind, lambda _: None)
         rospy.Subscriber(f"{namespace}/scan", LaserScan, count)
+        if case.has_points:
+            rospy.Subscriber(f"{namespace}/points", PointCloud2, lambda _: None)
         commands = rospy.Publisher(f"{namespace}/cmd_vel", Twist, queue_size=1, latch=True)
         commands.publish(Twist(Vector3(0.1, 0, 0), Vector3(0, 0, 0.4)))
 

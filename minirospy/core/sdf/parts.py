@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from minirospy.base.errors import SdfError
@@ -95,7 +96,7 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
         return Inertial()
     name = link.attributes.get("name", "")
     mass = source.number(element, "mass", 1.0, infinite=True)
-    if not 0.0 < mass < float("inf"):
+    if not 0.0 < mass < math.inf:
         if not is_static:
             source.warn(
                 element, f"link [{name}] has the mass {mass:g} kg, which is not possible: it gets 1 kg"
@@ -127,8 +128,15 @@ def read_axis(element: Element | None, source: Source, turned: Callable[[Element
         source.warn(xyz, "the axis is 0 0 0: it is z instead")
         direction = (0.0, 0.0, 1.0)
     limit, dynamics = element.first("limit"), element.first("dynamics")
-    lower = source.number(limit, "lower", float("-inf"), infinite=True)
-    upper = source.number(limit, "upper", float("inf"), infinite=True)
+    lower = source.number(limit, "lower", -math.inf, infinite=True)
+    upper = source.number(limit, "upper", math.inf, infinite=True)
+    if lower == math.inf or upper == -math.inf:
+        source.warn(
+            limit, f"the limits {lower:g} and {upper:g} allow no position: the infinite one is left out"
+        )
+        lower, upper = (
+            value if math.isfinite(value) else none for value, none in ((lower, -math.inf), (upper, math.inf))
+        )
     if lower > upper:
         source.warn(limit, f"the lower limit {lower:g} is above the upper limit {upper:g}: they are switched")
         lower, upper = upper, lower
@@ -156,4 +164,4 @@ def read_mimic(axis: Element | None, source: Source) -> Mimic | None:
 
 
 def _unlimited_if_negative(value: float) -> float:
-    return float("inf") if value < 0.0 else value
+    return math.inf if value < 0.0 else value

@@ -11,7 +11,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from geometry_msgs.msg import Point, Vector3
+from numpy.typing import NDArray
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -37,13 +39,14 @@ from minirospy.workspace.packages import package_name
 if TYPE_CHECKING:
     from minirospy.ros.gazebo_ros.physics import SimModel, Simulation
 
-__all__ = ["WorldMarkers", "marker_of", "model_markers"]
+__all__ = ["WorldMarkers", "has_moved", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
 RATE_HZ = 10.0  # of simulated time, for models that move
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 MAX_PLANE = 100.0  # m; larger planes are drawn smaller
 PLANE_THICKNESS = 0.001  # m
+MIN_CHANGE = 1e-5  # m, and of quaternions: bodies at rest tremble by less
 
 
 class WorldMarkers:
@@ -52,18 +55,16 @@ class WorldMarkers:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._publisher = rospy.Publisher(TOPIC, MarkerArray, queue_size=2, latch=True)
-        self._published: dict[str, Pose] = {}  # by link
+        self._published: NDArray[np.float64] = np.zeros((0, 7))  # the poses of all links
         self._next_ns = 0
 
     def publish_all(self) -> None:
         """Replace all markers."""
-        self._published.clear()
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        models = self._simulation.models.values()
-        self._published = {link.scoped_name: link.pose for model in models for link in model.links.values()}
-        return [marker for model in models for marker in model_markers(model)]
+        self._published = self._simulation.body_poses()
+        return [marker for model in self._simulation.models.values() for marker in model_markers(model)]
 
     def publish_moved(self) -> None:
         """Publish the links that have moved, at a low rate, if there are subscribers."""
@@ -71,11 +72,9 @@ class WorldMarkers:
         if 0 <= self._next_ns - now <= 1e9 / RATE_HZ or not self._publisher.get_num_connections():
             return
         self._next_ns = now + round(1e9 / RATE_HZ)
-        for model in self._simulation.models.values():
-            if any(self._published.get(link.scoped_name) != link.pose for link in model.links.values()):
-                # The latch keeps only the last message, so it contains all markers.
-                self._send(self._all())
-                return
+        if has_moved(self._published, self._simulation.body_poses()):
+            # The latch keeps only the last message, so it contains all markers.
+            self._send(self._all())
 
     def _send(self, markers: list[Marker]) -> None:
         stamp = time_of(self._simulation.time_ns)
@@ -83,6 +82,11 @@ class WorldMarkers:
             marker.header.frame_id = "world"
             marker.header.stamp = stamp
         self._publisher.publish(MarkerArray(markers))
+
+
+def has_moved(before: NDArray[np.float64], now: NDArray[np.float64]) -> bool:
+    """Return whether one of (n, 7) poses has changed visibly, or there are other ones."""
+    return before.shape != now.shape or bool((abs(now - before) > MIN_CHANGE).any())
 
 
 def model_markers(model: SimModel) -> list[Marker]:

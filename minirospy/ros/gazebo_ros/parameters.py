@@ -13,10 +13,13 @@ _POSITIVE = {
     "controlPeriod", "height", "horizontal_fov", "max", "samples", "wheelDiameter", "wheelSeparation", "width",
 }  # fmt: skip
 _NOT_NEGATIVE = {
-    "covariance_x", "covariance_y", "covariance_yaw", "far", "focalLength", "fov", "gaussianNoise", "min", "near",
-    "pointCloudCutoff", "pointCloudCutoffMax", "resolution", "stddev", "torque", "wheelAcceleration", "wheelTorque",
+    "covariance_x", "covariance_y", "covariance_yaw", "far", "focalLength", "fov", "gaussianNoise", "max_range", "min",
+    "min_range", "near", "pointCloudCutoff", "pointCloudCutoffMax", "resolution", "stddev", "torque", "wheelAcceleration",
+    "wheelTorque",
 }  # fmt: skip
-_MAY_BE_INFINITE = {"cmdTimeout", "max", "maxEffort", "pointCloudCutoffMax", "torque", "wheelTorque"}
+_MAY_BE_INFINITE = {
+    "cmdTimeout", "max", "maxEffort", "max_range", "pointCloudCutoffMax", "torque", "wheelTorque",
+}  # fmt: skip
 
 
 class PluginError(MinirospyError):

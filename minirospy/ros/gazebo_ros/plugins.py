@@ -71,6 +71,8 @@ LIBRARIES = {
     "gazebo_ros_depth_camera": f"{_PLUGINS}.depth_camera:DepthCamera",
     "gazebo_ros_openni_kinect": f"{_PLUGINS}.depth_camera:OpenniKinect",
     "gazebo_ros_block_laser": f"{_PLUGINS}.block_laser:BlockLaser",
+    "gazebo_ros_velodyne_laser": f"{_PLUGINS}.velodyne:Velodyne",
+    "gazebo_ros_velodyne_gpu_laser": f"{_PLUGINS}.velodyne:Velodyne",
     "gazebo_ros_joint_pose_trajectory": f"{_PLUGINS}.joint_pose_trajectory:JointPoseTrajectory",
     "gazebo_ros_f3d": f"{_PLUGINS}.f3d:F3D",
     "gazebo_ros_vacuum_gripper": f"{_PLUGINS}.vacuum_gripper:VacuumGripper",

@@ -41,7 +41,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from minirospy import client as rospy
 from minirospy.core.sdf.model import Pose, World
 from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
-from minirospy.ros.gazebo_ros.markers import marker_of, model_markers
+from minirospy.ros.gazebo_ros.markers import has_moved, marker_of, model_markers
 from minirospy.ros.gazebo_ros.messages import time_of
 from minirospy.ros.gazebo_ros.physics import SimulationError
 from minirospy.ros.gazebo_ros.plugins import PluginHost
@@ -171,7 +171,7 @@ class Window:
             if not self._moving:
                 return [], self._last, simulation.time_ns
         poses = simulation.body_poses()[[row for _, row in self._moving]]
-        if np.array_equal(poses, self._last):
+        if not has_moved(self._last, poses):
             return None
         self._last = poses
         return [name for name, _ in self._moving], poses, simulation.time_ns

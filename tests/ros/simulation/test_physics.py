@@ -27,7 +27,17 @@ from minirospy.core.sdf.model import (
 )
 from minirospy.core.sdf.poses import compose, rotate
 from minirospy.ros.gazebo_ros.physics import Simulation, State
-from tests.ros.simulation.worlds import GROUND, arm, at, body, diff_drive, pendulum, single, still
+from tests.ros.simulation.worlds import (
+    GROUND,
+    arm,
+    at,
+    body,
+    diff_drive,
+    four_wheels,
+    pendulum,
+    single,
+    still,
+)
 
 G = 9.8
 
@@ -187,15 +197,7 @@ def test_a_robot_on_rough_casters_drives_smoothly() -> None:
 def test_a_robot_with_four_wheels_turns_in_place() -> None:
     """With Coulomb friction, wheels at (+-length/2, +-width/2) turn it by 2 v width / (width^2 + length^2)."""
     length, width, radius = 0.3, 0.33, 0.0625
-    half = math.sqrt(0.5)
-    links = {"base": body("base", Box((0.3, 0.25, 0.1)), 4.5, at(z=0.1))}
-    joints: dict[str, Joint] = {}
-    for index, (x, y) in enumerate([(1, 1), (-1, 1), (1, -1), (-1, -1)]):
-        place = Pose((x * length / 2, y * width / 2, radius), (-half, 0.0, 0.0, half))
-        links[f"wheel{index}"] = body(f"wheel{index}", Cylinder(radius, 0.04), 0.28, place)
-        axis = Axis((0.0, 0.0, 1.0))
-        joints[f"joint{index}"] = Joint(f"joint{index}", "continuous", "base", f"wheel{index}", axis=axis)
-    simulation = Simulation(World(models=(GROUND, Model("robot", links, joints))))
+    simulation = Simulation(World(models=(GROUND, four_wheels(length, width, radius))))
     robot = simulation.model("robot")
     simulation.step(500)
     for index, speed in enumerate((-3.5, -3.5, 3.5, 3.5)):

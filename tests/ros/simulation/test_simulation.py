@@ -90,6 +90,28 @@ def test_a_name_is_used_once() -> None:
             "/no/such.stl: No such file",
         ),
         (Model("bad", {"a": Link("a")}, pose=at(x=math.nan)), "the pose is not finite"),
+        *(
+            (
+                Model("bad", {"a": Link("a")}, {"j": Joint("j", "revolute", "world", "a", axis=axis)}),
+                f"model 'bad': joint 'j' has a {text}",
+            )
+            for axis, text in (
+                (Axis(damping=math.nan), "pose, axis, damping, friction or spring that is not finite"),
+                (Axis(damping=math.inf), "pose, axis, damping, friction or spring that is not finite"),
+                (Axis(friction=math.inf), "pose, axis, damping, friction or spring that is not finite"),
+                (
+                    Axis(spring_stiffness=math.inf),
+                    "pose, axis, damping, friction or spring that is not finite",
+                ),
+                (
+                    Axis(initial_position=math.nan),
+                    "pose, axis, damping, friction or spring that is not finite",
+                ),
+                (Axis(effort=math.nan), "limit that is NaN"),
+                (Axis(velocity=math.nan), "limit that is NaN"),
+                (Axis(lower=math.nan), "limit that is NaN"),
+            )
+        ),
         (Model("bad", {"a": Link("a", Pose((math.nan, 0, 0)))}), "model 'bad': link 'a' has a pose"),
     ],
 )
@@ -230,6 +252,8 @@ def test_forces_and_states_that_are_not_finite_are_refused() -> None:
         lambda: joint.set_axis(Axis(damping=math.nan)),
         lambda: joint.set_axis(Axis(damping=math.inf)),
         lambda: joint.set_axis(Axis(friction=math.nan)),
+        lambda: joint.set_axis(Axis(lower=math.nan)),
+        lambda: joint.set_axis(Axis(upper=math.nan)),
         lambda: link.push((math.nan, 0.0, 0.0)),
         lambda: link.add_wrench(torque=(math.inf, 0.0, 0.0)),
         lambda: model.set_state(State(bad)),
@@ -304,6 +328,40 @@ def test_rays_begin_at_the_smallest_range() -> None:
         2.0
     )
     assert simulation.cast_rays(at(), forward, 1.0, min_range=0.1).distances[0] == math.inf
+
+
+def test_rays_that_leave_a_housing_meet_what_is_behind_it() -> None:
+    """Hidden: the housing and the ball in it. Not hidden: a wall that is nearer than the smallest range."""
+    models = (
+        GROUND,
+        still("housing", Cylinder(0.05, 0.07), at(z=0.5)),
+        still("ball", Sphere(0.02), at(x=0.1, z=0.5)),
+        still("wall", Box((0.1, 9.0, 9.0)), at(x=2.05)),
+        still("near", Box((0.1, 9.0, 9.0)), at(y=-0.2)),
+        still("far", Box((0.1, 9.0, 9.0)), at(x=-3.05)),
+    )
+    simulation = Simulation(World(models=models))
+    groups = simulation.engine.model.geom_group.copy()
+    angles = np.linspace(-math.pi, math.pi, 720, endpoint=False)
+    directions = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+
+    hits = simulation.cast_rays(at(z=0.5), directions, 20.0, min_range=0.3)
+
+    with np.errstate(divide="ignore"):
+        expected = np.where(np.cos(angles) > 0, 2.0 / np.cos(angles), -3.0 / np.cos(angles))
+    is_seen = np.sin(angles) >= 0
+    inside = is_seen & (expected < 4.5)
+    assert hits.distances[inside] == pytest.approx(expected[inside], abs=1e-3)
+    assert {each.partition("::")[0] for each, seen in zip(hits.collisions, inside, strict=True) if seen} == {
+        "wall",
+        "far",
+    }
+    # Each ray is as if it had been cast alone.
+    for index in range(0, 720, 30):
+        alone = simulation.cast_rays(at(z=0.5), directions[index : index + 1], 20.0, min_range=0.3)
+        assert alone.distances[0] == hits.distances[index]
+        assert alone.collisions[0] == hits.collisions[index]
+    assert (simulation.engine.model.geom_group == groups).all()
 
 
 def test_rays_see_wheels_as_cylinders() -> None:

@@ -107,6 +107,19 @@ def diff_drive(name: str = "robot", pose: Pose = IDENTITY) -> Model:
     return Model(name, links, joints, pose=pose)
 
 
+def four_wheels(length: float = 0.3, width: float = 0.33, radius: float = 0.0625, mass: float = 4.5) -> Model:
+    """Return a robot with wheels at (+-length/2, +-width/2) that do not steer; ``joint0`` and ``joint1`` are on the left."""
+    half = math.sqrt(0.5)
+    links = {"base": body("base", Box((0.3, 0.25, 0.1)), mass, at(z=0.1))}
+    joints: dict[str, Joint] = {}
+    for index, (x, y) in enumerate([(1, 1), (-1, 1), (1, -1), (-1, -1)]):
+        place = Pose((x * length / 2, y * width / 2, radius), (-half, 0.0, 0.0, half))
+        links[f"wheel{index}"] = body(f"wheel{index}", Cylinder(radius, 0.04), 0.28, place)
+        axis = Axis((0.0, 0.0, 1.0))
+        joints[f"joint{index}"] = Joint(f"joint{index}", "continuous", "base", f"wheel{index}", axis=axis)
+    return Model("robot", links, joints)
+
+
 def arm(count: int = 7, base: Vector = (0.0, 0.0, 0.0)) -> Model:
     """Return an arm on the ground with links of 0.2 m, whose axes are z, y, z, y, ..."""
     links = {"base": body("base", Box((0.2, 0.2, 0.1)), 5.0, at(*base[:2], base[2] + 0.05))}

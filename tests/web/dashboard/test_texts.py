@@ -93,3 +93,11 @@ def test_no_display_of_the_scene_has_a_status_or_error_without_its_translation()
         if re.search(r"[a-z]{2}", re.sub(r"\$\{[^}]*\}", "", found)) and found != '"OK"'
     }
     assert bare == set()
+
+
+def test_every_size_of_a_simulations_shape_is_in_the_table() -> None:
+    shapes = SOURCES["simulation.js"].partition("export const SHAPES")[2].partition("};")[0]
+    parts = re.findall(r"sizes: \{([^}]*)\}", shapes)
+    sizes = {name.strip() for part in parts for name in re.findall(r"([a-z ]+)\"?:", part)}
+    assert sizes >= {"size x", "radius"}
+    assert sizes - german().keys() == set()

@@ -25,15 +25,24 @@ from minirospy.core.sdf.model import (
 from minirospy.core.sdf.poses import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
-from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, Shapes
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, SOLREF, Shapes
 from minirospy.ros.gazebo_ros.physics.tree import WORLD, LinkTree, plan_tree
 
-__all__ = ["MOTOR_DAMPING", "Builder", "BuiltModel", "axis_names", "has_limits", "set_inertial"]
+__all__ = [
+    "MOTOR_DAMPING",
+    "Builder",
+    "BuiltModel",
+    "axis_names",
+    "count_substeps",
+    "has_limits",
+    "set_inertial",
+]
 
 FIXED_KINDS = ("fixed",)
 MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
 MIN_RANGE = 1e-5  # MuJoCo refuses a range of length zero
 MAX_LIGHTS = 8  # of OpenGL
+MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer ones MuJoCo softens contacts, and wheels slip
 VISUAL = "\tvisual"  # separates the names of visuals from those of collisions
 MOTOR_DAMPING = (
     0.9999  # MuJoCo's largest impedance: rows of joint friction and motors are as hard as it allows
@@ -75,9 +84,9 @@ class Builder:
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity of the next compilation."""
-        self.spec.option.timestep = physics.step
+        self._substep = physics.step / count_substeps(physics.step)
+        self.spec.option.timestep = self._substep
         self.spec.option.gravity = physics.gravity
-        self._step = physics.step
 
     def add(self, model: Model, name: str, pose: Pose) -> BuiltModel:
         """Add a model at a pose. Raise SimulationError if a part of it cannot be simulated; then nothing is added."""
@@ -218,7 +227,7 @@ class Builder:
             row = body.add_joint(name=axis_name, type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE)
             row.pos = joint.pose.position
             row.axis = _direction(joint, axis)
-            row.solref_friction = [-1 / self._step, -1 / self._step]
+            row.solref_friction = [-1 / self._substep, -1 / self._substep]
             row.solimp_friction = [MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0]
             row.solref_limit = [0.005, 1.0]
             row.solimp_limit = [0.95, 0.99, 0.001, 0.5, 2.0]
@@ -227,10 +236,10 @@ class Builder:
     def set_axis(self, name: str, kind: str, axis: Axis) -> None:
         """Set the limits and the passive forces of one of MuJoCo's joints."""
         row = self.spec.joint(name)
-        _set_first(row, "damping", _number(axis.damping))
-        _set_first(row, "stiffness", _number(axis.spring_stiffness))
+        _set_first(row, "damping", max(axis.damping, 0.0))
+        _set_first(row, "stiffness", max(axis.spring_stiffness, 0.0))
         row.springref = axis.spring_reference
-        row.frictionloss = _number(axis.friction)
+        row.frictionloss = max(axis.friction, 0.0)
         row.limited = kind != "continuous" and has_limits(axis)
         if row.limited:
             lower, upper = sorted((axis.lower, axis.upper))
@@ -311,6 +320,11 @@ def set_inertial(body: Any, inertial: Inertial) -> None:
     body.ipos, body.iquat = inertia.pose.position, _wxyz(inertia.pose.orientation)
 
 
+def count_substeps(step: float) -> int:
+    """Return the number of MuJoCo's steps in a step (s) of the world."""
+    return max(1, math.ceil(step / MAX_SUBSTEP - 1e-9))
+
+
 def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
     """Return the names of MuJoCo's joints for a joint: one for each axis, none for a fixed joint."""
     if joint.kind in FIXED_KINDS:
@@ -352,7 +366,7 @@ def _is_steep(pose: Pose, collision: Collision) -> bool:
 
 
 def _check_numbers(link: Link, joint: Joint | None) -> None:
-    """Raise SimulationError if a pose or an inertia is not finite: MuJoCo accepts NaN."""
+    """Raise SimulationError if a number is not finite, or a joint's limit is NaN: MuJoCo accepts NaN."""
     inertial = link.inertial
     values = [*link.pose.position, *link.pose.orientation, inertial.mass, *inertial.inertia]
     values += [*inertial.pose.position, *inertial.pose.orientation]
@@ -360,10 +374,20 @@ def _check_numbers(link: Link, joint: Joint | None) -> None:
         values += [*collision.pose.position, *collision.pose.orientation]
     if not all(map(math.isfinite, values)):
         raise SimulationError(f"link '{link.name}' has a pose or inertia that is not finite")
-    if joint is not None and not all(
-        map(math.isfinite, (*joint.pose.position, *joint.axis.xyz, *joint.axis2.xyz))
-    ):
-        raise SimulationError(f"joint '{joint.name}' has a pose or axis that is not finite")
+    if joint is None:
+        return
+    values = [*joint.pose.position]
+    limits: list[float] = []
+    for axis in (joint.axis, joint.axis2):
+        values += [*axis.xyz, axis.damping, axis.friction, axis.spring_stiffness]
+        values += [axis.spring_reference, axis.initial_position]
+        limits += [axis.lower, axis.upper, axis.effort, axis.velocity]
+    if not all(map(math.isfinite, values)):
+        raise SimulationError(
+            f"joint '{joint.name}' has a pose, axis, damping, friction or spring that is not finite"
+        )
+    if any(map(math.isnan, limits)):
+        raise SimulationError(f"joint '{joint.name}' has a limit that is NaN")
 
 
 def _direction(joint: Joint, axis: Axis) -> Vector:
@@ -379,10 +403,6 @@ def _set_first(row: Any, name: str, value: float) -> None:
         setattr(row, name, value)
     else:
         getattr(row, name)[0] = value
-
-
-def _number(value: float) -> float:
-    return max(value, 0.0) if math.isfinite(value) else 0.0
 
 
 def _wxyz(rotation: Quaternion) -> Quaternion:

@@ -1,7 +1,9 @@
-"""MuJoCo's compiled model and data, one step at a time, with motors as in ODE.
+"""MuJoCo's compiled model and data, one substep at a time, with motors as in ODE.
 
-After each step the positions of bodies, the contacts and the velocities belong to the new time: a step is the second half of
-``mj_step`` (forces, solver, integration) and the first half of the next one.
+A step of the world consists of substeps, because MuJoCo's contacts become soft if its step is long.
+
+After each substep the positions of bodies, the contacts and the velocities belong to the new time: a substep is the second half
+of ``mj_step`` (forces, solver, integration) and the first half of the next one.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from minirospy.core.sdf.model import Physics
-from minirospy.ros.gazebo_ros.physics.builder import MOTOR_DAMPING, Builder
+from minirospy.ros.gazebo_ros.physics.builder import MOTOR_DAMPING, Builder, count_substeps
 from minirospy.ros.gazebo_ros.physics.library import load_mujoco
 from minirospy.ros.gazebo_ros.physics.shapes import GROUP_COLLISION, GROUP_RAY_ONLY
 
@@ -35,7 +37,7 @@ class Engine:
     def __init__(self, builder: Builder, physics: Physics) -> None:
         self.mujoco = load_mujoco()
         self._builder = builder
-        self.physics = physics
+        self._set_step(physics)
         self.model: Any = builder.spec.compile()
         self.data: Any = self.mujoco.MjData(self.model)
         self.generation = 0  # grows with each compilation: ids of bodies and joints change
@@ -49,6 +51,11 @@ class Engine:
         self.joint_wrenches: NDArray[np.float64] = np.zeros((1, 6))
         self._has_normals = "normal:" in (self.mujoco.mj_multiRay.__doc__ or "")
         self._size_arrays()
+
+    def _set_step(self, physics: Physics) -> None:
+        self.physics = physics
+        self.substeps = count_substeps(physics.step)  # in a step of the world
+        self.substep = physics.step / self.substeps  # s
 
     def _size_arrays(self) -> None:
         count = self.model.nv
@@ -67,10 +74,11 @@ class Engine:
         dofs, positions = self.model.jnt_dofadr, self.model.jnt_qposadr
         self.position_of_dof[dofs] = positions
         self._swinging = self._find_swinging()
+        self._ray_counts = self._count_ray_geoms()
         self._set_friction_rows()
 
     def _set_friction_rows(self) -> None:
-        rate = 1 / self.physics.step
+        rate = 1 / self.substep
         self._rate = rate / MOTOR_DAMPING
         self.model.dof_solref[:] = (-rate, -rate)
         self.model.dof_solimp[:] = (MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0)
@@ -85,8 +93,8 @@ class Engine:
 
     def set_physics(self, physics: Physics) -> None:
         """Set the step and the gravity."""
-        self.physics = physics
-        self.model.opt.timestep = physics.step
+        self._set_step(physics)
+        self.model.opt.timestep = self.substep
         self.model.opt.gravity[:] = physics.gravity
         self._builder.set_physics(physics)
         self._set_friction_rows()
@@ -112,12 +120,12 @@ class Engine:
             self.mujoco.mj_step1(self.model, self.data)
             self._forget_details()
 
-    def step(self) -> None:
-        """Advance by one step."""
+    def advance(self, left: int = 1) -> None:
+        """Advance by one substep; ``left`` is the number of substeps until the end of the world's step, with this one."""
         model, data, mujoco = self.model, self.data, self.mujoco
         self.refresh()
         if self._followers.size:
-            self._follow()
+            self._follow(left)
         rows = slice(data.ne, data.ne + data.nf)
         dofs = data.efc_id[rows] if data.nf else None
         if dofs is not None:
@@ -135,7 +143,7 @@ class Engine:
             self.motor_force[dofs] = data.efc_force[rows]
         if self._damped.size:
             self._limit_damped()
-        if self.records_details:
+        if self.records_details and left == 1:
             self._record()
         mujoco.mj_step1(model, data)
 
@@ -149,23 +157,44 @@ class Engine:
         excluded_body: int,
     ) -> None:
         """Write each ray's first geom and its distance, or -1. ``vectors`` are (n, 3) unit vectors in world axes."""
-        count = len(vectors)
         # Newer versions have an argument for normals.
         normals = (None,) if self._has_normals else ()
-        self.mujoco.mj_multiRay(
-            self.model,
-            self.data,
-            origin,
-            vectors.ravel(),
-            RAY_GROUPS,
-            True,
-            excluded_body,
-            ids,
-            distances,
-            *normals,
-            count,
-            max_range,
-        )
+        # MuJoCo looks at all geoms for each ray; a room of one mesh has thousands that no ray hits, behind the one that it does.
+        counts = self.model.body_geomnum
+        all_counts = counts.copy()
+        counts[:] = self._ray_counts
+        try:
+            self.mujoco.mj_multiRay(
+                self.model,
+                self.data,
+                origin,
+                vectors.ravel(),
+                RAY_GROUPS,
+                True,
+                excluded_body,
+                ids,
+                distances,
+                *normals,
+                len(vectors),
+                max_range,
+            )
+        finally:
+            counts[:] = all_counts
+
+    def _count_ray_geoms(self) -> NDArray[np.int32]:
+        """Return how many of each body's geoms rays need: those until the last one that they can hit."""
+        model = self.model
+        counts = np.zeros(model.nbody, np.int32)
+        geoms = np.flatnonzero(RAY_GROUPS[model.geom_group])
+        bodies = model.geom_bodyid[geoms]
+        np.maximum.at(counts, bodies, geoms - model.body_geomadr[bodies] + 1)
+        return counts
+
+    def geoms_within(self, point: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
+        """Return the geoms that lie within a distance (m) of a point in the world."""
+        radii = self.model.geom_rbound  # 0: the geom is infinite
+        away = np.linalg.norm(self.data.geom_xpos - point, axis=1)
+        return np.flatnonzero((radii > 0) & (away + radii < distance))
 
     def _coriolis_correction(self) -> NDArray[np.float64] | None:
         """Return the difference of Coriolis and centrifugal forces between the last velocities and those half a step later.
@@ -178,7 +207,7 @@ class Engine:
         speed = abs(data.qvel[swinging]).max()
         if speed < MIN_SWING:
             return None
-        change = data.qacc * self.physics.step
+        change = data.qacc * self.substep
         if abs(change[swinging]).max() > 0.1 * speed:
             return None
         velocities = data.qvel.copy()
@@ -206,12 +235,12 @@ class Engine:
                 result.append(dof)
         return np.array(result, np.intp)
 
-    def _follow(self) -> None:
-        """Give position motors the velocity that reaches the target with this step."""
+    def _follow(self, left: int) -> None:
+        """Give position motors the velocity that reaches the target with the last of ``left`` substeps."""
         dofs = self._followers
         lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
-        limit, step = self.max_velocity[dofs], self.physics.step
-        self._bias[dofs] = np.clip(lacking, -limit * step, limit * step) * (self._rate / step)
+        limit = self.max_velocity[dofs]
+        self._bias[dofs] = np.clip(lacking / (left * self.substep), -limit, limit) * self._rate
 
     def _limit_damped(self) -> None:
         """Set the damping of joints with motors, and the force that their motors have left.

@@ -244,10 +244,13 @@ class SimJoint:
     def set_axis(self, axis: Axis) -> None:
         """Change limits, damping, friction and spring, but not the direction; the world is compiled again.
 
-        Raise SimulationError if damping or friction is not finite.
+        Raise SimulationError if damping or friction is not finite, or a limit is NaN.
         """
+        name = f"{self.model.name}::{self.name}"
         if not (math.isfinite(axis.damping) and math.isfinite(axis.friction)):
-            raise SimulationError(f"{self.model.name}::{self.name}: the damping or friction is not finite")
+            raise SimulationError(f"{name}: the damping or friction is not finite")
+        if math.isnan(axis.lower) or math.isnan(axis.upper):
+            raise SimulationError(f"{name}: the limit NaN is not finite")
         self.axis = axis._replace(xyz=self.axis.xyz, initial_position=self.axis.initial_position)
         if self.dof >= 0:
             self.model.set_axis(self.scoped, self.record.kind, self.axis)

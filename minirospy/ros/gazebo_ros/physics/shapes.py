@@ -41,6 +41,7 @@ __all__ = [
     "GROUP_RAY_ONLY",
     "GROUP_VISUAL",
     "PART",
+    "SOLREF",
     "Shapes",
     "friction",
 ]
@@ -210,11 +211,11 @@ class Shapes:
         except MeshError as error:
             raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
         is_whole = parts.are_exact
-        for part in parts.meshes:
-            name = self._add_mesh(part.vertices, part.triangles if is_whole else None)
-            yield _Piece("MESH", asset=name, group=GROUP_COLLISION if is_whole else GROUP_CONTACT_ONLY)
-        if not is_whole:
+        if not is_whole:  # first in the body: Engine.cast counts on it
             yield _Piece("MESH", asset=self._add_mesh(mesh.vertices, mesh.triangles), group=GROUP_RAY_ONLY)
+        for part in parts.meshes:
+            asset = self._add_mesh(part.vertices, part.triangles if is_whole else None)
+            yield _Piece("MESH", asset=asset, group=GROUP_COLLISION if is_whole else GROUP_CONTACT_ONLY)
 
     def _visible(self, geometry: Geometry) -> list[_Piece]:
         if isinstance(geometry, Plane):

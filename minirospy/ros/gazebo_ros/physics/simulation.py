@@ -19,7 +19,7 @@ from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
-from minirospy.ros.gazebo_ros.physics.shapes import PART
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, PART
 from minirospy.ros.gazebo_ros.physics.states import Contact, LostModel, RayHits, Wrench
 
 if TYPE_CHECKING:
@@ -97,17 +97,23 @@ class Simulation:
         for _ in range(count):
             if self.forced or self._had_forces:
                 self._apply_forces()
-            engine = self.engine
-            engine.refresh()
-            positions, velocities = engine.data.qpos.copy(), engine.data.qvel.copy()
-            engine.step()
-            # NaN and large values fail this comparison, too.
-            data = engine.data
-            if not (abs(data.qvel) < MAX_SPEED).all() or not (abs(data.qpos) < self._farthest).all():
-                lost += self._remove_lost(positions, velocities)
+            for left in range(self.engine.substeps, 0, -1):
+                lost += self._advance(left)
             self._time_ns += round(self.physics.step * NANOSECONDS)
             self.engine.data.time = self.time
         return lost
+
+    def _advance(self, left: int) -> list[LostModel]:
+        """Advance by the first of ``left`` substeps. Return the models that were removed."""
+        engine = self.engine
+        engine.refresh()
+        positions, velocities = engine.data.qpos.copy(), engine.data.qvel.copy()
+        engine.advance(left)
+        # NaN and large values fail this comparison, too.
+        data = engine.data
+        if (abs(data.qvel) < MAX_SPEED).all() and (abs(data.qpos) < self._farthest).all():
+            return []
+        return self._remove_lost(positions, velocities)
 
     def _apply_forces(self) -> None:
         data = self.engine.data
@@ -122,7 +128,7 @@ class Simulation:
     def _remove_lost(
         self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
     ) -> list[LostModel]:
-        """Remove the models that caused invalid states; the others return to the state before the step."""
+        """Remove the models that caused invalid states; the others return to the state before the substep."""
         data = self.engine.data
         broken: dict[str, str] = {}
         fastest = np.full(len(data.qvel), MAX_SPEED)
@@ -143,13 +149,13 @@ class Simulation:
         return result
 
     def _sources(self, broken: Iterable[str], velocities: NDArray[np.float64]) -> list[str]:
-        """Return the models that made some too fast or NaN in the last step, before which the velocities were given.
+        """Return the models that made some too fast or NaN in the last substep, before which the velocities were given.
 
         Contacts spread large velocities and NaN to other models. A model's velocity without contacts shows the source: if none
         is too large, it is that of the fastest of the broken models.
         """
         with np.errstate(all="ignore"):
-            free = abs(velocities + self.engine.data.qacc_smooth * self.physics.step)
+            free = abs(velocities + self.engine.data.qacc_smooth * self.engine.substep)
         speeds: dict[str, float] = {}
         for name, speed in zip(self._model_of_dof, free.tolist(), strict=True):
             speeds[name] = max(speeds.get(name, 0.0), math.inf if math.isnan(speed) else speed)
@@ -324,16 +330,20 @@ class Simulation:
             origin = np.array(pose.position)
             vectors = np.ascontiguousarray(directions @ _matrix(pose).T)
             body = engine.model.body(exclude).id if exclude else -1
+            # MuJoCo casts many rays from one point only. What lies within the smallest range, such as the housing, is hidden.
+            inner = engine.geoms_within(origin, min_range)
+            groups = engine.model.geom_group
+            shown = groups[inner]
+            groups[inner] = GROUP_VISUAL
             engine.cast(origin, vectors, ids, distances, max_range, body)
-            if min_range > 0:
-                for index in np.flatnonzero((distances >= 0) & (distances < min_range)):
-                    start = origin + min_range * vectors[index]
-                    found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
-                    engine.cast(
-                        start, vectors[index : index + 1].copy(), found, hit, max_range - min_range, body
-                    )
-                    ids[index] = found[0]
-                    distances[index] = hit[0] + min_range if hit[0] >= 0 else -1.0
+            groups[inner] = shown
+            # Another near geom, such as a wall, is passed by single rays that begin at the smallest range.
+            for index in np.flatnonzero((distances >= 0) & (distances < min_range)).tolist():
+                start = origin + min_range * vectors[index]
+                found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
+                engine.cast(start, vectors[index : index + 1].copy(), found, hit, max_range - min_range, body)
+                ids[index] = found[0]
+                distances[index] = hit[0] + min_range if hit[0] >= 0 else -1.0
         missed = (distances < 0) | (distances > max_range)
         distances[missed] = np.inf
         ids[missed] = -1

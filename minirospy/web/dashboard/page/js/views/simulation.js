@@ -7,42 +7,33 @@ import {
   DIRECTIONS,
   freeName,
   heightOf,
-  isThere,
   jointsOf,
   librarySdf,
-  poseOf,
-  pushOf,
   QUIET_MS,
-  rateOf,
   readName,
   readNumber,
   readState,
-  serviceOf,
   SHAPES,
   shapeSdf,
-  spawnOf,
   splitLink,
-  stateOf,
-  STEP,
   threeDecimals,
   topicOf,
   toRpy,
 } from "../simulation.js";
+import { MAX_EFFORT_SECONDS, SimulationServices } from "../simulation_services.js";
 import { errorText, t } from "../texts.js";
 
 const LOOK_MS = 500; // between two looks at the selected model
 const LIST_MS = 3000; // between two looks at the list of models
-const ANSWER_MS = 6000; // that a service has
-const SPAWN_MS = 60_000; // a large mesh takes long
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 0]; // 0 is as fast as possible
 const POSE = ["x", "y", "z", "roll", "pitch", "yaw"];
-const MAX_EFFORT_SECONDS = 1; // of a joint's force
 const COLORS = ["#d9822b", "#3b7dd8", "#3a9a5b", "#c2453d", "#8a5fc7"];
 const LIBRARY = "model";
 
 export class Simulation {
   constructor(link, words, main, place) {
     this.link = link;
+    this.services = new SimulationServices(link);
     this.place = place;
     this.state = null; // of the simulation, null until it is known
     this.stateAt = 0; // when it came
@@ -74,7 +65,7 @@ export class Simulation {
     for (const end of this.ends) end();
     this.endJoints?.();
     this.scene?.close();
-    if (this.isStepping) this.link.unpublish(STEP.topic);
+    this.services.close();
   }
 
   // --- elements
@@ -96,7 +87,9 @@ export class Simulation {
   }
 
   buildBar() {
-    this.playButton = this.button("❚❚", "Pause", () => this.pause(!this.state?.isPaused), { class: "sim-play" });
+    this.playButton = this.button("❚❚", "Pause", () => this.services.pause(!this.state?.isPaused), {
+      class: "sim-play",
+    });
     this.steps = h("input", { class: "short", inputmode: "numeric", value: "1", "aria-label": "Steps" });
     this.stepButton = this.button("Step", "Advance a paused simulation by so many steps", () => this.step());
     this.speed = h("select", { "aria-label": "Speed", onchange: () => this.act(() => this.setSpeed()) });
@@ -128,8 +121,10 @@ export class Simulation {
       this.steps,
       this.stepButton,
       h("label", {}, "Speed", this.speed),
-      this.button("Reset world", "All models return to the start; the time goes on", () => this.call("reset_world")),
-      this.button("Reset time", "Models and time return to the start", () => this.call("reset_simulation")),
+      this.button("Reset world", "All models return to the start; the time goes on", () =>
+        this.services.call("reset_world"),
+      ),
+      this.button("Reset time", "Models and time return to the start", () => this.services.call("reset_simulation")),
       Object.values(this.toggles),
       h("span", { class: "spring" }),
       this.world,
@@ -263,7 +258,7 @@ export class Simulation {
       if (this.isClosed) return;
       this.scene = new SimulationScene(this.link, this.frame, {
         selected: (model) => this.select(model),
-        call: (service, request) => this.call(service, request),
+        call: (service, request) => this.services.call(service, request),
         push: (hit, direction) => this.act(() => this.pushHit(hit, direction)),
         changed: () => this.list(),
         unfollowed: () => this.showFollowed(),
@@ -301,18 +296,13 @@ export class Simulation {
     this.look();
   }
 
-  get isThere() {
-    // A page that may not call services is offered none.
-    const { mayWrite, services, channels } = this.link;
-    return mayWrite ? isThere(services) : channels.has(topicOf("state"));
-  }
-
   get isQuiet() {
     return performance.now() - this.stateAt > QUIET_MS;
   }
 
   look() {
-    const { isThere: isRunning, link } = this;
+    const { link, services } = this;
+    const isRunning = services.isThere;
     for (const part of [this.bar, this.split]) part.hidden = !isRunning;
     setText(
       this.empty,
@@ -368,66 +358,31 @@ export class Simulation {
 
   // --- requests
 
-  /** Call a service of the simulation. Rejects with one line if it is not there, does not answer or refuses. */
-  async call(name, request = {}, most = ANSWER_MS) {
-    const service = serviceOf(name);
-    if (!this.link.mayWrite) throw new Error(t("This token is read-only."));
-    if (!this.link.services.has(service))
-      throw new Error(t("{service} is not there: the simulation has ended", { service }));
-    let timer = null;
-    const late = new Promise((_, reject) => {
-      timer = setTimeout(
-        () => reject(new Error(t("{service} does not answer: has the simulation stopped?", { service }))),
-        most,
-      );
-    });
-    try {
-      const response = await Promise.race([this.link.call(service, request), late]);
-      if (response.success === false) throw new Error(response.status_message || response.message || t("refused"));
-      return response;
-    } finally {
-      clearTimeout(timer);
-    }
-  }
-
-  async pause(isPaused) {
-    await this.call(isPaused ? "pause_physics" : "unpause_physics");
-  }
-
   async step() {
     const count = readNumber(this.steps.value, t("Steps"), { least: 1, most: 1e6 });
     if (!Number.isInteger(count))
       throw new Error(t("{name}: {value} is not a whole number", { name: t("Steps"), value: count }));
-    this.isStepping = true;
-    await this.link.publish(STEP.topic, STEP.type, STEP.schema, { data: count });
+    await this.services.step(count);
   }
 
   async setSpeed() {
     const { state } = this;
     const speed = Number(this.speed.value);
     this.speed.blur();
-    const physics = await this.call("get_physics_properties");
-    await this.call("set_physics_properties", {
-      time_step: physics.time_step,
-      max_update_rate: rateOf(speed, physics.time_step),
-      gravity: physics.gravity,
-      ode_config: physics.ode_config,
-    });
-    if (state) state.rate = rateOf(speed, physics.time_step);
+    const rate = await this.services.setSpeed(speed);
+    if (state) state.rate = rate;
   }
 
   // --- models
 
   async list() {
-    if (!this.isThere || this.isListing || this.isClosed) return;
+    if (!this.services.isThere || this.isListing || this.isClosed) return;
     this.isListing = true;
     try {
       // A page that calls no services has the models that it sees.
-      this.models = this.link.mayWrite
-        ? (await this.call("get_world_properties")).model_names
-        : (this.scene?.world.models() ?? []);
+      this.models = this.link.mayWrite ? await this.services.models() : (this.scene?.world.models() ?? []);
     } catch (error) {
-      if (this.isThere) this.say(errorText(error));
+      if (this.services.isThere) this.say(errorText(error));
     } finally {
       this.isListing = false;
     }
@@ -494,9 +449,9 @@ export class Simulation {
 
   async readProperties() {
     const { model } = this;
-    if (!model || !this.isThere || !this.link.mayWrite) return;
+    if (!model || !this.services.isThere || !this.link.mayWrite) return;
     try {
-      const properties = await this.call("get_model_properties", { model_name: model });
+      const properties = await this.services.properties(model);
       if (model !== this.model) return;
       this.properties = properties;
       for (const field of Object.values(this.fields)) delete field.dataset.edited;
@@ -534,12 +489,11 @@ export class Simulation {
   /** Show the pose of the selected model in the fields that nobody edits. */
   async readPose() {
     const { model } = this;
-    if (!model || !this.properties || !this.isThere || this.isReading || !this.link.mayWrite) return;
+    if (!model || !this.properties || !this.services.isThere || this.isReading || !this.link.mayWrite) return;
     this.isReading = true;
     try {
-      const { pose } = await this.call("get_model_state", { model_name: model, relative_entity_name: "" });
+      const { position: p, orientation: q } = await this.services.pose(model);
       if (model !== this.model) return;
-      const { position: p, orientation: q } = pose;
       const values = [p.x, p.y, p.z, ...toRpy([q.x, q.y, q.z, q.w])];
       POSE.forEach((name, index) => {
         const field = this.fields[name];
@@ -555,13 +509,12 @@ export class Simulation {
 
   async setPose() {
     const values = POSE.map((name) => readNumber(this.fields[name].value, name));
-    const pose = poseOf(values.slice(0, 3), values.slice(3));
-    await this.call("set_model_state", { model_state: stateOf(this.model, pose) });
+    await this.services.setPose(this.model, values.slice(0, 3), values.slice(3));
     for (const field of Object.values(this.fields)) delete field.dataset.edited;
   }
 
   async remove(model) {
-    await this.call("delete_model", { model_name: model });
+    await this.services.remove(model);
     await this.list();
   }
 
@@ -588,7 +541,7 @@ export class Simulation {
   async pushLink() {
     const [newtons, seconds] = this.readPush();
     const force = DIRECTIONS[this.direction.value].map((part) => part * newtons);
-    await this.call("apply_body_wrench", pushOf(`${this.model}::${this.link_.value}`, force, [0, 0, 0], seconds));
+    await this.services.push(`${this.model}::${this.link_.value}`, force, [0, 0, 0], seconds);
   }
 
   /** Push what is under the mouse away from the viewer. */
@@ -597,15 +550,8 @@ export class Simulation {
     const [newtons, seconds] = this.readPush();
     const origin = this.scene.context.transformNow(link)?.p ?? [0, 0, 0];
     const at = point.toArray().map((part, index) => part - origin[index]);
-    await this.call(
-      "apply_body_wrench",
-      pushOf(
-        link,
-        direction.map((part) => part * newtons),
-        at,
-        seconds,
-      ),
-    );
+    const force = direction.map((part) => part * newtons);
+    await this.services.push(link, force, at, seconds);
     this.scene.say(t("{name}: {newtons} N for {seconds} s", { name: link, newtons, seconds }));
   }
 
@@ -630,6 +576,7 @@ export class Simulation {
   jointRow({ name, position }) {
     const shown = h("span", { class: "num" });
     const field = this.field(name, position.toFixed(2));
+    field.setAttribute("aria-label", name); // the robot's word, which is not translated
     const send = h(
       "button",
       { type: "button", class: "small", onclick: () => this.act(() => this.moveJoint(name, field)) },
@@ -651,21 +598,10 @@ export class Simulation {
 
   async moveJoint(name, field) {
     const value = readNumber(field.value, name);
-    const scoped = `${this.model}::${name}`;
-    if (this.jointMode.value === "effort")
-      await this.call("apply_joint_effort", {
-        joint_name: scoped,
-        effort: value,
-        start_time: { secs: 0, nsecs: 0 },
-        duration: { secs: MAX_EFFORT_SECONDS, nsecs: 0 },
-      });
-    else
-      await this.call("set_model_configuration", {
-        model_name: this.model,
-        urdf_param_name: "",
-        joint_names: [name],
-        joint_positions: [value],
-      });
+    const { model, services } = this;
+    await (this.jointMode.value === "effort"
+      ? services.pushJoint(model, name, value)
+      : services.setJoint(model, name, value));
   }
 
   // --- insert
@@ -707,10 +643,10 @@ export class Simulation {
   async readLibrary() {
     if (this.library.children.length) return;
     try {
-      const { message } = await this.call("window/list_models");
+      const names = await this.services.library();
       fill(
         this.library,
-        message.split("\n").map((name) => h("option", { value: name })),
+        names.map((name) => h("option", { value: name })),
       );
     } catch (error) {
       this.say(errorText(error));
@@ -728,13 +664,13 @@ export class Simulation {
       const sizes = Object.fromEntries(
         Object.entries(this.sizeFields).map(([name, field]) => [
           name,
-          readNumber(field.value, name, { least: 0, most: 1000, isAbove: true }),
+          readNumber(field.value, t(name), { least: 0, most: 1000, isAbove: true }),
         ]),
       );
       xml = shapeSdf(kind, sizes, rgbOf(this.color.value));
     }
     const name = readName(this.nameField.value, this.models);
-    await this.call("spawn_sdf_model", spawnOf(name, xml, poseOf(at)), SPAWN_MS);
+    await this.services.spawn(name, xml, at);
     delete this.nameField.dataset.edited;
     this.inserted += 1;
     this.color.value = COLORS[this.inserted % COLORS.length];
