@@ -726,6 +726,9 @@ export const GERMAN = {
   "average of 10 s": "Mittel über 10 s",
   "How {label} is shown": "Wie {label} gezeigt wird",
   "Remove {name}": "{name} entfernen",
+  "Remove all": "Alle entfernen",
+  "Remove all series": "Alle Kurven entfernen",
+  "plot the angles": "Winkel als Kurven",
   "{count} points": "{count} Punkte",
   // graph
   "rates": "Raten",

@@ -6,6 +6,7 @@ import { download, fill, h, number, refill, setText, uniqueId } from "../dom.js"
 import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
 import { t } from "../texts.js";
+import { STEPS, tickTexts } from "../ticks.js";
 
 const WINDOWS = [
   ["5", "5 s"],
@@ -123,6 +124,7 @@ export class Plot {
         this.liveButton,
         this.axes.autoButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
+        h("button", { type: "button", title: "Remove all series", onclick: () => this.removeAll() }, "Remove all"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
         h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
@@ -221,6 +223,14 @@ export class Plot {
     this.problems.delete(path);
     this.remember();
     this.showProblems();
+  }
+
+  removeAll() {
+    for (const series of [...this.series.values()]) this.remove(series);
+    for (const path of [...this.ends.keys()]) this.forget(path);
+    this.removed.clear();
+    this.origin = null;
+    this.live();
   }
 
   remember() {
@@ -479,7 +489,13 @@ export class Plot {
             points: { size: 6, fill: each.color, show: () => each.samples.count === 1 },
           })),
         ], // a line has two points
-        axes: [styled({ values: (_, all) => all.map((each) => `${number(each)} s`) }), ...axes],
+        axes: [
+          styled({
+            incrs: STEPS,
+            values: (chart, all, index, space, step) => tickTexts(all, step).map((text) => `${text} s`),
+          }),
+          ...axes,
+        ],
         hooks: {
           setSelect: [
             (chart) => {
@@ -561,7 +577,16 @@ export class Plot {
             ],
           })),
         ],
-        axes: [styled({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), ...axes],
+        axes: [
+          styled({
+            label: this.over,
+            labelSize: 22,
+            labelFont: "12px system-ui",
+            incrs: STEPS,
+            values: (each, all, index, space, step) => tickTexts(all, step),
+          }),
+          ...axes,
+        ],
       },
       [null, ...shown.map(() => [[], []])],
       this.area,
