@@ -729,6 +729,13 @@ export const GERMAN = {
   "Remove all": "Alle entfernen",
   "Remove all series": "Alle Kurven entfernen",
   "plot the angles": "Winkel als Kurven",
+  "Plot paths of this bag": "Pfade dieses Bags zeichnen",
+  "Plot a whole bag, without playing it": "Ein ganzes Bag zeichnen, ohne es abzuspielen",
+  "Show all": "Alles zeigen",
+  "there is no bag": "es gibt kein Bag",
+  "reading: {percent} %": "liest: {percent} %",
+  "live topics and bags are in separate plots: remove all, or open a second plot":
+    "Laufende Topics und Bags stehen in getrennten Bildern: alle entfernen oder ein zweites öffnen",
   "{count} points": "{count} Punkte",
   // graph
   "rates": "Raten",

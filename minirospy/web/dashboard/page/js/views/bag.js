@@ -707,7 +707,7 @@ class Player {
       this.cards.get(row.name)?.element.remove();
       this.cards.delete(row.name);
     } else if (!this.cards.has(row.name)) {
-      const card = new Card(row);
+      const card = new Card(row, this.bag.name);
       this.cards.set(row.name, card);
       this.moments.append(card.element);
     }
@@ -816,7 +816,7 @@ class Player {
 
 // The message of the moment of one topic.
 class Card {
-  constructor(row) {
+  constructor(row, bag) {
     this.row = row;
     this.time = h("span", { class: "num muted" });
     this.problem = h("p", { class: "error" });
@@ -824,7 +824,8 @@ class Card {
     this.canvas = this.isImage
       ? h("canvas", { class: "image", role: "img", width: 0, height: 0, "aria-label": row.name })
       : null;
-    this.tree = this.isImage ? null : new Tree(row.name);
+    // Its links plot the whole bag.
+    this.tree = this.isImage ? null : new Tree(`${bag}:${row.name}`);
     this.body = h("div", { class: this.isImage ? "card-image" : "fields" }, this.canvas ?? this.tree.element);
     this.waiting = h("p", { class: "muted" }, "No message yet at this time.");
     this.element = h(
