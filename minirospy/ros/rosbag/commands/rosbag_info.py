@@ -70,6 +70,7 @@ def _info(bags: list[str], yaml: bool, key: str | None, freq: bool) -> int:
         try:
             with open_reader(path) as reader:
                 summary = info.summarize(reader, path, frequencies=freq)
+                span = info.span_out_of_order(reader)
         except BagEncryptedError as error:
             report(unreadable(path, error))
             continue
@@ -77,6 +78,12 @@ def _info(bags: list[str], yaml: bool, key: str | None, freq: bool) -> int:
             report(unreadable(path, error))
             return 1
 
+        if span:
+            report(
+                f"WARNING: {path}: its chunks are not in time order. ROS takes start, end and duration from the first and "
+                f"the last chunk; the messages are from {span[0]:.2f} to {span[1]:.2f} ({span[1] - span[0]:.1f}s). "
+                "`rosbag filter` with True writes them in order"
+            )
         if not yaml:
             print(info.as_text(summary))
         elif not key:
