@@ -167,3 +167,17 @@ def test_field_of_an_open_bag_links_to_its_plot(
     page = browse(address(serve(), f"bag?file=short.bag&token={TOKEN}"))
     page.click("a.plot[title='Plot short.bag:/twice/data']", "plot")
     page.wait_text(".series .count", "10 points")
+
+
+@needs_chromium
+def test_shown_topics_of_a_bag_are_exported(
+    bags: Path, serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), f"bag?file=short.bag&token={TOKEN}"))
+    page.wait_text(".bag-label .name", "/line")
+    page.choose("select[aria-label='Export the shown topics']", "csv")
+    page.wait_text("p[role=status]", "short_line.csv: 10 rows, 2 columns")
+    assert (bags / "short_line.csv").read_text(encoding="utf-8").splitlines()[1] == "99000.500000000,0.0"
+    # The second one would replace a file.
+    page.choose("select[aria-label='Export the shown topics']", "csv")
+    page.wait_text("p.error", "exists already")

@@ -2,10 +2,12 @@
 
 A client sends ``{"op": NAME, ...}``: list; record {topics, name, suffix, compression}, stop; open {name}, close;
 play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {topics}; density {start, end, bins};
-thumbnails {topic, times}; for plots: fields {name}, series {id, start, end, columns, series}. The server sends
+thumbnails {topic, times}; for plots: fields {name}, series {id, start, end, columns, series};
+export {topics, format}. The server sends
 ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``, ``{"bag"}``, ``{"state"}``, ``{"density"}``,
-``{"fields"}``, ``{"series"}``, ``{"sampling"}`` (the progress of series), ``{"error"}``, and binary messages: a byte (1: the
-current message, 2: a message for a thumbnail), the topic's number (u16), its time (f64), the serialized message.
+``{"fields"}``, ``{"series"}``, ``{"sampling"}`` (the progress of series), ``{"exported"}``, ``{"error"}``, and binary
+messages: a byte (1: the current message, 2: a message for a thumbnail), the topic's number (u16), its time (f64), the
+serialized message.
 Times are seconds since the bag's start. All operations require the read-write token, because files are read and written as the
 dashboard's user.
 """
@@ -14,6 +16,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import struct
 import time
 from collections import deque
@@ -23,6 +26,7 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.errors import BagError, MinirospyError, UsageError
+from minirospy.introspect.bag_export import Exported, export
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.bag_player import GraphOutput, OpenBag
 from minirospy.web.dashboard.bag_plot import SeriesRequest, fields_of, series_of
@@ -130,6 +134,7 @@ class BagSession(JsonSession):
             "thumbnails": self._request_thumbnails,
             "fields": self._fields,
             "series": self._series,
+            "export": self._export,
         }
         super().__init__(client, handlers)
 
@@ -292,6 +297,33 @@ class BagSession(JsonSession):
             raise UsageError(f"'{topic[:200]}' is not a topic of this bag")
         self._thumbnails = deque(each for each in self._thumbnails if each[0] != topic)
         self._thumbnails += [(topic, self._time(bag, each)) for each in times[:_MAX_THUMBNAILS]]
+
+    # --- tables
+
+    async def _export(self, fields: Fields) -> None:
+        name, topics, format_ = self._opened().name, texts_of(fields, "topics"), text_of(fields, "format")
+        if not topics:
+            raise UsageError("no topic is chosen")
+        # Do not wait for it: the player remains usable.
+        self._endpoint.spawn(self._write_tables(name, topics, format_))
+
+    async def _write_tables(self, name: str, topics: Sequence[str], format_: str) -> None:
+        folder = self._endpoint.folder
+
+        def check(done: int) -> None:
+            if self.is_ended:
+                raise BagError("the page has left")
+
+        def write() -> list[Exported]:
+            return export(str(folder.path_of(name)), topics, str(folder.root), format_, step=check)
+
+        try:
+            found = await self._loop.run_in_executor(None, write)
+        except (MinirospyError, OSError) as error:
+            self.send_error(f"{name}: {error}")
+        else:
+            rows = [[os.path.basename(each.path), each.rows, each.columns, each.left_out] for each in found]
+            self.send({"exported": rows})
 
     # --- plots
 

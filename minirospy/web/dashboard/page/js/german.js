@@ -732,6 +732,11 @@ export const GERMAN = {
   "Plot paths of this bag": "Pfade dieses Bags zeichnen",
   "Plot a whole bag, without playing it": "Ein ganzes Bag zeichnen, ohne es abzuspielen",
   "Show all": "Alles zeigen",
+  "Export the shown topics": "Die gezeigten Topics exportieren",
+  "Export …": "Export …",
+  "writing …": "schreibt …",
+  "{file}: {rows} rows, {columns} columns": "{file}: {rows} Zeilen, {columns} Spalten",
+  ", without {fields}": ", ohne {fields}",
   "there is no bag": "es gibt kein Bag",
   "reading: {percent} %": "liest: {percent} %",
   "live topics and bags are in separate plots: remove all, or open a second plot":

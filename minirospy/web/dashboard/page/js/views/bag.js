@@ -94,8 +94,12 @@ export class Bag {
       },
       state: (state) => this.player.show(state),
       density: (density) => this.player.showDensity(density),
+      exported: (tables) => this.player.showExported(tables),
       binary: (data) => this.player.received(data),
-      error: (text) => this.say(text),
+      error: (text) => {
+        this.player.showExported(null);
+        this.say(text);
+      },
     });
   }
 
@@ -391,6 +395,14 @@ class Player {
       this.clock,
       "/clock",
     );
+    this.export = h(
+      "select",
+      { "aria-label": "Export the shown topics", onchange: () => this.exportShown() },
+      h("option", { value: "" }, "Export …"),
+      h("option", { value: "csv" }, "CSV"),
+      h("option", { value: "parquet" }, "Parquet"),
+    );
+    this.exported = h("p", { class: "muted", role: "status", hidden: true });
     this.publishLabel = h("label", { class: "publish-switch" }, this.publishing, "Publish");
     this.now = h("output", { class: "num now" });
     this.date = h("span", { class: "muted num" });
@@ -425,7 +437,9 @@ class Player {
           h("label", {}, this.loop, t("loop")),
           this.publishLabel,
           this.clockLabel,
+          this.export,
         ),
+        this.exported,
         h("div", { class: "bag-timeline" }, this.labels, this.area),
       ),
       this.moments,
@@ -496,6 +510,7 @@ class Player {
     this.publishing.checked = false;
     this.clock.checked = false;
     this.clockLabel.hidden = true;
+    this.showExported(null);
     this.canvas.setAttribute("aria-valuemax", bag.length);
     this.element.hidden = !this.rows.length;
     this.resized();
@@ -568,6 +583,24 @@ class Player {
       topics: isOn ? this.rows.filter((row) => row.isPublished).map(({ name }) => name) : [],
       clock: isOn && this.clock.checked,
     });
+  }
+
+  /** Write the shown topics as tables into the folder of the command. */
+  exportShown() {
+    this.send({ op: "export", topics: [...this.cards.keys()], format: this.export.value });
+    this.export.value = "";
+    this.exported.hidden = false;
+    setText(this.exported, t("writing …"));
+  }
+
+  showExported(tables) {
+    this.exported.hidden = !tables;
+    const lines = (tables ?? []).map(
+      ([file, rows, columns, leftOut]) =>
+        t("{file}: {rows} rows, {columns} columns", { file, rows, columns }) +
+        (leftOut.length ? t(", without {fields}", { fields: leftOut.join(", ") }) : ""),
+    );
+    setText(this.exported, lines.join(" · "));
   }
 
   key(event) {
