@@ -66,8 +66,9 @@ def bag_span(reader: BagReader) -> tuple[int, int]:
     Chunks may be stored out of order. Raise BagFormatError if the bag is damaged.
     """
     if reader.chunks:
-        starts = [chunk.start_time for chunk in reader.chunks if chunk.counts]
-        ends = [chunk.end_time for chunk in reader.chunks if chunk.counts]
+        # A chunk without messages has the times 0. The counts of an MCAP file's chunks are not known.
+        starts = [chunk.start_time for chunk in reader.chunks if chunk.end_time]
+        ends = [chunk.end_time for chunk in reader.chunks if chunk.end_time]
     else:
         times = [each for each in reader.times(reader.connections) if each]
         starts, ends = [min(each) for each in times], [max(each) for each in times]

@@ -174,7 +174,8 @@ def _slots(value: Any) -> Sequence[str]:
     # Look at the class: a message's __getattr__ is slow for names that it does not have.
     kind = type(value)
     if hasattr(kind, "_type"):
-        return kind.__slots__
+        slots: Sequence[str] = kind.__slots__
+        return slots
     return ("secs", "nsecs") if hasattr(kind, "to_nsec") else ()
 
 

@@ -213,7 +213,8 @@ class BagSession(JsonSession):
             ]
             for topic in bag.timeline.topics.values()
         ]
-        return {"bag": {"name": name, "start": start / 1e9, "length": (end - start) / 1e9, "topics": topics}}
+        opened = {"name": name, "start": start / 1e9, "length": (end - start) / 1e9, "topics": topics}
+        return {"bag": {**opened, "format": bag.format, "left_out": bag.left_out}}
 
     async def _close(self, _: Fields) -> None:
         await self._close_bag()

@@ -735,6 +735,9 @@ export const GERMAN = {
   "Export the shown topics": "Die gezeigten Topics exportieren",
   "Export …": "Export …",
   "writing …": "schreibt …",
+  "Left out, as they cannot be converted to ROS 1: {topics}":
+    "Ausgelassen, da sie sich nicht in ROS 1 umwandeln lassen: {topics}",
+  "of ROS 2, converted": "aus ROS 2, umgewandelt",
   "{file}: {rows} rows, {columns} columns": "{file}: {rows} Zeilen, {columns} Spalten",
   ", without {fields}": ", ohne {fields}",
   "there is no bag": "es gibt kein Bag",

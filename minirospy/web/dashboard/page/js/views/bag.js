@@ -88,7 +88,9 @@ export class Bag {
       files: (files, { folder, given }) => this.showFiles(files, folder, given),
       recording: (recording) => this.recorder.show(recording),
       bag: (bag) => {
-        this.say("");
+        this.say(
+          bag.left_out ? t("Left out, as they cannot be converted to ROS 1: {topics}", { topics: bag.left_out }) : "",
+        );
         this.player.open(bag);
         setText(this.empty, bag.topics.length ? "" : t("{name} has no messages.", { name: bag.name }));
       },
@@ -493,12 +495,13 @@ class Player {
       top += height;
     }
     this.height = top;
+    const isOfRos2 = bag.format.endsWith("ROS 2");
     fill(
       this.labels,
       h(
         "div",
         { class: "bag-corner muted" },
-        `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString(language)}`,
+        `${t("{count} topics", { count: bag.topics.length })}${isOfRos2 ? ` · ${t("of ROS 2, converted")}` : ""} · ${new Date(bag.start * 1000).toLocaleString(language)}`,
       ),
       this.rows.map((row) => this.label(row)),
     );
