@@ -26,7 +26,7 @@ from minirospy.introspect.columns import Column, Kind, columns, leaves
 __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
-_BATCH = 2_000  # messages
+MAX_BATCH = 2_000  # messages
 _BATCH_BYTES = 8_000_000  # of serialized messages, as of scans
 _MAX_ELEMENTS = 10_000  # of an array that have columns
 _SECOND = 10**9
@@ -163,7 +163,7 @@ def _batches(
         times.append(stored.time)
         messages.append(message)
         size += len(stored.body)
-        if len(times) >= _BATCH or size >= _BATCH_BYTES:
+        if len(times) >= MAX_BATCH or size >= _BATCH_BYTES:
             yield _batch(times, messages)
             add(size)
             times, messages, size = [], [], 0

@@ -84,7 +84,7 @@ def test_elements_of_arrays_have_columns_also_in_messages_in_arrays(tmp_path: Pa
 
 
 def test_batches_with_other_columns_are_one_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bag_export, "_BATCH", 2)
+    monkeypatch.setattr(bag_export, "MAX_BATCH", 2)
     messages = [LaserScan(ranges=[1.0] * count) for count in (1, 0, 3, 2, 0)]
     rows = table(tmp_path, messages)
     assert [sum(row[f"ranges[{index}]"] != "" for index in range(3)) for row in rows] == [1, 0, 3, 2, 0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,15 @@ def test_damaged_message_is_an_error_of_the_file(tmp_path: Path) -> None:
     path.write_bytes(data[: at + 4] + b"\xff\xff\xff\x7f" + data[at + 8 :])
     with open_reader(str(path)) as reader, pytest.raises(BagFormatError):
         list(reader.messages())
+
+
+def test_without_the_room_for_ros2_the_topics_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "minirospy.ros2.bag_channels", None)
+    with open_reader(write(tmp_path, {"/chatter": [TYPES["std_msgs/msg/String"]("hi")]})) as reader:
+        assert left_out(reader) == "/chatter: [std_msgs/msg/String] its messages have the encoding 'cdr'"
+        assert (reader.version_name, list(reader.messages())) == ("MCAP 0", [])
 
 
 STRING = b"string data\n"

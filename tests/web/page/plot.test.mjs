@@ -170,6 +170,9 @@ test("the numbers of an axis are told apart by as few digits as possible", () =>
   assert.deepEqual(tickTexts([1700000000.1, 1700000000.2, 1700000000.3], 0.1), ["1700000000.1", "+0.1", "+0.2"]);
   assert.deepEqual(tickTexts([-1700000002, -1700000001], 1), ["-1700000002", "+1"]);
   assert.deepEqual(tickTexts([], 1), []);
+  // Of a range too small for any step, uPlot has the step 0.
+  assert.deepEqual(tickTexts([1, 2], 0), ["1", "2"]);
+  assert.deepEqual(tickTexts([0, 1e-30], 1e-30), ["0", "1e-30"]);
   assert.ok(STEPS.every((step, index) => index === 0 || step > STEPS[index - 1]));
   assert.deepEqual(
     STEPS.filter((step) => step >= 0.1 && step <= 10),

@@ -1,7 +1,7 @@
 // Readable numbers on the axes of a plot: steps of 1, 2 and 5, and texts with the digits that tell them apart. Pure.
 
-const SMALLEST = -12; // powers of ten of the steps
-const LARGEST = 18;
+const SMALLEST = -32; // powers of ten of the steps, as uPlot's own
+const LARGEST = 32;
 const MAX_DIGITS = 7; // of a number; beyond them, all but the first are shown as what is added to the first
 const MAX_PLAIN = 1e6; // from here on, and below its inverse, numbers have an exponent
 
@@ -13,6 +13,7 @@ export const STEPS = Array.from({ length: (LARGEST - SMALLEST + 1) * 3 }, (_, in
 /** Return the texts of the numbers of an axis, which are ``step`` apart; the same step for all: 0.1, 0.2, 0.3. */
 export function tickTexts(values, step) {
   if (!values.length) return [];
+  if (!(step > 0)) return values.map(String);
   const most = Math.max(...values.map(Math.abs));
   const power = Math.floor(Math.log10(step) + 1e-9);
   if (most > 0 && Math.floor(Math.log10(most)) - power >= MAX_DIGITS) {

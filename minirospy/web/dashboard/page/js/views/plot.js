@@ -208,7 +208,7 @@ export class Plot {
     const path = this.input.value.trim();
     if (!path) return;
     const whole = path.startsWith("/") || bagPathOf(path) ? path : `/${path}`;
-    this.add(this.bagChoice.value && whole.startsWith("/") ? `${this.bagChoice.value}:${whole}` : whole);
+    this.add(this.bagChoice.value && !bagPathOf(whole) ? `${this.bagChoice.value}:${whole}` : whole);
     this.input.value = "";
   }
 
