@@ -11,7 +11,7 @@ from minirospy.base.errors import BagError, UsageError
 from minirospy.core.bag.compression import check_compression
 from minirospy.core.bag.mcap_writer import McapWriter, check_mcap_compression
 from minirospy.core.bag.writer import BagWriter
-from minirospy.introspect.bags import naming_full_disk, open_reader
+from minirospy.introspect.bags import left_out, naming_full_disk, open_reader
 
 __all__ = ["check", "convert"]
 
@@ -71,7 +71,6 @@ def convert(source: str, target: str, *, compression: str, force: bool, step: Ca
             with contextlib.suppress(OSError):
                 os.unlink(partial)
             raise
-    foreign: list[str] = getattr(reader, "foreign", [])
-    if foreign:
-        raise BagError(f"{source}: left out, as they are not of ROS 1: {', '.join(sorted(foreign))}")
+    if foreign := left_out(reader):
+        raise BagError(f"{source}: left out, as they cannot be converted to ROS 1: {foreign}")
     return count

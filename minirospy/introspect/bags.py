@@ -41,6 +41,7 @@ __all__ = [
     "data_size",
     "filter_bag",
     "is_mcap",
+    "left_out",
     "naming_full_disk",
     "new_bag",
     "open_reader",
@@ -71,6 +72,12 @@ def is_mcap(path: str) -> bool:
     """Return whether a file starts with MCAP's magic bytes. Raise OSError if it cannot be read."""
     with open(path, "rb") as stream:
         return stream.read(len(MAGIC)) == MAGIC
+
+
+def left_out(reader: BagReader) -> str:
+    """Return the topics of an MCAP file that cannot be read, each with the reason, as one line; "" if there are none."""
+    foreign: dict[str, str] = getattr(reader, "foreign", {})
+    return "; ".join(f"{topic}: {why}" for topic, why in sorted(foreign.items()))
 
 
 def data_size(reader: BagReader) -> int:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import genpy
 
 from minirospy.base.errors import BridgeError
-from minirospy.notebook.columns import leaves
+from minirospy.introspect.columns import leaves
 from minirospy.web.video.options import Picture
 from minirospy.web.video.pictures import COMPRESSED, IMAGE, encoded
 

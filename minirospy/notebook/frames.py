@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from minirospy.base.errors import MinirospyError, NotFoundError
 from minirospy.base.installation import install_command
-from minirospy.notebook.columns import Column, Kind, columns
+from minirospy.introspect.columns import Column, Kind, columns
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped,import-not-found,unused-ignore]

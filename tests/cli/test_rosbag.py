@@ -15,6 +15,7 @@ from minirospy.core.bag.reader import open_bag
 from minirospy.core.bag.writer import BagWriter
 from minirospy.ros.rosbag.commands import rosbag
 from tests.core.bag.bags import Given, connection, make_bag
+from tests.web.dashboard.bags import START, make_bag_out_of_order
 
 from .conftest import Command
 
@@ -79,6 +80,21 @@ def test_info_prints_text_yaml_and_values(command: Command, bag: Path) -> None:
     assert "messages: 100\nindexed: True\n" in command("rosbag", "info", "-y", "a.bag").out
     assert command("rosbag", "info", "-y", "-k", "messages", "a.bag", "a.bag").out == "100\n---\n100\n"
     assert command("rosbag", "info", "-y", "-k", "no", "a.bag") == (0, "", 'Error getting key "no"\n')
+
+
+def test_info_warns_of_chunks_out_of_order_and_filter_writes_them_in_order(
+    command: Command, bag: Path
+) -> None:
+    make_bag_out_of_order(bag)
+    status, out, err = command("rosbag", "info", "a.bag")
+    # The output is that of ROS, which uses the first and the last chunk.
+    assert (status, "duration:    -1.0s\n" in out) == (0, True)
+    start = START / 1e9
+    assert f"the messages are from {start:.2f} to {start + 29:.2f} (29.0s)" in err
+    assert len(err.splitlines()) == 1
+    assert command("rosbag", "filter", "a.bag", "b.bag", "True").status == 0
+    sorted_copy = command("rosbag", "info", "b.bag")
+    assert (sorted_copy.err, "duration:    29.0s\n" in sorted_copy.out) == ("", True)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ __all__ = [
     "as_yaml",
     "compression_of",
     "seconds",
+    "span_out_of_order",
     "summarize",
     "value_of",
 ]
@@ -33,6 +34,7 @@ __all__ = [
 NUMPY_PAYS = 100_000
 """Number of timestamps above which numpy computes the median faster than Python, even including the time to import numpy."""
 
+MAX_OVERLAP = 1.0  # seconds by which the chunks of a recording may overlap
 BLOCK = 1 << 16  # number of timestamps that numpy processes together
 
 
@@ -78,10 +80,10 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
     connections = list(reader.connections.values())
     counts: Counter[int] = Counter()
     if reader.chunks:
-        start, end = (
-            seconds(reader.chunks[0].start_time),
-            seconds(reader.chunks[-1].end_time),
-        )
+        start, end = seconds(reader.chunks[0].start_time), seconds(reader.chunks[-1].end_time)
+        if not reader.version:
+            # ROS cannot read MCAP files, so there is no output to match.
+            start, end = _span(reader)
         for chunk in reader.chunks:
             counts.update(chunk.counts)
     else:
@@ -126,6 +128,24 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         sorted(types.items()),
         topics,
     )
+
+
+def span_out_of_order(reader: BagReader) -> tuple[float, float] | None:
+    """Return the times of the first and the last message, if ROS's summary shows others; None if it shows these.
+
+    For bags, ROS takes the times from the first and the last chunk in the file. Chunks that overlap a little, as recorders
+    write them, are in order.
+    """
+    if not reader.chunks or not reader.version:
+        return None
+    start, end = _span(reader)
+    late = max(seconds(reader.chunks[0].start_time) - start, end - seconds(reader.chunks[-1].end_time))
+    return (start, end) if late > MAX_OVERLAP else None
+
+
+def _span(reader: BagReader) -> tuple[float, float]:
+    start = min(chunk.start_time for chunk in reader.chunks)
+    return seconds(start), seconds(max(chunk.end_time for chunk in reader.chunks))
 
 
 def compression_of(reader: BagReader) -> list[Stored]:

@@ -1,4 +1,4 @@
-"""Read an MCAP file with ROS 1 messages: connections, and messages in time order.
+"""Read an MCAP file with messages of ROS 1 or ROS 2: connections, and messages in time order.
 
 Opening reads the summary at the end of the file. Needs the extra ``minirospy[mcap]``. Source: https://mcap.dev/spec.
 """
@@ -6,16 +6,18 @@ Opening reads the summary at the end of the file. Needs the extra ``minirospy[mc
 from __future__ import annotations
 
 import os
+import re
 import struct
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from heapq import heapify, heappop, heapreplace
 from io import BytesIO
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
-from minirospy.base.errors import BagFormatError, McapUnindexedError
+from minirospy.base.errors import BagFormatError, McapUnindexedError, MessageException, MinirospyError
 from minirospy.core.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.core.bag.chunks import StoredChunk
 from minirospy.core.bag.compression import NONE
+from minirospy.core.bag.foreign_channels import ros1_channel
 from minirospy.core.bag.index import ConnectionIndex
 from minirospy.core.bag.mcap_repair import MAGIC, chunk_data, mcap_faults
 from minirospy.core.bag.mcap_writer import check_mcap
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
+_TRANSIENT_LOCAL = re.compile(r"durability: *(1|transient_local)\b")  # ROS 2's latching, as rosbag2 stores it
 _MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
@@ -48,9 +51,10 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 
 
 class McapReader(BagReader):
-    """An MCAP file with the profile ``ros1``. Presents its channels as bag connections.
+    """An MCAP file of ROS 1, or of ROS 2. Presents its channels as bag connections.
 
-    Channels with other encodings are not read; ``foreign`` contains their topics. Raise BagFormatError if the file is
+    Messages of ROS 2 are converted if the file has their definitions and ROS 1 has the type. Channels that cannot be
+    converted are not read; ``foreign`` contains their topics, each with the reason. Raise BagFormatError if the file is
     damaged, McapUnindexedError if its summary is missing or damaged, BagError if the extra is missing.
     """
 
@@ -58,7 +62,8 @@ class McapReader(BagReader):
         check_mcap()
         self.version = 0
         self.stream = stream
-        self.foreign: list[str] = []
+        self.foreign: dict[str, str] = {}
+        self._converters: dict[int, Callable[[bytes], bytes]] = {}
         self.connections = {}
         self._size = size = stream.seek(0, os.SEEK_END)
         stream.seek(max(size - len(MAGIC), 0))
@@ -78,9 +83,9 @@ class McapReader(BagReader):
             if channel.message_encoding == "ros1" and schema is not None:
                 self.connections[channel.id] = _connection(channel, schema)
             else:
-                self.foreign.append(channel.topic)
+                self._add_foreign(channel, schema)
         self.statistics = summary.statistics
-        self.chunks = _chunk_infos(summary)
+        self.chunks = _chunk_infos(summary, self.connections)
         self._summary = summary
         self._headers = {
             chunk.chunk_start_offset: StoredChunk(
@@ -92,8 +97,42 @@ class McapReader(BagReader):
 
     @property
     def version_name(self) -> str:
-        """The name of the format, instead of a bag version."""
-        return "MCAP 0"
+        """The name of the format, instead of a bag version, and the system if it is not ROS 1."""
+        return "MCAP 0 of ROS 2" if self._converters else "MCAP 0"
+
+    def _add_foreign(self, channel: Channel, schema: Schema | None) -> None:
+        """Add a channel of ROS 2, or the reason why it cannot be converted."""
+        if schema is None:
+            self.foreign[channel.topic] = "it has no definition"
+            return
+        try:
+            found = ros1_channel(schema.name, schema.encoding, schema.data, channel.message_encoding)
+        except MinirospyError as error:
+            self.foreign[channel.topic] = f"[{schema.name}] {' '.join(str(error).split())}"
+            return
+        header: Fields = {
+            "topic": channel.topic.encode(),
+            "type": found.type.encode(),
+            "md5sum": found.md5sum.encode(),
+            "message_definition": found.definition.encode(),
+        }
+        if _TRANSIENT_LOCAL.search(channel.metadata.get("offered_qos_profiles", "")):
+            header["latching"] = b"1"
+        self.connections[channel.id] = Connection(channel.id, channel.topic, header)
+        self._converters[channel.id] = found.to_ros1
+
+    def _converted(self, channel: int, body: bytes, position: int) -> bytes:
+        """Return a message's bytes in ROS 1's serialization. Raise BagFormatError if they do not match its definition."""
+        convert = self._converters.get(channel)
+        if convert is None:
+            return body
+        try:
+            return convert(body)
+        except MessageException as error:
+            topic = self.connections[channel].topic
+            raise BagFormatError(
+                f"a message on {topic} does not match its definition: {error}", position
+            ) from error
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
         """See :meth:`BagReader.chunk_headers`."""
@@ -122,7 +161,10 @@ class McapReader(BagReader):
                 run.load(self.stream, self._size, selection)
             else:
                 time, _, channel, body, after = run.messages[at]
-                yield StoredMessage(wanted[channel], time, run.body(self.stream, body, after), 0)
+                data = run.body(self.stream, body, after)
+                if self._converters:
+                    data = self._converted(channel, data, run.position)
+                yield StoredMessage(wanted[channel], time, data, 0)
             if (at := at + 1) < len(run.messages):
                 heapreplace(heap, (run.messages[at][0], position, at, run))
             else:
@@ -368,10 +410,11 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
     return Connection(channel.id, channel.topic, header)
 
 
-def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
-    """Return the chunk infos. Each has the message counts of the whole file, because the summary has none per chunk."""
+def _chunk_infos(summary: Summary, known: Collection[int]) -> list[ChunkInfo]:
+    """Return the chunk infos. The first has the counts of the whole file, because the summary has none per chunk."""
     assert summary.statistics is not None
-    counts = dict(summary.statistics.channel_message_counts)
+    all_counts = summary.statistics.channel_message_counts
+    counts = {number: count for number, count in all_counts.items() if number in known}
     infos = []
     for chunk in summary.chunk_indexes:
         infos.append(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 from array import array
 from bisect import bisect_left, bisect_right
+from itertools import islice
 from typing import NamedTuple
 
 from minirospy.core.bag.base import BagReader, StoredMessage
@@ -40,7 +42,7 @@ class Timeline:
         self._reader = reader
         numbers = list(reader.connections)
         by_topic: dict[str, TopicTimes] = {}
-        for number, times in zip(numbers, reader.times(numbers), strict=True):
+        for number, times in zip(numbers, map(_in_order, reader.times(numbers)), strict=True):
             if times:
                 connection = reader.connections[number]
                 topic = by_topic.setdefault(connection.topic, TopicTimes(connection.topic, [], []))
@@ -113,3 +115,8 @@ class Timeline:
             if (at := bisect_left(times, time))
         ]
         return max(found, default=None)
+
+
+def _in_order(times: array[int]) -> array[int]:
+    """Return times in order: a writer may store chunks, and messages in them, in any order."""
+    return times if all(map(operator.le, times, islice(times, 1, None))) else array("Q", sorted(times))

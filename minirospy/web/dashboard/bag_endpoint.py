@@ -2,9 +2,12 @@
 
 A client sends ``{"op": NAME, ...}``: list; record {topics, name, suffix, compression}, stop; open {name}, close;
 play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {topics}; density {start, end, bins};
-thumbnails {topic, times}. The server sends ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``,
-``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1: the current message, 2: a message
-for a thumbnail), the topic's number (u16), its time (f64), the serialized message.
+thumbnails {topic, times}; for plots: fields {name}, series {id, start, end, columns, series};
+export {topics, format}. The server sends
+``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``, ``{"bag"}``, ``{"state"}``, ``{"density"}``,
+``{"fields"}``, ``{"series"}``, ``{"sampling"}`` (the progress of series), ``{"exported"}``, ``{"error"}``, and binary
+messages: a byte (1: the current message, 2: a message for a thumbnail), the topic's number (u16), its time (f64), the
+serialized message.
 Times are seconds since the bag's start. All operations require the read-write token, because files are read and written as the
 dashboard's user.
 """
@@ -13,7 +16,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import struct
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -21,8 +26,10 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.errors import BagError, MinirospyError, UsageError
+from minirospy.introspect.bag_export import Exported, export
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.bag_player import GraphOutput, OpenBag
+from minirospy.web.dashboard.bag_plot import SeriesRequest, fields_of, series_of
 from minirospy.web.dashboard.json_session import (
     Fields,
     Handler,
@@ -44,6 +51,7 @@ SUBPROTOCOL = "minirospy.bag.v1"
 
 _PLAYING_SECONDS = 0.05
 _RECORDING_SECONDS = 0.25
+_SAMPLING_SECONDS = 0.25  # between reports of the progress of reading a bag
 _MAX_BINS = 4000
 _MAX_THUMBNAILS = 60
 _LEAST_RATE, _MAX_RATE = 0.1, 10.0
@@ -124,6 +132,9 @@ class BagSession(JsonSession):
             "show": self._show,
             "density": self._density,
             "thumbnails": self._request_thumbnails,
+            "fields": self._fields,
+            "series": self._series,
+            "export": self._export,
         }
         super().__init__(client, handlers)
 
@@ -202,7 +213,8 @@ class BagSession(JsonSession):
             ]
             for topic in bag.timeline.topics.values()
         ]
-        return {"bag": {"name": name, "start": start / 1e9, "length": (end - start) / 1e9, "topics": topics}}
+        opened = {"name": name, "start": start / 1e9, "length": (end - start) / 1e9, "topics": topics}
+        return {"bag": {**opened, "format": bag.format, "left_out": bag.left_out}}
 
     async def _close(self, _: Fields) -> None:
         await self._close_bag()
@@ -255,8 +267,8 @@ class BagSession(JsonSession):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
         # Publish the earlier messages of latched topics, because new subscribers would not receive them otherwise.
-        time = bag.state.time
-        for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
+        now = bag.state.time
+        for topic, body in await self.in_thread(lambda: bag.latched_before(new, now)):
             bag.output.send(topic, body)
 
     # --- shown messages
@@ -286,6 +298,59 @@ class BagSession(JsonSession):
             raise UsageError(f"'{topic[:200]}' is not a topic of this bag")
         self._thumbnails = deque(each for each in self._thumbnails if each[0] != topic)
         self._thumbnails += [(topic, self._time(bag, each)) for each in times[:_MAX_THUMBNAILS]]
+
+    # --- tables
+
+    async def _export(self, fields: Fields) -> None:
+        name, topics, format_ = self._opened().name, texts_of(fields, "topics"), text_of(fields, "format")
+        if not topics:
+            raise UsageError("no topic is chosen")
+        # Do not wait for it: the player remains usable.
+        self._endpoint.spawn(self._write_tables(name, topics, format_))
+
+    async def _write_tables(self, name: str, topics: Sequence[str], format_: str) -> None:
+        folder = self._endpoint.folder
+
+        def check(done: int) -> None:
+            if self.is_ended:
+                raise BagError("the page has left")
+
+        def write() -> list[Exported]:
+            return export(str(folder.path_of(name)), topics, str(folder.root), format_, step=check)
+
+        try:
+            found = await self._loop.run_in_executor(None, write)
+        except (MinirospyError, OSError) as error:
+            self.send_error(f"{name}: {error}")
+        else:
+            rows = [[os.path.basename(each.path), each.rows, each.columns, each.left_out] for each in found]
+            self.send({"exported": rows})
+
+    # --- plots
+
+    async def _fields(self, fields: Fields) -> Fields:
+        name = text_of(fields, "name")
+        return {"fields": await self.in_thread(lambda: fields_of(self._endpoint.folder, name))}
+
+    async def _series(self, fields: Fields) -> Fields:
+        request = SeriesRequest.parse(fields)
+        last = 0.0
+
+        def report(share: float) -> None:
+            """Report the progress to the page, in the session's thread. Raise BagError if the page has left."""
+            nonlocal last
+            if self.is_ended:
+                raise BagError("the page has left")
+            now = time.monotonic()
+            if now - last > _SAMPLING_SECONDS:
+                last = now
+                self._loop.call_soon_threadsafe(self._send_sampling, request.id, share)
+
+        return {"series": await self.in_thread(lambda: series_of(self._endpoint.folder, request, report))}
+
+    def _send_sampling(self, request: object, share: float) -> None:
+        text = json.dumps({"sampling": {"id": request, "share": round(share, 3)}})
+        self.client.send_text_message("sampling", text.encode(), newest_only=True)
 
     async def _follow_bag(self, bag: OpenBag) -> None:
         state = bag.state

@@ -15,6 +15,7 @@ from minirospy.core.bag.base import StoredMessage
 from minirospy.core.bag.records import Connection
 from minirospy.core.bag.timeline import Timeline
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.introspect.bags import left_out
 from minirospy.ros.rosbag.recording.output import CLOCK, Controls
 from minirospy.ros.rosbag.recording.playback import PlayerState
 from minirospy.ros.rosbag.recording.player import Player
@@ -176,7 +177,10 @@ class OpenBag:
         self._files = ExitStack()
         with ExitStack() as opened:
             try:
-                self.timeline = Timeline(open_reader(path, opened))
+                reader = open_reader(path, opened)
+                self.format = reader.version_name
+                self.left_out = left_out(reader)
+                self.timeline = Timeline(reader)
                 self.span = self.timeline.span or (0, 0)
                 self._bags = opened.enter_context(Bags([str(path)]))
             except BagUnindexedError as error:

@@ -5,6 +5,7 @@ A view and its settings are in the link's fragment, which browsers do not send, 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from urllib.parse import quote, urlencode
 
@@ -66,13 +67,19 @@ def link(
     return f"{scheme}://{name}:{port}/#/{view}{query}"
 
 
+_IN_BAG = re.compile(r".+?\.(bag|mcap):/")
+
+
 def plotted_fields(words: Iterable[str]) -> list[str]:
     """Return the paths in rqt_plot's arguments: ``/a/x,/b/y`` has two, and ``/pose/x:y`` means /pose/x and /pose/y.
 
-    Raise UsageError if an argument is not a path.
+    A path in a bag, ``run.bag:/pose/x``, remains as it is. Raise UsageError if an argument is not a path.
     """
     found: list[str] = []
     for word in (part for each in words for part in each.split(",") if part):
+        if _IN_BAG.match(word):
+            found.append(word)
+            continue
         # A colon in brackets is part of a slice.
         head, *others = _split_colons(word)
         base = head.rpartition("/")[0]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from minirospy.core.bag.timeline import Timeline
 from minirospy.ros.rosbag.recording.sources import open_reader
-from tests.web.dashboard.bags import SECOND, START, make_bag, text_body
+from tests.web.dashboard.bags import SECOND, START, make_bag, make_bag_out_of_order, text_body
 
 
 def test_messages_are_found_by_time(tmp_path: Path) -> None:
@@ -32,3 +32,17 @@ def test_messages_are_found_by_time(tmp_path: Path) -> None:
         assert timeline.time_before(START) is None
         assert timeline.time_after(START + 10 * SECOND) is None
         assert timeline.topics["/map"].is_latched
+
+
+def test_chunks_may_be_stored_in_any_order(tmp_path: Path) -> None:
+    path = make_bag_out_of_order(tmp_path / "a.bag")
+    with ExitStack() as opened:
+        timeline = Timeline(open_reader(path, opened))
+        assert timeline.span == (START, START + 29 * SECOND)
+        assert timeline.density("/chatter", START, START + 30 * SECOND - 1, 3) == [10, 10, 10]
+        assert timeline.time_at("/chatter", START + 15 * SECOND) == START + 15 * SECOND
+        assert timeline.time_after(START + 9 * SECOND) == START + 10 * SECOND
+        assert timeline.time_before(START + 20 * SECOND) == START + 19 * SECOND
+        message = timeline.message_at("/chatter", START + 12 * SECOND)
+        assert message
+        assert message.body == text_body("message 12")

@@ -46,3 +46,16 @@ def make_bag(path: Path, seconds: int = 20, *, hostile: str = "") -> Path:
                 writer.write(camera, time, image_body(number * 255 // (seconds * 10)))
         writer.close()
     return path
+
+
+def make_bag_out_of_order(path: Path) -> Path:
+    """Write a bag with a string per second on /chatter, whose chunks have the seconds 20 to 29, 0 to 9, 10 to 19."""
+    with path.open("wb") as stream:
+        writer = BagWriter(stream, chunk_threshold=200)
+        described = {"type": String._type, "md5sum": String._md5sum, "message_definition": String._full_text}
+        chatter = writer.add_connection("/chatter", {**described, "callerid": "/talker"})
+        for first in (20, 0, 10):
+            for number in range(first, first + 10):
+                writer.write(chatter, START + number * SECOND, text_body(f"message {number}"))
+        writer.close()
+    return path

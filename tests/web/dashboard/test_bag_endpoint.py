@@ -57,6 +57,13 @@ class Client:
                 return found[name]
             assert "error" not in found, found
 
+    def error(self) -> str:
+        """Return the next error."""
+        while True:
+            data = self.socket.recv(timeout=60)
+            if isinstance(data, str) and "error" in (found := json.loads(data)):
+                return str(found["error"])
+
     def binary(self, kind: int, body: bytes) -> float:
         """Wait for a binary message of this kind with these bytes; return its time."""
         while True:
@@ -105,6 +112,40 @@ def test_bag_is_listed_and_opened(client: Callable[..., Client], folder: Path) -
     assert rows["/chatter"] == [10] * 10
     assert rows["/camera"] == [2] * 10
     assert rows["/map"] == [1, *[0] * 9]
+
+
+def test_topics_of_an_open_bag_are_exported_into_the_folder(
+    client: Callable[..., Client], folder: Path
+) -> None:
+    (folder / "sub").mkdir()
+    make_bag(folder / "sub" / "a.bag")
+    page = client()
+    page.send("export", topics=["/chatter"], format="csv")
+    assert "no bag is open" in page.error()
+    page.send("open", name="sub/a.bag")
+    page.send("export", topics=["/chatter", "/camera"], format="csv")
+    assert page.next("exported") == [["a_chatter.csv", 200, 2, []], ["a_camera.csv", 40, 9, ["data"]]]
+    assert (folder / "a_chatter.csv").read_text(encoding="utf-8").splitlines()[1].endswith(",message 0")
+    for fields, why in (
+        ({"topics": ["/chatter"], "format": "csv"}, "a_chatter.csv exists already"),
+        ({"topics": ["/map"], "format": "xls"}, "the format is csv or parquet"),
+        ({"topics": [], "format": "csv"}, "no topic is chosen"),
+    ):
+        page.send("export", **fields)
+        assert why in page.error()
+
+
+def test_series_and_their_progress_are_sent(client: Callable[..., Client], folder: Path) -> None:
+    make_bag(folder / "a.bag")
+    page = client()
+    page.send("fields", name="a.bag")
+    assert [each[0] for each in page.next("fields")["topics"]] == ["/camera", "/chatter", "/map"]
+    series = [{"key": "k", "bag": "a.bag", "path": "/camera/width"}]
+    page.send("series", id=7, start=None, end=None, columns=100, series=series)
+    answer = page.next("series")
+    assert (answer["id"], answer["errors"], answer["found"][0]["count"]) == (7, {}, 40)
+    page.send("series", id=8, columns=100, series="x")
+    assert "series is a list" in page.error()
 
 
 def test_moment_follows_seek_step_and_back(client: Callable[..., Client], folder: Path) -> None:

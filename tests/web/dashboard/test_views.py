@@ -56,6 +56,17 @@ def test_words_of_rqt_plot_become_paths(words: list[str], paths: list[str]) -> N
     assert plotted_fields(words) == paths
 
 
+def test_paths_in_bags_remain_as_they_are() -> None:
+    words = ["run.bag:/pose/x,/tmp/a b.mcap:/a/b[1:2]", "a.bag:/x/y - b.bag:/x/y", "/pose/x:y"]
+    assert plotted_fields(words) == [
+        "run.bag:/pose/x",
+        "/tmp/a b.mcap:/a/b[1:2]",
+        "a.bag:/x/y - b.bag:/x/y",
+        "/pose/x",
+        "/pose/y",
+    ]
+
+
 @pytest.mark.parametrize("word", ["x", "/x:y"])
 def test_word_that_is_not_a_path_is_refused(word: str) -> None:
     with pytest.raises(UsageError, match=re.escape(word)):

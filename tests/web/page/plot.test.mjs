@@ -1,12 +1,21 @@
 // What the plot computes: samples, what is drawn of them, derived series, paths of fields, rates.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { derivedOf, pairs, rangeOf } from "../../../minirospy/web/dashboard/page/js/derived.js";
-import { canLead, numericPaths, parseSteps, select } from "../../../minirospy/web/dashboard/page/js/paths.js";
+import {
+  anglesOf,
+  canLead,
+  namedSteps,
+  numericPaths,
+  parseSteps,
+  select,
+} from "../../../minirospy/web/dashboard/page/js/paths.js";
 import { Rate } from "../../../minirospy/web/dashboard/page/js/rates.js";
 import { parseDefinition } from "../../../minirospy/web/dashboard/page/js/ros1.js";
 import { drawn, MAX_POINTS, Samples } from "../../../minirospy/web/dashboard/page/js/samples.js";
+import { STEPS, tickTexts } from "../../../minirospy/web/dashboard/page/js/ticks.js";
 
 const samplesOf = (points) => {
   const samples = new Samples();
@@ -102,7 +111,73 @@ test("paths lead to fields, elements, slices and what a filter finds", () => {
     [6],
   );
   assert.deepEqual(found("/constructor", {}), []);
-  assert.throws(() => parseSteps("/a[x]"), /is not a field/);
+  assert.throws(() => parseSteps("/a[x"), /is not a field/);
+});
+
+// introspect/field_series.py reads the same table.
+const PATHS = JSON.parse(readFileSync(new URL("paths.json", import.meta.url), "utf-8"));
+
+for (const [path, wanted] of Object.entries(PATHS.series)) {
+  test(`the path ${path} finds its numbers`, () => {
+    const found = {};
+    select(PATHS.message, parseSteps(path), (label, value) => (found[label] = value));
+    assert.deepEqual(Object.keys(found), Object.keys(wanted));
+    for (const [label, value] of Object.entries(wanted)) assert.ok(Math.abs(found[label] - value) < 1e-7, label);
+  });
+}
+
+test("paths with wrong syntax are refused", () => {
+  for (const path of PATHS.refused) assert.throws(() => parseSteps(path), /is not a field/, path);
+});
+
+test("paths by joint name and by angle are compared with the type", () => {
+  const definition = parseDefinition(
+    "a/B",
+    "string[] name\nfloat64[] position\nQ turn\nQ[] turns\nO own\nfloat64[] name2\n" +
+      `${"=".repeat(80)}\nMSG: a/Q\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n` +
+      `${"=".repeat(80)}\nMSG: a/O\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\nfloat32 yaw\n`,
+  );
+  const can = (path) => canLead(definition, parseSteps(path));
+  for (const path of ["/position[elbow]", "/turns[elbow]", "/turn/yaw", "/turns[0]/roll", "/own/yaw", "/own/pitch"])
+    assert.ok(can(path), path);
+  for (const path of ["/turn[elbow]", "/turn/yaw/x", "/turns/yaw", "/turn/heading", "/position[0][elbow]"])
+    assert.equal(can(path), false, path);
+  const paths = numericPaths(definition);
+  assert.deepEqual(paths.slice(1, 5), ["/turn/roll", "/turn/pitch", "/turn/yaw", "/turn/x"]);
+  assert.equal(paths.filter((path) => path === "/own/yaw").length, 1);
+});
+
+test("elements have the names beside their array, if these belong to them", () => {
+  assert.deepEqual(namedSteps(["elbow", "3", "a:b"], [1, 2, 3]), ["[elbow]", '["3"]', '["a:b"]']);
+  assert.equal(namedSteps(["elbow", "elbow"], [1, 2]), null);
+  assert.equal(namedSteps(["elbow"], [1, 2]), null);
+  assert.equal(namedSteps(["a]"], [1]), null);
+  assert.equal(namedSteps("ab", [1, 2]), null);
+  assert.deepEqual(anglesOf({ x: 0, y: 0, z: 0, w: 1 }), ["roll", "pitch", "yaw"]);
+  assert.deepEqual(anglesOf({ x: 0, y: 0, z: 0, w: 1, yaw: 3 }), ["roll", "pitch"]);
+  assert.deepEqual(anglesOf({ x: 0, y: 0, z: 0 }), []);
+});
+
+test("the numbers of an axis are told apart by as few digits as possible", () => {
+  assert.deepEqual(tickTexts([0.1, 0.2, 0.1 + 0.2], 0.1), ["0.1", "0.2", "0.3"]);
+  assert.deepEqual(tickTexts([-0.5, -5.5e-17, 0.5], 0.5), ["-0.5", "0.0", "0.5"]);
+  assert.deepEqual(tickTexts([0, 50, 100], 50), ["0", "50", "100"]);
+  assert.deepEqual(tickTexts([0.0002, 0.0004], 0.0002), ["0.0002", "0.0004"]);
+  assert.deepEqual(tickTexts([0, 2e-8, 4e-8], 2e-8), ["0", "2e-8", "4e-8"]);
+  assert.deepEqual(tickTexts([0, 5e5, 1e6, 1.5e6], 5e5), ["0", "0.5e6", "1.0e6", "1.5e6"]);
+  assert.deepEqual(tickTexts([1e9, 2e9], 1e9), ["1e9", "2e9"]);
+  // Of a stamp, the first number is shown in full.
+  assert.deepEqual(tickTexts([1700000000.1, 1700000000.2, 1700000000.3], 0.1), ["1700000000.1", "+0.1", "+0.2"]);
+  assert.deepEqual(tickTexts([-1700000002, -1700000001], 1), ["-1700000002", "+1"]);
+  assert.deepEqual(tickTexts([], 1), []);
+  // Of a range too small for any step, uPlot has the step 0.
+  assert.deepEqual(tickTexts([1, 2], 0), ["1", "2"]);
+  assert.deepEqual(tickTexts([0, 1e-30], 1e-30), ["0", "1e-30"]);
+  assert.ok(STEPS.every((step, index) => index === 0 || step > STEPS[index - 1]));
+  assert.deepEqual(
+    STEPS.filter((step) => step >= 0.1 && step <= 10),
+    [0.1, 0.2, 0.5, 1, 2, 5, 10],
+  );
 });
 
 test("paths of a definition are those of numbers", () => {

@@ -15,6 +15,7 @@ from minirospy.command.command import INTERRUPTED, complain
 from minirospy.command.verbs import Family, HelpStatus
 from minirospy.ros.rosbag.commands import (
     rosbag_convert,
+    rosbag_export,
     rosbag_info,
     rosbag_play,
     rosbag_record,
@@ -32,6 +33,7 @@ FAMILY = Family(
         *migration_verbs(),
         *rosbag_rewrite.VERBS,
         rosbag_convert.VERB,
+        rosbag_export.VERB,
         rosbag_play.VERB,
         rosbag_record.VERB,
     ),

@@ -64,12 +64,14 @@ def _info(bags: list[str], yaml: bool, key: str | None, freq: bool) -> int:
     if key and not yaml:
         raise Misuse("-k needs -y", "You can only specify key when printing in YAML format.")
     from minirospy.core.bag import info
-    from minirospy.introspect.bags import open_reader
+    from minirospy.introspect.bags import left_out, open_reader
 
     for number, path in enumerate(bags):
         try:
             with open_reader(path) as reader:
                 summary = info.summarize(reader, path, frequencies=freq)
+                span = info.span_out_of_order(reader)
+                foreign = left_out(reader)
         except BagEncryptedError as error:
             report(unreadable(path, error))
             continue
@@ -77,6 +79,14 @@ def _info(bags: list[str], yaml: bool, key: str | None, freq: bool) -> int:
             report(unreadable(path, error))
             return 1
 
+        if foreign:
+            report(f"WARNING: {path}: left out, as they cannot be converted to ROS 1: {foreign}")
+        if span:
+            report(
+                f"WARNING: {path}: its chunks are not in time order. ROS takes start, end and duration from the first and "
+                f"the last chunk; the messages are from {span[0]:.2f} to {span[1]:.2f} ({span[1] - span[0]:.1f}s). "
+                "`rosbag filter` with True writes them in order"
+            )
         if not yaml:
             print(info.as_text(summary))
         elif not key:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from minirospy.base.errors import ROSInterruptException, UsageError
 from minirospy.command.parser import Misuse, Parser
 from minirospy.command.verbs import Command, Verb, with_options
+from minirospy.ros.rosbag.commands.rosbag_info import report
 
 if TYPE_CHECKING:
     from minirospy.ros.rosbag.recording.schedule import PlayOptions
@@ -160,10 +161,14 @@ def _nanoseconds(name: str, seconds: float) -> int:
 def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> int:
     # Imported here because --help does not need the client library.
     from minirospy import client
+    from minirospy.introspect.bags import left_out
     from minirospy.ros.rosbag.recording.player import Player
     from minirospy.ros.rosbag.recording.sources import Bags
 
     with Bags(paths) as bags, contextlib.ExitStack() as serving:
+        for path, reader in zip(paths, bags.readers, strict=True):
+            if foreign := left_out(reader):
+                report(f"WARNING: {path}: left out, as they cannot be converted to ROS 1: {foreign}")
         if foxglove_port is not None:
             from minirospy.web.serve import require_libraries
 

@@ -2,6 +2,7 @@
 
 import { h, number } from "./dom.js";
 import { t } from "./texts.js";
+import { STEPS, tickTexts } from "./ticks.js";
 
 export const MAX_AXES = 6;
 const LEAST_SIZE = 40; // pixels for the numbers of an axis
@@ -131,6 +132,8 @@ export class Axes {
         scale: `y${axis}`,
         side: isLeft(axis) ? 3 : 1,
         size: (...words) => this.size(...words),
+        incrs: STEPS,
+        values: (chart, all, index, space, step) => tickTexts(all, step),
         ...(index ? { grid: { show: false } } : {}),
         ...(used.length > 1 && own.length === 1 ? { stroke: own[0].color } : {}),
         ...(label ? { label, labelSize: 20, labelGap: 0, labelFont: FONT } : {}),

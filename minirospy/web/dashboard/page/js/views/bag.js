@@ -88,14 +88,20 @@ export class Bag {
       files: (files, { folder, given }) => this.showFiles(files, folder, given),
       recording: (recording) => this.recorder.show(recording),
       bag: (bag) => {
-        this.say("");
+        this.say(
+          bag.left_out ? t("Left out, as they cannot be converted to ROS 1: {topics}", { topics: bag.left_out }) : "",
+        );
         this.player.open(bag);
         setText(this.empty, bag.topics.length ? "" : t("{name} has no messages.", { name: bag.name }));
       },
       state: (state) => this.player.show(state),
       density: (density) => this.player.showDensity(density),
+      exported: (tables) => this.player.showExported(tables),
       binary: (data) => this.player.received(data),
-      error: (text) => this.say(text),
+      error: (text) => {
+        this.player.showExported(null);
+        this.say(text);
+      },
     });
   }
 
@@ -391,6 +397,14 @@ class Player {
       this.clock,
       "/clock",
     );
+    this.export = h(
+      "select",
+      { "aria-label": "Export the shown topics", onchange: () => this.exportShown() },
+      h("option", { value: "" }, "Export …"),
+      h("option", { value: "csv" }, "CSV"),
+      h("option", { value: "parquet" }, "Parquet"),
+    );
+    this.exported = h("p", { class: "muted", role: "status", hidden: true });
     this.publishLabel = h("label", { class: "publish-switch" }, this.publishing, "Publish");
     this.now = h("output", { class: "num now" });
     this.date = h("span", { class: "muted num" });
@@ -425,7 +439,9 @@ class Player {
           h("label", {}, this.loop, t("loop")),
           this.publishLabel,
           this.clockLabel,
+          this.export,
         ),
+        this.exported,
         h("div", { class: "bag-timeline" }, this.labels, this.area),
       ),
       this.moments,
@@ -479,12 +495,13 @@ class Player {
       top += height;
     }
     this.height = top;
+    const isOfRos2 = bag.format.endsWith("ROS 2");
     fill(
       this.labels,
       h(
         "div",
         { class: "bag-corner muted" },
-        `${t("{count} topics", { count: bag.topics.length })} · ${new Date(bag.start * 1000).toLocaleString(language)}`,
+        `${t("{count} topics", { count: bag.topics.length })}${isOfRos2 ? ` · ${t("of ROS 2, converted")}` : ""} · ${new Date(bag.start * 1000).toLocaleString(language)}`,
       ),
       this.rows.map((row) => this.label(row)),
     );
@@ -496,6 +513,7 @@ class Player {
     this.publishing.checked = false;
     this.clock.checked = false;
     this.clockLabel.hidden = true;
+    this.showExported(null);
     this.canvas.setAttribute("aria-valuemax", bag.length);
     this.element.hidden = !this.rows.length;
     this.resized();
@@ -568,6 +586,24 @@ class Player {
       topics: isOn ? this.rows.filter((row) => row.isPublished).map(({ name }) => name) : [],
       clock: isOn && this.clock.checked,
     });
+  }
+
+  /** Write the shown topics as tables into the folder of the command. */
+  exportShown() {
+    this.send({ op: "export", topics: [...this.cards.keys()], format: this.export.value });
+    this.export.value = "";
+    this.exported.hidden = false;
+    setText(this.exported, t("writing …"));
+  }
+
+  showExported(tables) {
+    this.exported.hidden = !tables;
+    const lines = (tables ?? []).map(
+      ([file, rows, columns, leftOut]) =>
+        t("{file}: {rows} rows, {columns} columns", { file, rows, columns }) +
+        (leftOut.length ? t(", without {fields}", { fields: leftOut.join(", ") }) : ""),
+    );
+    setText(this.exported, lines.join(" · "));
   }
 
   key(event) {
@@ -707,7 +743,7 @@ class Player {
       this.cards.get(row.name)?.element.remove();
       this.cards.delete(row.name);
     } else if (!this.cards.has(row.name)) {
-      const card = new Card(row);
+      const card = new Card(row, this.bag.name);
       this.cards.set(row.name, card);
       this.moments.append(card.element);
     }
@@ -816,7 +852,7 @@ class Player {
 
 // The message of the moment of one topic.
 class Card {
-  constructor(row) {
+  constructor(row, bag) {
     this.row = row;
     this.time = h("span", { class: "num muted" });
     this.problem = h("p", { class: "error" });
@@ -824,7 +860,8 @@ class Card {
     this.canvas = this.isImage
       ? h("canvas", { class: "image", role: "img", width: 0, height: 0, "aria-label": row.name })
       : null;
-    this.tree = this.isImage ? null : new Tree(row.name);
+    // Its links plot the whole bag.
+    this.tree = this.isImage ? null : new Tree(`${bag}:${row.name}`);
     this.body = h("div", { class: this.isImage ? "card-image" : "fields" }, this.canvas ?? this.tree.element);
     this.waiting = h("p", { class: "muted" }, "No message yet at this time.");
     this.element = h(

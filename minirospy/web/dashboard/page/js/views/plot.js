@@ -1,11 +1,13 @@
 // Plots of numbers of messages: paths of fields, several y axes, zoom and pan while they stream, CSV and PNG.
 
 import { Axes, titleOf } from "../axes.js";
+import { BagPlot, bagPathOf } from "../bag_plot.js";
 import { KINDS, derivedOf, pairs, rangeOf } from "../derived.js";
 import { download, fill, h, number, refill, setText, uniqueId } from "../dom.js";
 import { numericPaths } from "../paths.js";
 import { Samples, csv, drawn } from "../samples.js";
 import { t } from "../texts.js";
+import { STEPS, tickTexts } from "../ticks.js";
 
 const WINDOWS = [
   ["5", "5 s"],
@@ -66,6 +68,24 @@ export class Plot {
       autocomplete: "off",
     });
     this.waiting = h("div", { role: "status" });
+    this.bags = null; // reads bags, after the first path of one, or once its button was pressed
+    this.bagFields = []; // paths of the chosen bag
+    this.bagChoice = h("select", {
+      "aria-label": "Plot paths of this bag",
+      onchange: () => this.chooseBag(this.bagChoice.value),
+    });
+    this.bagState = h("span", { class: "muted", role: "status" });
+    this.bagRow = h("div", { class: "bar", hidden: true }, h("label", {}, t("Bag"), this.bagChoice), this.bagState);
+    this.bagButton = h(
+      "button",
+      {
+        type: "button",
+        title: "Plot a whole bag, without playing it",
+        "aria-expanded": "false",
+        onclick: () => this.showBags(this.bagRow.hidden),
+      },
+      "Bags",
+    );
     this.window = h(
       "select",
       {
@@ -98,7 +118,9 @@ export class Plot {
       this.input,
       this.known,
       h("button", { type: "submit", class: "primary" }, "Plot"),
+      this.bagButton,
     );
+    this.clearButton = h("button", { type: "button", onclick: () => this.clear() }, "Clear");
     this.area = h("div", {
       class: "panel chart",
       tabindex: 0,
@@ -113,6 +135,7 @@ export class Plot {
     this.legend = h("div", { class: "legend", role: "list", "aria-label": "Series" });
     main.append(
       this.form,
+      this.bagRow,
       h(
         "div",
         { class: "bar" },
@@ -122,7 +145,8 @@ export class Plot {
         this.axes.button,
         this.liveButton,
         this.axes.autoButton,
-        h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
+        this.clearButton,
+        h("button", { type: "button", title: "Remove all series", onclick: () => this.removeAll() }, "Remove all"),
         h("button", { type: "button", onclick: () => this.saveCsv() }, "CSV"),
         h("button", { type: "button", onclick: () => this.savePng() }, "PNG"),
         h("span", { class: "muted tips" }, t("drag: zoom · wheel: zoom · shift and wheel: pan · double click: follow")),
@@ -159,11 +183,12 @@ export class Plot {
     clearTimeout(this.unsaved);
     for (const end of [...this.ending, ...this.ends.values()]) end();
     this.observer.disconnect();
+    this.bags?.close();
     this.chart?.destroy();
   }
 
   suggest() {
-    const paths = [];
+    const paths = [...this.bagFields];
     for (const { topic, type, schema } of this.link.channels.values()) {
       const definition = this.link.definition(type, schema);
       if (definition && paths.length < 2000) paths.push(...numericPaths(definition, 60).map((path) => topic + path));
@@ -176,25 +201,116 @@ export class Plot {
   dropped(event) {
     const path = event.dataTransfer.getData("text/plain").trim();
     event.preventDefault();
-    if (path.startsWith("/")) this.add(path);
+    if (path.startsWith("/") || bagPathOf(path)) this.add(path);
   }
 
   addTyped() {
     const path = this.input.value.trim();
     if (!path) return;
-    this.add(path.startsWith("/") ? path : `/${path}`);
+    const whole = path.startsWith("/") || bagPathOf(path) ? path : `/${path}`;
+    this.add(this.bagChoice.value && !bagPathOf(whole) ? `${this.bagChoice.value}:${whole}` : whole);
     this.input.value = "";
   }
 
   add(path) {
     if (this.ends.has(path)) return;
+    const operands = bagPathOf(path);
     this.problems.set(path, "");
-    this.ends.set(
-      path,
-      this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)),
-    );
+    if (this.isOfBags === !operands) {
+      // The times of a bag and of now have nothing in common.
+      this.problems.set(path, t("live topics and bags are in separate plots: remove all, or open a second plot"));
+      this.ends.set(path, () => {});
+    } else if (operands) {
+      this.ends.set(path, () => this.bags.remove(path));
+      this.origin = 0;
+      this.openBags().add(path, operands);
+    } else
+      this.ends.set(
+        path,
+        this.link.subscribe({ path, mode: "series" }, (item) => this.received(path, item)),
+      );
     this.remember();
     this.showProblems();
+    this.showMode();
+  }
+
+  /** Return whether the plot shows bags, null if it shows nothing yet. */
+  get isOfBags() {
+    const [first] = this.ends.keys();
+    return first === undefined ? null : Boolean(bagPathOf(first));
+  }
+
+  showMode() {
+    const isOfBags = this.isOfBags === true;
+    this.pauseButton.hidden = this.window.hidden = this.clearButton.hidden = isOfBags;
+    setText(this.liveButton, isOfBags ? t("Show all") : t("Follow"));
+  }
+
+  showBags(isShown) {
+    this.bagRow.hidden = !isShown;
+    this.bagButton.setAttribute("aria-expanded", String(isShown));
+    if (isShown) this.openBags().list();
+    else this.chooseBag("");
+  }
+
+  openBags() {
+    this.bags ??= new BagPlot(this.link, {
+      files: (names) => {
+        const chosen = this.bagChoice.value;
+        fill(
+          this.bagChoice,
+          h("option", { value: "" }, names.length ? t("choose a bag") : t("there is no bag")),
+          names.map((name) => h("option", { value: name }, name)),
+        );
+        this.bagChoice.value = names.includes(chosen) ? chosen : "";
+      },
+      fields: ({ name, topics }) => {
+        if (name !== this.bagChoice.value) return;
+        this.bagFields = topics.flatMap(([topic, type, definition]) => {
+          const known = this.link.definition(type, definition);
+          return known ? numericPaths(known, 60).map((path) => `${name}:${topic}${path}`) : [];
+        });
+        this.suggest();
+      },
+      shown: (path, series) => this.receivedOfBag(path, series),
+      failed: (path, text) => {
+        this.problems.set(path, text);
+        this.showProblems();
+      },
+      progress: (share) =>
+        setText(this.bagState, share === null ? "" : t("reading: {percent} %", { percent: Math.round(share * 100) })),
+      error: (text) => {
+        setText(this.bagState, text);
+        if (this.isOfBags)
+          for (const path of this.ends.keys()) if (this.problems.has(path)) this.problems.set(path, text);
+        this.showProblems();
+      },
+    });
+    return this.bags;
+  }
+
+  chooseBag(name) {
+    this.bagChoice.value = name;
+    this.bagFields = [];
+    this.suggest();
+    if (name) this.openBags().choose(name);
+  }
+
+  /** Take over all points of a series of a bag. */
+  receivedOfBag(path, { label, times, values, count }) {
+    const { bag, minus } = bagPathOf(path);
+    const name = minus ? path : `${bag}:${label}`;
+    if (this.removed.has(name)) return;
+    let series = this.series.get(name);
+    if (!series) {
+      series = this.makeSeries(name, path);
+      this.rebuild();
+    }
+    if (this.problems.delete(path)) this.showProblems();
+    series.raw = new Samples();
+    series.raw.append(times, values);
+    series.raw.total = count;
+    this.setKind(series, series.kind);
   }
 
   remove(series) {
@@ -221,6 +337,15 @@ export class Plot {
     this.problems.delete(path);
     this.remember();
     this.showProblems();
+    this.showMode();
+  }
+
+  removeAll() {
+    for (const series of [...this.series.values()]) this.remove(series);
+    for (const path of [...this.ends.keys()]) this.forget(path);
+    this.removed.clear();
+    this.origin = null;
+    this.live();
   }
 
   remember() {
@@ -332,7 +457,7 @@ export class Plot {
     const color = COLORS.find((each) => !used.has(each)) ?? COLORS[this.series.size % COLORS.length];
     const raw = new Samples();
     const series = { label, path, raw, samples: raw, kind: "", derived: null, color, isHidden: false };
-    const known = this.kinds.get(label) ?? "";
+    const known = bagPathOf(path) ? "" : (this.kinds.get(label) ?? "");
     if (KINDS.some(([kind]) => kind === known)) this.setKind(series, known);
     const kinds = h(
       "select",
@@ -349,6 +474,8 @@ export class Plot {
       KINDS.map(([kind, name]) => h("option", { value: kind }, t(name))),
     );
     kinds.value = series.kind;
+    // Of the extremes of a bag there is no derivative.
+    kinds.hidden = Boolean(bagPathOf(path));
     series.value = h("span", { class: "num" });
     series.count = h("span", { class: "muted count" });
     const swatch = h("button", {
@@ -410,6 +537,7 @@ export class Plot {
   /** Return the time that is shown: [from, to]. */
   range() {
     if (this.zoom) return [this.zoom.min, this.zoom.max];
+    if (this.isOfBags) return [0, Math.max(1e-3, this.newest())];
     const to = Number.isFinite(this.pausedAt) && this.pausedAt !== null ? this.pausedAt : this.newest();
     if (!Number.isFinite(to)) return [0, 1];
     const oldest = Math.min(...[...this.series.values()].map((each) => each.samples.firstTime));
@@ -479,7 +607,13 @@ export class Plot {
             points: { size: 6, fill: each.color, show: () => each.samples.count === 1 },
           })),
         ], // a line has two points
-        axes: [styled({ values: (_, all) => all.map((each) => `${number(each)} s`) }), ...axes],
+        axes: [
+          styled({
+            incrs: STEPS,
+            values: (chart, all, index, space, step) => tickTexts(all, step).map((text) => `${text} s`),
+          }),
+          ...axes,
+        ],
         hooks: {
           setSelect: [
             (chart) => {
@@ -561,7 +695,16 @@ export class Plot {
             ],
           })),
         ],
-        axes: [styled({ label: this.over, labelSize: 22, labelFont: "12px system-ui" }), ...axes],
+        axes: [
+          styled({
+            label: this.over,
+            labelSize: 22,
+            labelFont: "12px system-ui",
+            incrs: STEPS,
+            values: (each, all, index, space, step) => tickTexts(all, step),
+          }),
+          ...axes,
+        ],
       },
       [null, ...shown.map(() => [[], []])],
       this.area,
@@ -643,6 +786,7 @@ export class Plot {
     this.liveButton.classList.toggle("unused", !this.zoom && !this.isPaused);
     if (this.chart) {
       const [from, to] = this.range();
+      if (this.isOfBags) this.bags.show(from, to, this.chart.bbox.width / devicePixelRatio);
       if (this.over) {
         const over = this.series.get(this.over)?.samples ?? new Samples();
         const shown = this.visible();

@@ -1,7 +1,7 @@
 // All topics: type, rate, bandwidth, and the live values of those that are open.
 
 import { bandwidth, fill, h, setText, shown } from "../dom.js";
-import { numberOf } from "../paths.js";
+import { anglesOf, namedSteps, numberOf } from "../paths.js";
 import { Rate } from "../rates.js";
 import { isList } from "../ros1.js";
 import { t } from "../texts.js";
@@ -238,7 +238,8 @@ export class Tree {
     this.items = new Map();
   }
 
-  show(message) {
+  /** ``steps``: of an array, the steps to its elements by names, as of joints; null: by index. */
+  show(message, steps = null) {
     const isArray = isList(message);
     /** @type {(string | number)[]} */
     const names = isArray
@@ -252,16 +253,18 @@ export class Tree {
       }
     }
     for (const name of names) {
+      const step = isArray ? (steps?.[name] ?? `[${name}]`) : `/${name}`;
       let item = this.items.get(name);
-      if (!item) {
-        item = new Field(
-          isArray ? `[${name}]` : String(name),
-          isArray ? `${this.path}[${name}]` : `${this.path}/${name}`,
-        );
+      if (item?.path !== this.path + step) {
+        // The names came later, or changed.
+        const before = item?.element;
+        item = new Field(isArray ? step : String(name), this.path + step);
         this.items.set(name, item);
-        this.element.append(item.element);
+        if (before) before.replaceWith(item.element);
+        else this.element.append(item.element);
       }
-      item.show(message[name]);
+      const value = message[name];
+      item.show(value, !isArray && isList(value) && name !== "name" ? namedSteps(message.name, value) : null);
     }
   }
 }
@@ -290,14 +293,21 @@ class Field {
     this.isOpen = null;
   }
 
-  show(value) {
+  show(value, steps = null) {
     this.last = value;
+    this.steps = steps;
     const isNested = value !== null && typeof value === "object" && numberOf(value) === null;
     if (!isNested) {
       setText(this.value, shown(numberOf(value) !== null && typeof value === "object" ? numberOf(value) : value, 2000));
       this.plot.hidden = numberOf(value) === null;
       this.element.draggable = !this.plot.hidden;
       return;
+    }
+    const angles = isList(value) ? [] : anglesOf(value);
+    this.plot.hidden = !angles.length;
+    if (angles.length) {
+      this.plot.href = `#/plot?${new URLSearchParams(angles.map((angle) => ["path", `${this.path}/${angle}`]))}`;
+      setText(this.plot, t("plot the angles"));
     }
     // Messages start open, arrays closed.
     this.isOpen ??= !isList(value);
@@ -317,7 +327,7 @@ class Field {
         this.tree = new Tree(this.path);
         this.element.append(this.tree.element);
       }
-      this.tree.show(value);
+      this.tree.show(value, steps);
     }
     if (this.tree) this.tree.element.hidden = !this.isOpen;
   }
@@ -330,6 +340,6 @@ class Field {
 
   toggle() {
     this.isOpen = !this.isOpen;
-    this.show(this.last);
+    this.show(this.last, this.steps);
   }
 }

@@ -1,4 +1,4 @@
-"""notebook/columns: the fields of messages as columns."""
+"""introspect/columns: the fields of messages as columns."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rosgraph_msgs.msg import TopicStatistics
 from sensor_msgs.msg import Image, JointState, LaserScan
 from std_msgs.msg import Empty, String
 
-from minirospy.notebook.columns import Column, Kind, columns
+from minirospy.introspect.columns import Column, Kind, columns
 
 
 def named(messages: list[object]) -> dict[str, Column]:

@@ -1,0 +1,207 @@
+"""Follow a plot's path into messages: ``/position[elbow]``, ``/pose/orientation/yaw``, ``/points[:]{id==2}/x``.
+
+Pure. The paths are those of the dashboard's page (``page/js/paths.js``), behind the topic's name; ``tests/web/page/paths.json``
+compares both. Rotations are in radians, times in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from minirospy.base.errors import UsageError
+
+__all__ = ["Filter", "Named", "Slice", "Step", "parse_steps", "select"]
+
+_MAX_VALUES = 50  # series from one path, as from a whole array
+_MAX_TESTED = 10_000  # elements that a filter tests
+
+_STEP = re.compile(
+    r"[/.](?P<name>\w+)|\[(?P<index>-?\d+)\]|\[(?P<first>\d*):(?P<last>\d*)\]"
+    r"|\{(?P<path>[\w./]+)\s*(?P<operator>==|!=|<=?|>=?)\s*(?:\"(?P<double>[^\"]*)\"|'(?P<single>[^']*)'|(?P<bare>[^}\"']+))\}"
+    r"|\[(?:\"(?P<quoted>[^\"\][]+)\"|'(?P<apostrophe>[^'\][]+)'|(?P<word>[^\][:\"']*[^\][:\"'\d-][^\][:\"']*))\]",
+    re.ASCII,
+)
+_TESTS: dict[str, Callable[[Any, Any], bool]] = {
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+class Slice(NamedTuple):
+    """The elements from ``first`` to before ``last`` (None: to the end)."""
+
+    first: int
+    last: int | None
+
+
+class Named(NamedTuple):
+    """The element that belongs to ``name`` in the array of strings ``name`` beside the array."""
+
+    name: str
+
+
+class Filter(NamedTuple):
+    """A filter: the field of an element, an operator, and the value to compare with; ``text`` is the filter's source."""
+
+    fields: tuple[str, ...]
+    compare: Callable[[Any, Any], bool]
+    wanted: float | str
+    text: str
+
+    def accepts(self, value: Any) -> bool:
+        """Return whether an element has a field that passes the test."""
+        for name in self.fields:
+            if name not in _slots(value):
+                return False
+            value = getattr(value, name)
+        if isinstance(self.wanted, str):
+            return self.compare(str(value), self.wanted)
+        number = _number(value)
+        return self.compare is operator.ne if number is None else self.compare(number, self.wanted)
+
+
+Step = str | int | Slice | Named | Filter
+
+
+def parse_steps(text: str) -> list[Step]:
+    """Return the steps of a path behind its topic. Raise UsageError if its syntax is invalid."""
+    steps: list[Step] = []
+    at = 0
+    while at < len(text):
+        match = _STEP.match(text, at)
+        if not match:
+            raise UsageError(f'"{text[at:]}" is not a field, nor an index, nor a filter as {{id==1}}')
+        found = match.groupdict()
+        if found["name"] is not None:
+            steps.append(found["name"])
+        elif found["index"] is not None:
+            steps.append(int(found["index"]))
+        elif found["path"] is not None:
+            steps.append(_filter(found, match.group()))
+        elif found["first"] is not None:
+            steps.append(Slice(int(found["first"] or 0), int(found["last"]) if found["last"] else None))
+        else:
+            steps.append(Named(found["quoted"] or found["apostrophe"] or found["word"]))
+        at = match.end()
+    return steps
+
+
+def _filter(found: dict[str, Any], text: str) -> Filter:
+    wanted: float | str = next(
+        each for name in ("double", "single", "bare") if (each := found[name]) is not None
+    ).strip()
+    if found["bare"] is not None:
+        if wanted in ("true", "false"):
+            wanted = float(wanted == "true")
+        else:
+            try:
+                wanted = float(wanted)
+            except ValueError:
+                pass
+    return Filter(tuple(re.split(r"[./]", found["path"])), _TESTS[found["operator"]], wanted, text)
+
+
+def select(value: Any, steps: Sequence[Step], label: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:
+    """Yield the label and the value of each number to which the steps lead in a message."""
+    if depth == len(steps):
+        yield from _leaves(value, label)
+        return
+    step = steps[depth]
+    if isinstance(step, str):
+        yield from _select_field(value, step, steps, label, depth)
+    elif isinstance(step, Filter):
+        if step.accepts(value):
+            yield from select(value, steps, label + step.text, depth + 1)
+    elif isinstance(step, Named) or not isinstance(value, list | tuple | bytes):
+        return
+    elif isinstance(step, int):
+        if -len(value) <= step < len(value):
+            yield from select(value[step], steps, f"{label}[{step}]", depth + 1)
+    else:
+        # Elements that pass a filter are one series, whatever their index.
+        is_filtered = isinstance(steps[depth + 1] if depth + 1 < len(steps) else None, Filter)
+        last = len(value) if step.last is None else min(step.last, len(value))
+        last = min(last, step.first + (_MAX_TESTED if is_filtered else _MAX_VALUES))
+        for index in range(step.first, last):
+            yield from select(value[index], steps, f"{label}[{':' if is_filtered else index}]", depth + 1)
+
+
+def _select_field(
+    value: Any, name: str, steps: Sequence[Step], label: str, depth: int
+) -> Iterator[tuple[str, float]]:
+    if name in _slots(value):
+        inner = getattr(value, name)
+        following = steps[depth + 1] if depth + 1 < len(steps) else None
+        if not isinstance(following, Named):
+            yield from select(inner, steps, f"{label}/{name}", depth + 1)
+            return
+        names = getattr(value, "name", None)
+        if isinstance(names, list | tuple) and isinstance(inner, list | tuple | bytes):
+            try:
+                index = names.index(following.name)
+            except ValueError:
+                return
+            if index < len(inner):
+                yield from select(inner[index], steps, f"{label}/{name}[{following.name}]", depth + 2)
+    elif depth + 1 == len(steps) and (angle := _angle(value, name)) is not None:
+        yield f"{label}/{name}", angle
+
+
+def _leaves(value: Any, label: str) -> Iterator[tuple[str, float]]:
+    number = _number(value)
+    if number is not None:
+        yield label, number
+    elif isinstance(value, list | tuple | bytes):
+        for index, each in enumerate(value[:_MAX_VALUES]):
+            if (number := _number(each)) is not None:
+                yield f"{label}[{index}]", number
+    else:
+        # As rqt_plot: of a message, the numbers that are directly in it.
+        for name in _slots(value):
+            if (number := _number(getattr(value, name))) is not None:
+                yield f"{label}/{name}", number
+
+
+def _slots(value: Any) -> Sequence[str]:
+    # Look at the class: a message's __getattr__ is slow for names that it does not have.
+    kind = type(value)
+    if hasattr(kind, "_type"):
+        slots: Sequence[str] = kind.__slots__
+        return slots
+    return ("secs", "nsecs") if hasattr(kind, "to_nsec") else ()
+
+
+def _number(value: Any) -> float | None:
+    """Return a value as a number, or None if it is not one. Times are seconds."""
+    if isinstance(value, int | float):
+        return float(value)
+    if hasattr(type(value), "to_nsec"):
+        return float(value.to_sec())
+    return None
+
+
+def _angle(value: Any, name: str) -> float | None:
+    """Return roll, pitch or yaw of a quaternion, or None if ``name`` is another name or the value is no rotation."""
+    if name not in ("roll", "pitch", "yaw") or not {"x", "y", "z", "w"} <= {*_slots(value)}:
+        return None
+    parts = [_number(each) for each in (value.x, value.y, value.z, value.w)]
+    if None in parts:
+        return None
+    size = math.hypot(*(each for each in parts if each is not None))
+    # A quaternion of zeros, from a message that was not filled in, is no rotation.
+    if not 0 < size < math.inf:
+        return None
+    x, y, z, w = (each / size for each in parts if each is not None)
+    if name == "roll":
+        return math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    if name == "pitch":
+        return math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

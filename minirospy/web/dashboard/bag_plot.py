@@ -1,0 +1,181 @@
+"""Series of bags for the page's plots: parse a request, read the bags, return points as JSON. Functions block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import NamedTuple
+
+from minirospy.base.errors import BagError, BagUnindexedError, MinirospyError, UsageError
+from minirospy.core.bag.base import BagReader
+from minirospy.introspect import bag_series
+from minirospy.introspect.bag_series import Sampler
+from minirospy.introspect.bags import open_reader
+from minirospy.web.dashboard.bag_folder import BagFolder
+from minirospy.web.dashboard.json_session import Fields, number, text_of
+
+__all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
+
+_MAX_COLUMNS = 10_000
+_MAX_SERIES = 100  # paths in one request
+_MARGIN_SECONDS = (
+    10.0  # read before and after a range, so that a subtrahend has points around each of the minuend's
+)
+
+
+class Operand(NamedTuple):
+    """A path in a bag, which is named as on the page."""
+
+    bag: str
+    path: str
+
+
+class BagPath(NamedTuple):
+    """A series, by the page's key for it: a path in a bag, or the difference of two."""
+
+    key: str
+    operand: Operand
+    minus: Operand | None
+
+
+class SeriesRequest(NamedTuple):
+    """A page's request: the series, and the range of time in seconds since each bag's start (None: the whole bag)."""
+
+    id: object
+    start: float | None
+    end: float | None
+    columns: int
+    paths: Sequence[BagPath]
+
+    @classmethod
+    def parse(cls, fields: Fields) -> SeriesRequest:
+        """Parse an operation. Raise LookupError, TypeError or UsageError if it is invalid."""
+        columns = min(max(int(number(fields["columns"])), 1), _MAX_COLUMNS)
+        start, end = (None if fields.get(name) is None else number(fields[name]) for name in ("start", "end"))
+        wanted = fields["series"]
+        if not isinstance(wanted, list):
+            raise TypeError("series is a list")
+        if len(wanted) > _MAX_SERIES:
+            raise UsageError(f"a plot has {_MAX_SERIES} paths of bags at most")
+        paths = []
+        for each in wanted:
+            if not isinstance(each, dict):
+                raise TypeError("a series is an object")
+            minus = each.get("minus")
+            paths.append(
+                BagPath(text_of(each, "key"), _operand(each), None if minus is None else _operand(minus))
+            )
+        return cls(fields.get("id"), start, end, columns, paths)
+
+
+def _operand(fields: object) -> Operand:
+    if not isinstance(fields, dict):
+        raise TypeError("a path of a bag is an object")
+    return Operand(text_of(fields, "bag"), text_of(fields, "path"))
+
+
+def fields_of(folder: BagFolder, name: str) -> Fields:
+    """Return a bag's topics with their definitions. Raise BagError if it cannot be opened."""
+    with ExitStack() as opened:
+        reader = _open(folder, name, opened)
+        start, end = bag_series.bag_span(reader)
+        topics = [list(each) for each in bag_series.bag_topics(reader)]
+    return {"name": name, "start": start / 1e9, "length": (end - start) / 1e9, "topics": topics}
+
+
+def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[float], object]) -> Fields:
+    """Return the series of a request, and an error's text for each that cannot be read.
+
+    ``on_share`` is called with the part that has been read, from 0 to 1; its exceptions end the reading.
+    """
+    errors: dict[str, str] = {}
+    found: list[Fields] = []
+    by_bag: dict[str, list[BagPath]] = {}
+    for each in request.paths:
+        # Paths in one bag are read together. A difference needs two readers, which may be in different places.
+        place = each.operand.bag if each.minus is None else f"{each.key}\0"
+        by_bag.setdefault(place, []).append(each)
+    for done, group in enumerate(by_bag.values()):
+
+        def report(share: float, done: int = done) -> None:
+            on_share((done + share) / len(by_bag))
+
+        try:
+            found += _read(folder, group, request, report, errors)
+        except (MinirospyError, OSError) as error:
+            report(1.0)  # ends here if the page has left
+            name = group[0].operand.bag
+            text = str(error) if name in str(error) else f"{name}: {error}"
+            errors.update((each.key, text) for each in group)
+    return {"id": request.id, "found": found, "errors": errors}
+
+
+def _read(
+    folder: BagFolder,
+    group: Sequence[BagPath],
+    request: SeriesRequest,
+    on_share: Callable[[float], object],
+    errors: dict[str, str],
+) -> list[Fields]:
+    with ExitStack() as opened:
+        reader = _open(folder, group[0].operand.bag, opened)
+        topics = {each.topic for each in reader.connections.values()}
+        first, last = bag_series.bag_span(reader)
+        length = (last - first) / 1e9
+        start, end = request.start, request.end
+        shown = (0.0 if start is None else start, length if end is None else end)
+
+        def on_time(time: float) -> None:
+            on_share(min(1.0, max(0.0, (time - shown[0]) / max(shown[1] - shown[0], 1e-9))))
+
+        paths, keys = [], []
+        for each in group:
+            try:
+                paths.append(bag_series.field_path(each.operand.path, topics))
+                keys.append(each.key)
+            except MinirospyError as error:
+                errors[each.key] = str(error)
+        found = bag_series.points(reader, paths, start, end, on_time)
+        if minus := group[0].minus:
+            other = _open(folder, minus.bag, opened)
+            subtrahend = bag_series.field_path(
+                minus.path, {each.topic for each in other.connections.values()}
+            )
+            margin = max(_MARGIN_SECONDS, (shown[1] - shown[0]) / 10)
+            around = bag_series.points(
+                other,
+                [subtrahend],
+                None if start is None else max(0.0, start - margin),
+                None if end is None else end + margin,
+            )
+            difference = bag_series.differences((point for _, point in found), (point for _, point in around))
+            found = ((0, point) for point in difference)
+        samplers = bag_series.sample(found, len(paths), *shown, request.columns)
+    series = []
+    for key, path, own in zip(keys, paths, samplers, strict=True):
+        if not own and start is None and end is None:
+            errors[key] = f"no number at {path.topic} in the messages of this bag"
+        series += [_series(key, label, sampler, length) for label, sampler in own.items()]
+    return series
+
+
+def _series(key: str, label: str, sampler: Sampler, length: float) -> Fields:
+    times, values = sampler.result()
+    return {
+        "key": key,
+        "label": label,
+        "times": times,
+        "values": values,
+        "count": sampler.count,
+        "exact": sampler.is_exact,
+        "length": length,
+    }
+
+
+def _open(folder: BagFolder, name: str, opened: ExitStack) -> BagReader:
+    try:
+        reader = opened.enter_context(open_reader(str(folder.path_of(name))))
+        reader.prepare()
+    except BagUnindexedError as error:
+        raise BagError(f"{error}. Run `rosbag reindex {name}`") from error
+    return reader
