@@ -15,10 +15,16 @@ let end = null;
 const listeners = new Set(); // of the views that are open: a layout may have several
 let removed = 0;
 
-function collect(link) {
+/** Collect the lines from now on; call a function with all of them after each change, and return what ends that. */
+export function collect(link, received = null) {
   end ??= link.subscribe({ topic: "/rosout_agg", mode: "all" }, (item) => {
     append((item.lines ?? []).map(lineOf));
   });
+  if (!received) return () => {};
+  const listener = () => received(lines);
+  listeners.add(listener);
+  listener();
+  return () => listeners.delete(listener);
 }
 
 function append(added) {
