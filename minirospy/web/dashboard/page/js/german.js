@@ -55,6 +55,7 @@ export const GERMAN = {
   "Show more": "Mehr zeigen",
   "{count} topic": "{count} Topic",
   "{count} more": "{count} weitere",
+  "{count} inside": "{count} darin",
   "No line yet.": "Noch keine Zeile.",
   "Hold: button of GPIO {pin}": "Halten: Taster an GPIO {pin}",
   "topics": "Topics",

@@ -127,7 +127,7 @@ export class Console {
     main.append(
       h(
         "div",
-        { class: "bar" },
+        { class: "bar console-bar" },
         [...this.buttons.values()],
         this.node,
         this.text,
@@ -138,7 +138,7 @@ export class Console {
       ),
       h(
         "div",
-        { class: "bar" },
+        { class: "bar console-bar" },
         this.pauseButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),

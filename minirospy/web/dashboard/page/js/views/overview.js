@@ -286,8 +286,12 @@ export class Overview {
           "tr",
           { class: isBad ? "bad" : "" },
           h("td", {}, mark(isBad ? "bad" : state === "flows" ? "good" : "none", title)),
-          h("th", { scope: "row", title: type }, h("a", { href: linkOf(topic, state, publishers) }, breakable(topic))),
-          h("td", { class: "num", title: hz ? bandwidth(bytes) : "" }, isBad ? t(STATES[state]) : rate),
+          h(
+            "th",
+            { scope: "row", title: type || null },
+            h("a", { href: linkOf(topic, state, publishers) }, breakable(topic)),
+          ),
+          h("td", { class: "num", title: hz ? bandwidth(bytes) : null }, isBad ? t(STATES[state]) : rate),
         );
         row.dataset.topic = topic;
         row.dataset.state = state;
