@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
+_MASTER_SECONDS = 1.0  # to connect to a master before the page is served without one
+
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
 
@@ -133,7 +135,7 @@ def dashboard_parser() -> Parser:
         "view",
         nargs="?",
         default="",
-        help=f"the view to open (topics), or a layout: {', '.join(layouts)}",
+        help=f"the view to open (overview), or a layout: {', '.join(layouts)}",
         completer="dashboard_views",
     )
     parser.add_argument(
@@ -253,7 +255,7 @@ def _dashboard(view: str, layout: str, embed: bool, arguments: Sequence[str] = (
         names = (*VIEWS, *(each for each in LAYOUTS if each not in VIEWS))
         raise Misuse(f"there is no view '{view}'{did_you_mean(view, names)}: there are {', '.join(names)}")
     fields = {"preset": [layout]} if layout else {}
-    shown = "layout" if layout else view or "topics"
+    shown = "layout" if layout else view or "overview"
     return _serve(shown, fields, Serving(**serving), arguments, embeds=embed)
 
 
@@ -333,7 +335,9 @@ def _serve(
     from minirospy.web.addresses import host_names
     from minirospy.web.bridge import BridgeOptions
     from minirospy.web.dashboard.bag_folder import BagFolder
+    from minirospy.web.dashboard.codes import Codes
     from minirospy.web.dashboard.dashboard import PORT, Dashboard
+    from minirospy.web.dashboard.waiting_page import WaitingPage
     from minirospy.web.serve import run
 
     # Bags named on the command line may be in any folder, not only below the working folder.
@@ -354,55 +358,107 @@ def _serve(
     )
 
     class Started:
-        """Opens the dashboard on the given port. The default is PORT, or any free port if PORT is in use."""
+        """Opens the dashboard on the given port. The default is PORT, or any free port if PORT is in use.
 
-        dashboard: Dashboard
+        Until there is a master, a page without data is served on the port.
+        """
 
         def __init__(self, node: Node) -> None:
             self._node = node
+            self._codes = Codes()
+            self._waiting: WaitingPage | None = None
             self._opened: list[Dashboard] = []
 
+        async def wait(self) -> None:
+            """Serve the page if nothing listens at the master's address; return before there is a master."""
+            if await _is_reachable(self._node.master_uri):
+                return
+            for each in ports:
+                waiting = WaitingPage(self._node.master_uri, self._codes, options_of(each), embeds=embeds)
+                try:
+                    await waiting.open()
+                except BridgeError:
+                    if each != ports[-1]:
+                        continue
+                    raise
+                self._waiting = waiting
+                announce(waiting.port, self._codes)
+                return
+
         async def start(self) -> None:
-            for each in (PORT, 0) if port is None else (port,):
-                options = BridgeOptions(
-                    address=serving.bound,
-                    foxglove_port=each,
-                    access=access,
-                    certificate=serving.cert,
-                    key=serving.key,
-                    diagnostics=False,
-                    name="minirospy dashboard",
-                )
-                self.dashboard = Dashboard(
+            waiting = self._waiting
+            if waiting:
+                await waiting.close()
+            for each in (waiting.port,) if waiting else ports:
+                dashboard = Dashboard(
                     self._node,
-                    options,
+                    options_of(each),
                     rviz_file,
                     bags,
                     publishes_joints=bool(node_name),
                     embeds=embeds,
+                    codes=self._codes,
                 )
-                self._opened.append(self.dashboard)
+                self._opened.append(dashboard)
                 try:
-                    await self.dashboard.start()
+                    await dashboard.start()
                 except BridgeError:
-                    if each == PORT and port is None:
+                    if each != ports[-1] and not waiting:
                         continue
                     raise
+                if not waiting:
+                    announce(dashboard.port, self._codes)
                 return
 
         async def close(self) -> None:
+            if self._waiting:
+                await self._waiting.close()
             for each in self._opened:
                 await each.close()
+
+    ports = (PORT, 0) if port is None else (port,)
+
+    def options_of(port: int) -> BridgeOptions:
+        return BridgeOptions(
+            address=serving.bound,
+            foxglove_port=port,
+            access=access,
+            certificate=serving.cert,
+            key=serving.key,
+            diagnostics=False,
+            name="minirospy dashboard",
+        )
 
     async def start(node: Node) -> Started:
         return Started(node)
 
-    def announce(started: Started) -> None:
-        _announce(serving, started.dashboard.port, view, fields, tokens, started.dashboard.codes)
+    def announce(port: int, codes: Codes) -> None:
+        _announce(serving, port, view, fields, tokens, codes)
 
     if embeds:
         end_with_stdin()
-    return run(node_name or anonymous_name("minirospy_dashboard"), arguments, start, announce)
+    return run(
+        node_name or anonymous_name("minirospy_dashboard"),
+        arguments,
+        start,
+        lambda _: None,
+        connect=Started.wait,
+    )
+
+
+async def _is_reachable(uri: str) -> bool:
+    """Return whether a program listens at a URI's host and port. Wait at most _MASTER_SECONDS."""
+    import asyncio
+    import contextlib
+
+    from minirospy.base.environment import split_uri
+
+    host, port, _ = split_uri(uri)
+    with contextlib.suppress(OSError, asyncio.TimeoutError):
+        _, writer = await asyncio.wait_for(asyncio.open_connection(host, port), _MASTER_SECONDS)
+        writer.close()
+        return True
+    return False
 
 
 def end_with_stdin() -> None:

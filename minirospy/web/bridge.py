@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from minirospy.web.rosapi.services import Rosapi
     from minirospy.web.tf_republisher.republisher import Republisher
 
-__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOptions", "Extras"]
+__all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOptions", "Extras", "tls_of"]
 
 FOXGLOVE_PORT = 8765
 ROSBRIDGE_PORT = 9090
@@ -86,6 +86,19 @@ class Extras:
 
     endpoints: Sequence[Endpoint] = ()
     pages: Mapping[str, HttpHandler] = field(default_factory=dict)
+
+
+def tls_of(options: BridgeOptions) -> ssl.SSLContext | None:
+    """Return the TLS context for the options, or None without a certificate. Raise BridgeError if it cannot be used."""
+    if not options.certificate:
+        if options.key:
+            raise BridgeError("a key is given without its certificate: give both PEM files")
+        return None
+    try:
+        return tls_context(options.certificate, options.key)
+    except OSError as error:  # covers ssl.SSLError, which is a subclass
+        name = error.filename or f"{options.certificate} {options.key}".strip()
+        raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
 
 
 class Bridge:
@@ -132,7 +145,7 @@ class Bridge:
 
     async def start(self) -> None:
         """Open the listeners. Raise BridgeError if one cannot be opened."""
-        tls = self._tls()
+        tls = tls_of(self.options)
         served: list[tuple[str, list[Endpoint], int | None]] = [
             ("foxglove", [self.foxglove, *self._extras.endpoints], self.options.foxglove_port),
             ("rosbridge", [self.rosbridge], self.options.rosbridge_port),
@@ -248,17 +261,6 @@ class Bridge:
             },
             "clients": clients,
         }
-
-    def _tls(self) -> ssl.SSLContext | None:
-        if not self.options.certificate:
-            if self.options.key:
-                raise BridgeError("a key is given without its certificate: give both PEM files")
-            return None
-        try:
-            return tls_context(self.options.certificate, self.options.key)
-        except OSError as error:  # covers ssl.SSLError, which is a subclass
-            name = error.filename or f"{self.options.certificate} {self.options.key}".strip()
-            raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
 
     def _status_page(self, exchange: Exchange) -> None:
         exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")

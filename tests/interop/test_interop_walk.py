@@ -29,6 +29,7 @@ from tests.web.dashboard.conftest import Served, serve
 __all__ = ["browse", "serve"]
 
 SEEN = {
+    "overview": ("tr[data-topic] th", "/button_state"),
     "topics": (".topic .name", "/button_state"),
     "console": (".line .text", "the battery is low"),
     "graph": ("svg.graph .node", "/talker_scan"),

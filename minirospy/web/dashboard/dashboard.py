@@ -35,15 +35,17 @@ class Dashboard:
         *,
         publishes_joints: bool = False,
         embeds: bool = False,
+        codes: Codes | None = None,
     ) -> None:
         """Create the dashboard.
 
         ``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``. ``bags``: the
         bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish joints like
         joint_state_publisher_gui, even if no page is open. ``embeds``: notebooks on this machine may embed the page.
+        ``codes``: the one-time codes of a page that was served before this dashboard.
         """
         master_uri = node.master_uri
-        self.codes = Codes()
+        self.codes = codes or Codes()
         self._board = BoardEndpoint()
         self.rviz = RvizEndpoint(rviz_file)
         self._tools = ToolsEndpoint(master_uri)

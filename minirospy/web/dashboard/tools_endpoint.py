@@ -18,6 +18,7 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from minirospy.aio.tasks import ErrorReporter, keep_running
+from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.graph import Graph, why_illegal
@@ -28,6 +29,7 @@ from minirospy.introspect.survey import Survey, describe, survey
 from minirospy.introspect.type_texts import installed_type
 from minirospy.introspect.values import check_parameter, format_value, parse_value
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.web.dashboard.health import Examiner, last_log_lines, running_boards
 from minirospy.web.dashboard.json_session import Fields, Handler, JsonEndpoint, JsonSession, text_of, texts_of
 
 if TYPE_CHECKING:
@@ -66,10 +68,12 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         self._surveyor = ThreadPoolExecutor(1, "tools-survey")
         self._last: Survey | None = None
         self._processes = ProcessLoads()
+        self.examiner = Examiner(master_uri)
 
     async def close(self) -> None:
         """Cancel the running requests. Idempotent."""
         await super().close()
+        await asyncio.get_running_loop().run_in_executor(None, self.examiner.close)
         reporting, self._reporting = self._reporting, None
         if reporting:
             reporting.cancel()
@@ -146,6 +150,9 @@ class ToolsSession(JsonSession):
             "yaml": self._yaml,
             "value": self._value,
             "set": self._set,
+            "examine": self._examine,
+            "boards": self._boards,
+            "log": self._log,
         }
         super().__init__(client, handlers)
 
@@ -265,6 +272,23 @@ class ToolsSession(JsonSession):
         if found is None:
             raise NotFoundError("message type", name, ())
         return {"name": name, "definition": found.definition}
+
+    async def _examine(self, _: Fields) -> Fields:
+        """Return the findings of `minirospy doctor`, which takes seconds."""
+        return {"findings": await self.in_thread(self._endpoint.examiner.findings)}
+
+    async def _boards(self, _: Fields) -> Fields:
+        """Return the names of the boards that a program on this machine uses."""
+        return {"names": await self.in_thread(running_boards)}
+
+    async def _log(self, _: Fields) -> Fields:
+        """Return the end of the master's rosout.log, or "" if it is not on this machine."""
+
+        def read() -> str:
+            with self._endpoint.graph() as graph:
+                return last_log_lines(Environment.read().log_dir, graph.master.get_param("/run_id"))
+
+        return {"text": await self.in_thread(read)}
 
     def _require_writing(self, what: str) -> None:
         if not self.client.may_write:

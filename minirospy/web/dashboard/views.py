@@ -14,6 +14,7 @@ from minirospy.base.errors import UsageError
 __all__ = ["LAYOUTS", "VIEWS", "link", "plotted_fields"]
 
 VIEWS = (
+    "overview",
     "topics",
     "console",
     "plot",

@@ -23,7 +23,7 @@ class Served:
 
     def __init__(self, options: BridgeOptions) -> None:
         self.loop = LoopThread("test-dashboard")
-        self._nodes: list[Node] = []
+        self.nodes: list[Node] = []
         self._options = options
         self.dashboard: Dashboard | None = None
 
@@ -37,7 +37,7 @@ class Served:
 
     @property
     def node_of_dashboard(self) -> Node:
-        return self._nodes[0]
+        return self.nodes[0]
 
     def run(self, work: Coroutine[object, object, _T]) -> _T:
         return self.loop.run(work, 200.0)
@@ -46,7 +46,7 @@ class Served:
         async def start() -> Node:
             node = Node(name)
             await node.start()
-            self._nodes.append(node)
+            self.nodes.append(node)
             return node
 
         return self.run(start())
@@ -71,7 +71,7 @@ class Served:
     async def _start(self) -> Dashboard:
         node = Node("dashboard", rosout=False)
         await node.start()
-        self._nodes.append(node)
+        self.nodes.append(node)
         dashboard = Dashboard(node, self._options)
         await dashboard.start()
         return dashboard
@@ -79,7 +79,7 @@ class Served:
     async def _close(self) -> None:
         if self.dashboard:
             await self.dashboard.close()
-        for node in reversed(self._nodes):
+        for node in reversed(self.nodes):
             await node.close()
 
 

@@ -17,10 +17,13 @@ from urllib.request import url2pathname, urlopen
 
 import pytest
 
+from minirospy.base.errors import MasterUnreachableError
 from minirospy.cli import dashboard as command
 from minirospy.web.dashboard import browser
 from minirospy.web.dashboard.browser import has_screen, open_link
 from minirospy.workspace.packages import Packages
+from tests.conftest import free_port
+from tests.waiting import wait_until
 from tests.web.test_web import make_certificate
 
 
@@ -66,6 +69,50 @@ def test_dashboard_prints_its_link_serves_and_ends_with_status_0(
     assert started[0].wait(60) == 0
 
 
+def test_page_is_served_before_there_is_a_master(
+    started: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = free_port()
+    uri = f"http://localhost:{port}"
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    link = link_of(started, "-m", "minirospy", "dashboard", "--no-browser", "--port", "0")
+    token = link.rpartition("token=")[2]
+    bearer = {"Authorization": f"Bearer {token}"}
+
+    def status(headers: dict[str, str]) -> tuple[int, str]:
+        connection = HTTPConnection("127.0.0.1", urlsplit(link).port or 0, timeout=60)
+        try:
+            connection.request("GET", "/status", headers=headers)
+            answer = connection.getresponse()
+            return answer.status, answer.read().decode()
+        except ConnectionError:  # between the two pages the port is free
+            return 0, ""
+        finally:
+            connection.close()
+
+    assert urlopen(link, timeout=60).status == 200
+    assert status(bearer) == (503, str(MasterUnreachableError(uri)))
+    started.append(
+        subprocess.Popen([sys.executable, "-m", "minirospy", "master", "-p", str(port)], text=True)
+    )
+    wait_until(lambda: status(bearer)[0] == 200, 120, "the dashboard does not start")
+    # The link was printed once: the page keeps its port.
+    started[0].terminate()
+    assert started[0].wait(60) == 0
+    assert started[0].stdout
+    assert "Open in a browser" not in started[0].stdout.read()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another process")
+def test_dashboard_without_a_master_ends_with_status_0(
+    started: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{free_port()}")
+    link_of(started, "-m", "minirospy", "dashboard", "--no-browser", "--port", "0")
+    started[0].send_signal(signal.SIGINT)
+    assert started[0].wait(60) == 0
+
+
 @pytest.mark.parametrize("words", [["workshop"], ["--layout", "workshop"]])
 def test_layout_of_the_page_is_opened(started: list[subprocess.Popen[str]], words: list[str]) -> None:
     link = link_of(started, "-m", "minirospy", "dashboard", *words, "--no-browser", "--port", "0")
@@ -97,7 +144,7 @@ def test_listening_dashboard_prints_links_with_tokens(started: list[subprocess.P
         "--address",
         "127.0.0.1",
     )
-    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#/topics\?token=[\w-]{22}", link)
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#/overview\?token=[\w-]{22}", link)
 
 
 def test_certificate_makes_the_link_https(started: list[subprocess.Popen[str]], tmp_path: Path) -> None:
@@ -197,7 +244,7 @@ def test_browser_is_started_with_a_file_without_code_or_token(
     with pytest.raises(Opened):
         command.dashboard(["--port", "0"])
     assert "code" not in opened.get()
-    link = r"http://127\.0\.0\.1:\d+/#/topics\?code=[\w-]{22}"
+    link = r"http://127\.0\.0\.1:\d+/#/overview\?code=[\w-]{22}"
     assert re.search(f'url={link}"', pages[0])
     assert re.search(f'href="{link}"', pages[0])
     assert "token" not in pages[0]

@@ -20,6 +20,20 @@ export function pathOf(points) {
   return points.map(({ x, y }, index) => `${index ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join("");
 }
 
+/**
+ * Return a line's points so that the line does not cross its label, which is at one of the points: from left to right
+ * it runs level between the label's lines of text, downwards it runs straight past the label's left side.
+ */
+export function aroundLabel(points, { x, y, width, height }, isLevel) {
+  const distance = (point) => Math.hypot(point.x - x, point.y - y);
+  const at = points.reduce((best, point, index) => (distance(point) < distance(points[best]) ? index : best), 0);
+  const [from, to] = [points[0], points.at(-1)];
+  const [along, half] = isLevel ? ["x", width / 2] : ["y", height / 2];
+  const sign = to[along] < from[along] ? -1 : 1;
+  const ends = [-half, half].map((far) => ({ x, y, [along]: (isLevel ? x : y) + sign * far }));
+  return [...points.slice(0, Math.max(1, at)), ...ends, ...points.slice(Math.min(at + 1, points.length - 1))];
+}
+
 /** Return the path of a loop from a box to itself around the place of its label: at the right side, or below. */
 export function loopOf({ x, y, width, height }, label) {
   const isRight = Math.abs(label.x - x) / width >= Math.abs(label.y - y) / height;

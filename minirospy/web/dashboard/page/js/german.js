@@ -30,6 +30,63 @@ export const GERMAN = {
   "Not connected: this was not done. Try again in a moment.":
     "Nicht verbunden: das wurde nicht ausgeführt. Gleich noch einmal versuchen.",
   "This view failed: {why}": "Diese Ansicht hat versagt: {why}",
+  // the first view
+  "Overview": "Übersicht",
+  "What to do": "Was zu tun ist",
+  "Check again": "Noch einmal prüfen",
+  "Log": "Log",
+  "different types": "verschiedene Typen",
+  "not published": "nicht gesendet",
+  "silent": "stumm",
+  "messages come": "Nachrichten kommen",
+  "no message at present": "zur Zeit keine Nachricht",
+  "it answers": "antwortet",
+  "nobody listens": "niemand hört zu",
+  "There is no ROS master yet.": "Es gibt noch keinen ROS-Master.",
+  "The dashboard does not answer.": "Das Dashboard antwortet nicht.",
+  "The ROS master does not answer.": "Der ROS-Master antwortet nicht.",
+  "All is well.": "Alles in Ordnung.",
+  "{count} problem": "{count} Problem",
+  "{count} problems": "{count} Probleme",
+  "{count} warning": "{count} Warnung",
+  "{count} warnings": "{count} Warnungen",
+  "as `minirospy doctor` finds": "wie `minirospy doctor` es findet",
+  "checking …": "prüft …",
+  "Nothing to do.": "Nichts zu tun.",
+  "Show more": "Mehr zeigen",
+  "{count} topic": "{count} Topic",
+  "{count} more": "{count} weitere",
+  "{count} inside": "{count} darin",
+  "No line yet.": "Noch keine Zeile.",
+  "Hold: button of GPIO {pin}": "Halten: Taster an GPIO {pin}",
+  "topics": "Topics",
+  "{topic} is silent: {nodes} published on it, or should, and sends nothing":
+    "{topic} ist stumm: {nodes} hat darauf gesendet oder sollte es, und sendet nichts",
+  "look at that node's log lines, and at the device that it reads":
+    "die Log-Zeilen dieser Node ansehen und das Gerät, das sie liest",
+  // findings of minirospy doctor
+  "no ROS master answers at {uri}: start one with `roscore`, or set ROS_MASTER_URI to the machine where it runs":
+    "an {uri} antwortet kein ROS-Master: mit `roscore` einen starten, oder ROS_MASTER_URI auf den Rechner setzen, auf dem er läuft",
+  "none runs on this machine at {uri}": "auf diesem Rechner läuft keiner an {uri}",
+  "start `roscore`, or set ROS_MASTER_URI to the machine where it runs":
+    "`roscore` starten, oder ROS_MASTER_URI auf den Rechner setzen, auf dem er läuft",
+  "it answered, and then no more: {why}": "er hat geantwortet, dann nicht mehr: {why}",
+  "nobody publishes {topics}": "niemand sendet {topics}",
+  "start the publisher, or correct the topic's name": "den Publisher starten, oder den Namen des Topics berichtigen",
+  "{topic} has nodes of different types, which never connect: {types}":
+    "{topic} hat Nodes mit verschiedenen Typen, die sich nie verbinden: {types}",
+  "use one type, or two names": "einen Typ verwenden, oder zwei Namen",
+  "{nodes}: nothing listens at their port on '{host}'": "{nodes}: an ihrem Port auf '{host}' hört nichts",
+  "nothing listens at their port on '{host}'": "an ihrem Port auf '{host}' hört nichts",
+  "if they were killed, `rosnode cleanup` makes the master forget them; if they run, they registered a wrong address: set ROS_IP on their machine":
+    "wurden sie beendet, lässt `rosnode cleanup` den Master sie vergessen; laufen sie, haben sie eine falsche Adresse angemeldet: auf ihrem Rechner ROS_IP setzen",
+  "{nodes}: nothing comes back from '{host}'": "{nodes}: von '{host}' kommt nichts zurück",
+  "nothing comes back from '{host}'": "von '{host}' kommt nichts zurück",
+  "{subscriber} does not get {topics} of {publisher}": "{subscriber} bekommt {topics} von {publisher} nicht",
+  "{service} of {node} does not answer: {why}": "{service} von {node} antwortet nicht: {why}",
+  "start its node again; if that one runs elsewhere, its port for services is blocked: see MINIROSPY_PORTS":
+    "die Node neu starten; läuft sie auf einem anderen Rechner, ist ihr Port für Services gesperrt: siehe MINIROSPY_PORTS",
+  "not installed: {packages}": "nicht installiert: {packages}",
   // names of views
   "Layouts": "Anordnungen",
   "Topics": "Topics",

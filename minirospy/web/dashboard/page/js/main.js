@@ -20,6 +20,7 @@ import { Joints } from "./views/joints.js";
 import { Launch } from "./views/launch.js";
 import { Layouts } from "./views/layout.js";
 import { Nodes } from "./views/nodes.js";
+import { Overview } from "./views/overview.js";
 import { Parameters } from "./views/parameters.js";
 import { Panels } from "./views/panels.js";
 import { Plot } from "./views/plot.js";
@@ -38,6 +39,7 @@ import { Turtlesim } from "./views/turtlesim.js";
 if (window.parent !== window) document.documentElement.classList.add("embedded");
 
 const VIEWS = {
+  overview: ["Overview", Overview, "Look"],
   topics: ["Topics", Topics, "Look"],
   console: ["Console", Console, "Look"],
   plot: ["Plot", Plot, "Look"],
@@ -130,7 +132,7 @@ function placeOf(name) {
 
 function route() {
   const { view, words } = addressOf(location.hash);
-  const chosen = Object.hasOwn(VIEWS, view) ? view : "topics";
+  const chosen = Object.hasOwn(VIEWS, view) ? view : "overview";
   // What fails in one view does not keep a person in it.
   const closing = current;
   current = null;

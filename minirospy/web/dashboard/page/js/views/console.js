@@ -15,10 +15,16 @@ let end = null;
 const listeners = new Set(); // of the views that are open: a layout may have several
 let removed = 0;
 
-function collect(link) {
+/** Collect the lines from now on; call a function with all of them after each change, and return what ends that. */
+export function collect(link, received = null) {
   end ??= link.subscribe({ topic: "/rosout_agg", mode: "all" }, (item) => {
     append((item.lines ?? []).map(lineOf));
   });
+  if (!received) return () => {};
+  const listener = () => received(lines);
+  listeners.add(listener);
+  listener();
+  return () => listeners.delete(listener);
 }
 
 function append(added) {
@@ -121,7 +127,7 @@ export class Console {
     main.append(
       h(
         "div",
-        { class: "bar" },
+        { class: "bar console-bar" },
         [...this.buttons.values()],
         this.node,
         this.text,
@@ -132,7 +138,7 @@ export class Console {
       ),
       h(
         "div",
-        { class: "bar" },
+        { class: "bar console-bar" },
         this.pauseButton,
         h("button", { type: "button", onclick: () => this.clear() }, "Clear"),
         h("button", { type: "button", onclick: (event) => this.copy(event.currentTarget) }, "Copy"),

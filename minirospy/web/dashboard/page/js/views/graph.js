@@ -1,7 +1,7 @@
 // Who sends to whom: nodes and topics, laid out by dagre and drawn as SVG. A click shows the details.
 
 import { Graph as Layered, layout } from "../../vendor/dagre/dagre.esm.js";
-import { brief, loopOf, pathOf } from "../drawing.js";
+import { aroundLabel, brief, loopOf, pathOf } from "../drawing.js";
 import { bandwidth, h, redraw, refill, setText, svg, uniqueId } from "../dom.js";
 import { connectedOf, elementsOf, groupsOf, packed, trafficOf } from "../graph_elements.js";
 import { PanZoom } from "../panzoom.js";
@@ -16,6 +16,7 @@ const MODES = [
 const SHAPES = { n: "node", t: "topic", a: "action" };
 const HEIGHT = 36;
 const MAX_TRIED = 150; // nodes and topics that are laid out in two ways
+const LABEL_GAP = 6; // pixels between a line that runs downwards and its label
 const RATE_TEXT = "000.0 kB/s"; // for which an edge has room
 
 export class Graph {
@@ -251,11 +252,12 @@ export class Graph {
     measure.font = "12px system-ui, sans-serif";
     const room = this.hasRates.checked ? measure.measureText(RATE_TEXT).width : 0;
     edges.forEach(({ from, to, label }, index) => {
-      const width = Math.max(label ? measure.measureText(brief(label)).width : 0, room);
+      const text = Math.max(label ? measure.measureText(brief(label)).width : 0, room);
+      const width = rankdir === "LR" ? text : 2 * (text && text + LABEL_GAP); // downwards, the text is right of the line
       partOf(from).setEdge(
         from,
         to,
-        width ? { width, height: label ? 46 : 30, labelpos: "c", index } : { index },
+        width ? { width, height: label ? 46 : 30, labelpos: "c", index, isLevel: rankdir === "LR" } : { index },
         String(index),
       );
     });
@@ -288,13 +290,17 @@ export class Graph {
     );
   }
 
-  makeEdge({ points, x, y, index }, id, edges, box) {
+  makeEdge({ points, x: center, y, width, height, index, isLevel }, id, edges, box) {
     const edge = edges[index];
-    const path = id.v === id.w && x !== undefined ? loopOf(box, { x, y }) : pathOf(points);
-    const hasText = x !== undefined;
+    const hasText = center !== undefined;
+    const isLoop = id.v === id.w && hasText;
+    const label = { x: center, y, width, height };
+    const path = isLoop ? loopOf(box, label) : pathOf(hasText ? aroundLabel(points, label, isLevel) : points);
+    const isBeside = hasText && !isLevel && !isLoop;
+    const x = isBeside ? center + LABEL_GAP : center;
     const part = svg(
       "g",
-      { class: "edge" },
+      { class: isBeside ? "edge beside" : "edge" },
       svg("path", { d: path, "marker-end": `url(#${this.arrow})` }),
       hasText && edge.label ? [svg("title", {}, edge.label), svg("text", { x, y: y - 4 }, brief(edge.label))] : null,
     );

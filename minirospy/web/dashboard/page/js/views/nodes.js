@@ -2,6 +2,7 @@
 // the dead.
 
 import { fill, h, refill, setText } from "../dom.js";
+import { Folders } from "../folders.js";
 import { t } from "../texts.js";
 
 const COLUMNS = ["Node", "Host", "Process", "CPU", "Memory", "Answers in", "Topics", "Services"];
@@ -46,6 +47,17 @@ export class Nodes {
       ),
     );
     this.table = h("table", { class: "goals nodes" }, h("thead", {}, h("tr", {}, this.heads)), this.body);
+    this.folders = new Folders(this.body, {
+      rowOf: (name) => this.rows.get(name),
+      show: (row, label, depth) => {
+        const button = row.querySelector("button");
+        setText(button, label);
+        button.title = row.dataset.node;
+        row.style.setProperty("--depth", String(depth));
+      },
+      wrap: (button) => h("tr", { class: "folder-row" }, h("th", { colspan: String(COLUMNS.length) }, button)),
+      changed: () => this.showList(),
+    });
     this.side = h("aside", { class: "panel details side wide", hidden: true });
     this.empty = h("p", { class: "empty" });
     main.append(
@@ -81,24 +93,25 @@ export class Nodes {
       row.remove();
       this.rows.delete(name);
     }
-    let before = null;
     COLUMNS.forEach((each, index) => {
       if (SORTED[each] === this.sort)
         this.heads[index].setAttribute("aria-sort", this.sort ? "descending" : "ascending");
       else this.heads[index].removeAttribute("aria-sort");
     });
     const { sort } = this;
-    const shown = [...this.nodes];
+    const all = [...this.nodes];
     // Those of other machines last.
-    if (sort) shown.sort(([, one], [, other]) => (other[sort] ?? -1) - (one[sort] ?? -1));
-    for (const [name, node] of shown) {
+    if (sort) all.sort(([, one], [, other]) => (other[sort] ?? -1) - (one[sort] ?? -1));
+    const found = [];
+    for (const [name, node] of all) {
       const row = this.rows.get(name) ?? this.makeRow(name);
       this.showRow(row, node);
-      row.hidden = !`${name} ${node.host}`.toLowerCase().includes(words);
-      const next = before ? before.nextSibling : this.body.firstChild;
-      if (row !== next) this.body.insertBefore(row, next);
-      before = row;
+      if (`${name} ${node.host}`.toLowerCase().includes(words)) found.push(name);
     }
+    const shown = new Set(found);
+    const needed = new Set(this.chosen ? [this.chosen] : []);
+    const folded = this.folders.arrange(found, { needed, isFiltered: Boolean(words), isFlat: Boolean(sort) });
+    for (const [name, row] of this.rows) row.hidden = !shown.has(name) || folded.has(name);
     const dead = [...this.nodes.values()].filter(({ trouble }) => trouble).length;
     setText(
       this.count,

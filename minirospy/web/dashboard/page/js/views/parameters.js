@@ -1,6 +1,7 @@
 // Parameters: all that are set, live; set and deleted.
 
 import { h, quoted, setText } from "../dom.js";
+import { Folders } from "../folders.js";
 import { t } from "../texts.js";
 
 const PREVIEW_MS = 150; // without another key
@@ -21,6 +22,17 @@ export class Parameters {
     });
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "group", "aria-label": "Parameters" });
+    this.folders = new Folders(this.list, {
+      rowOf: (name) => this.rows.get(name).element,
+      show: (element, label, depth) => {
+        const name = element.querySelector(".name");
+        setText(name, label);
+        name.title = element.dataset.name;
+        element.style.setProperty("--depth", String(depth));
+      },
+      wrap: (button) => h("div", { class: "row folder-row" }, button),
+      changed: () => this.showFiltered(),
+    });
     this.name = h("input", { placeholder: "/name", "aria-label": "Name of a new parameter", autocomplete: "off" });
     this.value = h("input", {
       placeholder: "value, as 5 or [1, 2] or text",
@@ -64,7 +76,6 @@ export class Parameters {
         this.rows.delete(name);
       }
     }
-    let before = null;
     for (const name of names) {
       let row = this.rows.get(name);
       if (!row) {
@@ -75,9 +86,6 @@ export class Parameters {
       // What a person is typing stays.
       if (row.text !== text && document.activeElement !== row.input) row.input.value = text;
       row.text = text;
-      const next = before ? before.nextSibling : this.list.firstChild;
-      if (row.element !== next) this.list.insertBefore(row.element, next);
-      before = row.element;
     }
     this.showFiltered();
   }
@@ -126,12 +134,15 @@ export class Parameters {
 
   showFiltered() {
     const words = this.filter.value.toLowerCase();
-    let count = 0;
-    for (const [name, row] of this.rows) {
-      row.element.hidden = !`${name} ${row.text}`.toLowerCase().includes(words);
-      if (!row.element.hidden) count += 1;
-    }
-    setText(this.count, t("{count} of {all} parameters", { count, all: this.rows.size }));
+    const found = [...this.rows.keys()]
+      .filter((name) => `${name} ${this.rows.get(name).text}`.toLowerCase().includes(words))
+      .sort();
+    const shown = new Set(found);
+    // What a person is typing in stays.
+    const typing = [...this.rows].filter(([, { input }]) => input === document.activeElement).map(([name]) => name);
+    const folded = this.folders.arrange(found, { needed: new Set(typing), isFiltered: Boolean(words) });
+    for (const [name, { element }] of this.rows) element.hidden = !shown.has(name) || folded.has(name);
+    setText(this.count, t("{count} of {all} parameters", { count: found.length, all: this.rows.size }));
   }
 
   /** Set a parameter as rosparam does: the server reads the text as YAML. */

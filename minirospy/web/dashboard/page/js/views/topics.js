@@ -1,6 +1,7 @@
 // All topics: type, rate, bandwidth, and the live values of those that are open.
 
 import { bandwidth, fill, h, setText, shown } from "../dom.js";
+import { Folders } from "../folders.js";
 import { anglesOf, namedSteps, numberOf } from "../paths.js";
 import { Rate } from "../rates.js";
 import { isList } from "../ros1.js";
@@ -39,6 +40,12 @@ export class Topics {
     this.count = h("span", { class: "muted" });
     this.list = h("div", { class: "topics", role: "tree", "aria-label": "Topics" });
     this.empty = h("p", { class: "empty" });
+    this.folders = new Folders(this.list, {
+      rowOf: (topic) => this.rows.get(topic).element,
+      show: (element, label, depth) => this.rows.get(element.dataset.topic).place(label, depth),
+      wrap: (button) => h("div", { class: "row folder-row", role: "treeitem" }, button),
+      changed: () => this.showFiltered(),
+    });
     main.append(h("div", { class: "bar" }, this.filter, this.count), this.list, this.empty);
     this.ending = link.watch(["channels", "state"], () => this.update());
     this.timer = setInterval(() => this.refresh(), REFRESH_MS);
@@ -61,16 +68,10 @@ export class Topics {
         this.rows.delete(topic);
       }
     }
-    let before = null;
     for (const [topic, channel] of channels) {
-      let row = this.rows.get(topic);
-      if (!row) {
-        row = new Row(this.link, channel, this.opened.has(topic), (isOpen) => this.toggled(topic, isOpen));
-        this.rows.set(topic, row);
-      }
-      const next = before ? before.nextSibling : this.list.firstChild;
-      if (row.element !== next) this.list.insertBefore(row.element, next);
-      before = row.element;
+      if (this.rows.has(topic)) continue;
+      const row = new Row(this.link, channel, this.opened.has(topic), (isOpen) => this.toggled(topic, isOpen));
+      this.rows.set(topic, row);
     }
     this.showFiltered();
     this.showLinked();
@@ -98,7 +99,10 @@ export class Topics {
   accept(words) {
     for (const topic of words.getAll("open")) {
       const row = this.rows.get(topic);
-      if (row && !row.isOpen) row.toggle();
+      if (row && !row.isOpen) {
+        row.toggle();
+        this.showFiltered();
+      }
       row?.element.scrollIntoView({ block: "nearest" });
     }
     return true;
@@ -106,12 +110,17 @@ export class Topics {
 
   showFiltered() {
     const words = this.filter.value.toLowerCase().split(/\s+/);
-    let count = 0;
-    for (const row of this.rows.values()) {
-      const text = `${row.channel.topic} ${row.channel.type}`.toLowerCase();
-      row.element.hidden = !words.every((word) => text.includes(word));
-      if (!row.element.hidden) count += 1;
-    }
+    const found = [...this.rows.values()]
+      .filter(({ channel }) => {
+        const text = `${channel.topic} ${channel.type}`.toLowerCase();
+        return words.every((word) => text.includes(word));
+      })
+      .map(({ channel }) => channel.topic)
+      .sort(byName);
+    const shown = new Set(found);
+    const folded = this.folders.arrange(found, { needed: this.opened, isFiltered: Boolean(this.filter.value) });
+    for (const [topic, row] of this.rows) row.setShown(shown.has(topic) && !folded.has(topic), folded.has(topic));
+    const count = found.length;
     setText(this.count, t("{count} of {all} topics", { count, all: this.rows.size }));
     setText(
       this.empty,
@@ -130,6 +139,8 @@ export class Topics {
   }
 }
 
+const byName = (one, other) => (one < other ? -1 : 1);
+
 class Row {
   constructor(link, channel, isOpen, toggled) {
     this.link = link;
@@ -145,7 +156,7 @@ class Row {
     this.button = h(
       "button",
       { type: "button", class: "topic", "aria-expanded": "false", onclick: () => this.toggle() },
-      h("span", { class: "name" }, channel.topic),
+      (this.name = h("span", { class: "name" }, channel.topic)),
       h("span", { class: "type" }, channel.type),
       this.hz,
       this.bandwidth,
@@ -156,8 +167,24 @@ class Row {
     this.tree = null;
     this.toggled = () => {};
     if (isOpen) this.toggle();
-    else if (!HEAVY.has(channel.type)) this.subscribe();
     this.toggled = toggled;
+  }
+
+  /** Show the part of the name that is not in the folders around the row. */
+  place(label, depth) {
+    setText(this.name, label);
+    this.name.title = this.channel.topic;
+    this.element.style.setProperty("--depth", String(depth));
+  }
+
+  /** Show or hide the row. A topic in a folder that is folded is not subscribed to. */
+  setShown(isShown, isFolded) {
+    this.element.hidden = !isShown;
+    if (isShown && !this.end && !HEAVY.has(this.channel.type)) this.subscribe();
+    else if (isFolded && !this.isOpen && this.end) {
+      this.close();
+      this.rate = new Rate();
+    }
   }
 
   subscribe() {

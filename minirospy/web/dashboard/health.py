@@ -1,0 +1,105 @@
+"""What the first view shows besides the graph: the findings of `minirospy doctor`, running boards, and the last log lines.
+
+The doctor runs as a child process, so that its checks, which block, do not delay the page's data.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from minirospy.base.environment import run_folder
+from minirospy.base.errors import BoardError, MinirospyError
+from minirospy.board.directory import BoardDirectory
+from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, end_processes, start_process
+
+__all__ = ["Examiner", "last_log_lines", "running_boards"]
+
+_KEPT_SECONDS = (
+    5.0  # findings younger than this are returned again, so that several pages cost one examination
+)
+_TIMEOUTS = Timeouts(interrupt=3.0, terminate=1.0)  # SIGINT lets the doctor unregister its node
+_TAIL_BYTES = 64 * 1024  # of rosout.log: some 500 lines
+
+
+class Examiner:
+    """Runs `minirospy doctor` for the pages, one examination at a time. May be used from any thread."""
+
+    def __init__(self, master_uri: str) -> None:
+        self._master_uri = master_uri
+        self._running = threading.Lock()
+        self._process: Process | None = None
+        self._is_closed = False
+        self._found: list[Mapping[str, str]] = []
+        self._finished = -_KEPT_SECONDS
+
+    def findings(self) -> list[Mapping[str, str]]:
+        """Return the findings: check, status, text and advice. Raise MinirospyError if the doctor fails."""
+        with self._running:
+            if time.monotonic() - self._finished >= _KEPT_SECONDS:
+                self._found = self._examine()
+                self._finished = time.monotonic()
+            return self._found
+
+    def close(self) -> None:
+        """End a running examination. Idempotent; blocks for seconds at most."""
+        self._is_closed = True
+        process = self._process
+        if process:
+            end_processes([process], _TIMEOUTS, lambda _: None)
+
+    def _examine(self) -> list[Mapping[str, str]]:
+        # Run in an empty folder, because `python -m` imports from the working folder first.
+        with tempfile.TemporaryDirectory(prefix="minirospy-doctor-", ignore_cleanup_errors=True) as folder:
+            process = start_process(
+                "minirospy doctor",
+                [sys.executable, "-m", "minirospy", "doctor", "--json"],
+                environ={**os.environ, "ROS_MASTER_URI": self._master_uri},
+                folder=Path(folder),
+                stdout=subprocess.PIPE,
+            )
+            self._process = process
+            try:
+                if self._is_closed:
+                    end_processes([process], _TIMEOUTS, lambda _: None)
+                output, _ = process.popen.communicate()
+            finally:
+                self._process = None
+        status = process.popen.returncode
+        if status not in (0, 1):
+            raise MinirospyError(f"minirospy doctor ended with status {status}")
+        return [json.loads(line) for line in output.decode("utf-8", "replace").splitlines()]
+
+
+def running_boards() -> list[str]:
+    """Return the names of this machine's boards that a program uses now."""
+    try:
+        own = BoardDirectory.find()
+        found = [BoardDirectory(name, own.folder) for name in own.names()]
+        return [each.name for each in found if each.socket_path.exists() or each.address_path.exists()]
+    except (BoardError, OSError):
+        return []
+
+
+def last_log_lines(log_dir: Path, run_id: object) -> str:
+    """Return the end of a run's rosout.log, from the start of a line; "" if this machine has no such file."""
+    folder = run_folder(log_dir, run_id)
+    if folder is None:
+        return ""
+    try:
+        with (folder / "rosout.log").open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(0, size - _TAIL_BYTES))
+            data = file.read(_TAIL_BYTES)
+    except OSError:
+        return ""
+    if size > _TAIL_BYTES:
+        data = data.partition(b"\n")[2]
+    return data.decode("utf-8", "replace")
