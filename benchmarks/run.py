@@ -25,8 +25,10 @@ BIN = Path(sys.executable).parent
 STACKS = {
     "minirospy": (sys.executable, [str(BIN / "roscore"), "-q", "-p"]),
     "minirospy by TCP": (sys.executable, [str(BIN / "roscore"), "-q", "-p"]),
+    "minirospy by socket": (sys.executable, [str(BIN / "roscore"), "-q", "-p"]),
     "rospy": ("/usr/bin/python3", ["/usr/bin/rosmaster", "--core", "-p"]),
 }
+TRANSPORTS = {"minirospy by TCP": "tcp", "minirospy by socket": "unix"}
 IMAGE_MB = {"vga": 0.9216, "6mb": 6.2208}
 
 Figures = dict[str, float]
@@ -44,7 +46,7 @@ class Peers:
             **os.environ,
             "ROS_HOSTNAME": "localhost",
             "ROS_MASTER_URI": f"http://localhost:{port}",
-            "MINIROSPY_TRANSPORT": "tcp" if stack.endswith("TCP") else "auto",
+            "MINIROSPY_TRANSPORT": TRANSPORTS.get(stack, "auto"),
         }
         quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         self._running = [subprocess.Popen([*master, str(port)], env=self._environment, **quiet)]
@@ -148,11 +150,13 @@ def stream(kind: str, *, hz: float = 0.0, listeners: int = 1) -> Callable[[str],
             published = mouth.said()["published"]
             heard = [ear.said() for ear in ears]
             delivered = sum(ear["delivered"] for ear in heard)
-            cpu = 1e6 * cost([*ears, mouth]) / max(1, delivered)
+            of_publisher = cost([mouth])
+            cpu = 1e6 * (cost(ears) + of_publisher) / max(1, delivered)
 
         if hz:
             late = sorted(us for ear in heard for us in ear["late_us"])
             return {
+                f"{name} at {hz:g} Hz, publisher's CPU us": 1e6 * of_publisher / published,
                 f"{name} at {hz:g} Hz, median us": late[len(late) // 2],
                 f"{name} at {hz:g} Hz, p99 us": late[int(0.99 * (len(late) - 1))],
                 f"{name} at {hz:g} Hz, CPU us": cpu,
@@ -197,6 +201,7 @@ CASES: dict[str, Callable[[str], Figures]] = {
     "6mb": stream("6mb"),
     "vga_30hz": stream("vga", hz=30),
     "6mb_30hz": stream("6mb", hz=30),
+    "6mb_fanout_30hz": stream("6mb", hz=30, listeners=5),
     "fanout": stream("small", listeners=10),
     "fanout_100hz": stream("small", hz=100, listeners=10),
     "calls": measure_calls,
@@ -264,10 +269,11 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--cases", help=f"some of {','.join(CASES)}")
     parser.add_argument("--tcp", action="store_true", help="minirospy once more, by TCP alone")
+    parser.add_argument("--socket", action="store_true", help="minirospy once more, without shared memory")
     parser.add_argument("--json", type=Path, help="write the figures of every round there")
     parser.add_argument("--plot", type=Path, help="draw the ratios there, as SVG")
     options = parser.parse_args()
-    stacks = ["minirospy by TCP", "minirospy"] if options.tcp else ["minirospy"]
+    stacks = ["minirospy by TCP"] * options.tcp + ["minirospy by socket"] * options.socket + ["minirospy"]
     if Path("/usr/bin/rosmaster").exists():
         stacks.insert(0, "rospy")
     wanted = options.cases.split(",") if options.cases else list(CASES)

@@ -57,8 +57,8 @@ class Environment(NamedTuple):
     ``host`` is the name advertised to peers; ``bind_host`` is the address that servers listen on (loopback if ``host``
     is loopback, else every interface; IPv6 addresses if ``ipv6`` is set). ``ports`` are the ports that a node's servers
     may use (None: any), such as those that a firewall or a container allows; ``allow`` lists the networks that may
-    connect ("": all). If ``transport`` is "tcp", Unix sockets are disabled. ``local`` restricts the process to this
-    machine, see :meth:`on_this_machine`.
+    connect ("": all). If ``transport`` is "tcp", Unix sockets are disabled; if it is "unix", shared
+    memory is. ``local`` restricts the process to this machine, see :meth:`on_this_machine`.
     """
 
     master_uri: str
@@ -118,6 +118,11 @@ class Environment(NamedTuple):
     def same_host(self) -> bool:
         """Return whether Unix sockets may be used for connections to processes on this machine."""
         return self.transport != "tcp"
+
+    @property
+    def shares_memory(self) -> bool:
+        """Return whether large messages to processes on this machine may go through shared memory."""
+        return self.transport not in ("tcp", "unix")
 
     @property
     def uri_host(self) -> str:
@@ -265,8 +270,8 @@ def _checked_host(host: str, variable: str) -> str:
 
 
 def _checked_transport(name: str) -> str:
-    if name.lower() not in ("", "auto", "tcp"):
-        raise UsageError(f"MINIROSPY_TRANSPORT [{name}] is neither 'tcp' nor 'auto'")
+    if name.lower() not in ("", "auto", "tcp", "unix"):
+        raise UsageError(f"MINIROSPY_TRANSPORT [{name}] is neither 'tcp', 'unix' nor 'auto'")
     return name.lower()
 
 

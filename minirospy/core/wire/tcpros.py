@@ -45,13 +45,21 @@ class InterfaceType(NamedTuple):
 
 
 def subscriber_header(
-    topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False, split_frames: bool = False
+    topic: str,
+    type_: InterfaceType,
+    caller_id: str,
+    *,
+    tcp_nodelay: bool = False,
+    split_frames: bool = False,
+    shared_memory: bool = False,
 ) -> Header:
     """Return the header that a subscriber sends first.
 
-    ``split_frames``: the subscriber supports split frames (``core/wire/framing``).
+    ``split_frames``: the subscriber supports split frames (``core/wire/framing``). ``shared_memory``: it can read from a ring
+    (``core/wire/ring``).
     """
     return {
+        **({"shared_memory": "1"} if shared_memory else {}),
         **({"split_frames": "1"} if split_frames else {}),
         "callerid": caller_id,
         "md5sum": type_.md5sum,

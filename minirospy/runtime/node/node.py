@@ -101,6 +101,7 @@ class Node:
         self.unix_listener = tcp.Listener(self._accept)
         # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
+        self._shares_memory = environment.shares_memory
         # Name of the Unix socket that serves topics to processes on this machine, or "" if there is none.
         self.unix_name = ""
 
@@ -230,6 +231,7 @@ class Node:
             on_loop=on_loop,
             header_memory=self._header_memory,
             this_host=self.this_host,
+            shares_memory=self._shares_memory,
             unreachable=self._unreachable,
         )
 
@@ -327,7 +329,7 @@ class Node:
         elif "topic" in fields:
             publication = self.publications.get(fields["topic"])
             if publication:
-                why = publication.accept(sock, fields, self.name, address)
+                why = publication.accept(sock, fields, self.name, address, shares_memory=self._shares_memory)
             else:
                 topics = [[each.topic, each.type.name] for each in self.publications.values()]
                 why = f"[{self.name}] is not a publisher of [{fields['topic']}]. Topics are {topics}"

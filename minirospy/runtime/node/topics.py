@@ -29,6 +29,7 @@ from minirospy.base.errors import (
 )
 from minirospy.base.steps import Steps
 from minirospy.core.graph.subscription import MAX_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
+from minirospy.core.wire import ring
 from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame
 from minirospy.core.wire.header import Header, serialize_header
 from minirospy.core.wire.tcpros import (
@@ -39,7 +40,7 @@ from minirospy.core.wire.tcpros import (
     subscriber_header,
 )
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
-from minirospy.runtime.transport import local, sockets, tcp
+from minirospy.runtime.transport import local, shared_memory, sockets, tcp
 from minirospy.runtime.transport.limits import explain, is_file_limit
 from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
@@ -114,11 +115,22 @@ class Publication:
         self._on_link = on_link
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
+        # the shared memory for large messages, from the first subscriber that can read it
+        self._ring: shared_memory.SharedRing | None = None
 
     @property
     def is_sending(self) -> bool:
         """Return whether a thread is publishing, and therefore holds a lock."""
-        return self._latch_lock.locked() or any(link.is_sending for link in self.links)
+        return (
+            self._latch_lock.locked()
+            or any(link.is_sending for link in self.links)
+            or (self._ring is not None and self._ring.lock.locked())
+        )
+
+    @property
+    def shared_bytes(self) -> int:
+        """Return the number of bytes of shared memory that this topic uses."""
+        return self._ring.memory_bytes if self._ring else 0
 
     def publish(self, frame: bytes | LargeFrame) -> None:
         """Send one frame to every subscriber."""
@@ -130,17 +142,23 @@ class Publication:
         else:
             links = self.links
         if links:
-            self.sent_bytes += len(frame) if isinstance(frame, bytes) else 4 + frame.size
-        for link in links:
-            link.send(frame)
+            if isinstance(frame, bytes):
+                self.sent_bytes += len(frame)
+                for link in links:
+                    link.send(frame)
+            else:
+                self.sent_bytes += 4 + frame.size
+                self._send_large(frame, links)
         if self.queue_size is None:
             for link in links:
                 link.wait()
 
-    def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
+    def accept(
+        self, sock: socket.socket, fields: Header, caller_id: str, peer: str, *, shares_memory: bool = False
+    ) -> str | None:
         """Reply as node ``caller_id`` to a subscriber's header and start sending to it. If refused, return the reason.
 
-        Call this on the loop.
+        ``shares_memory``: large messages may go through shared memory if the subscriber can read it. Call this on the loop.
         """
         why = check_subscriber(fields, self.topic, self.type)
         if why:
@@ -149,14 +167,21 @@ class Publication:
         sockets.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
         sockets.enlarge_send_buffer(sock)
         answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
+        loop = asyncio.get_running_loop()
+        if shares_memory and fields.get("shared_memory") == "1" and shared_memory.may_share(sock):
+            self._ring = self._ring or shared_memory.SharedRing(loop)
+            sender = self._ring.add(sock)
+        else:
+            sender = None
         link = OutLink(
             sock,
-            asyncio.get_running_loop(),
+            loop,
             fields.get("callerid", peer),
             self.queue_size or 0,
             self._link_closed,
             header=serialize_header(answer),
             split=fields.get("split_frames") == "1",
+            ring=sender,
         )
 
         for other in self.links:
@@ -187,7 +212,16 @@ class Publication:
 
     def close(self) -> None:
         """Close all links. Call this on the loop."""
-        close_each([link.close for link in self.links])
+        close_each([*(link.close for link in self.links), *([self._ring.close] if self._ring else [])])
+
+    def _send_large(self, frame: LargeFrame, links: tuple[OutLink, ...]) -> None:
+        if self._ring is None or not ring.MIN_MESSAGE <= frame.size <= ring.MAX_MESSAGE:
+            for link in links:
+                link.send(frame)
+            return
+        with self._ring.share(frame) as sharing:
+            for link in links:
+                link.send(frame, sharing)
 
     def _link_closed(self, link: OutLink) -> None:
         self.links = tuple(other for other in self.links if other is not link)
@@ -207,6 +241,7 @@ class InLink:
     received_bytes: int = 0
     closed: bool = field(default=False)
     latched: Frame | None = None  # the last message from a latching publisher
+    shares_memory: bool = False  # whether the publisher was told that this side can map its memory
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
     # True if the master's list dropped the publisher and listed it again while the link was open
@@ -301,16 +336,19 @@ class Subscription:
         on_loop: bool = False,
         header_memory: tcp.HeaderMemory | None = None,
         this_host: str = "",
+        shares_memory: bool = False,
         unreachable: Unreachable | None = None,
     ) -> None:
         """Create the subscription. ``this_host`` is the value of :func:`local.this_host`, or "" to avoid Unix sockets.
 
-        All subscriptions of the node share ``unreachable``, because several subscriptions may lose the same publisher.
+        ``shares_memory``: large messages from a process of this user may come through shared memory. All subscriptions of
+        the node share ``unreachable``, because several subscriptions may lose the same publisher.
         """
         self.topic = topic
         self.type = type_
         self.newest = newest
         self._this_host = this_host
+        self._shares_memory = shares_memory
         self.tcp_nodelay = tcp_nodelay
         self._links: dict[str, InLink] = {}
         self._caller_id = caller_id
@@ -509,6 +547,7 @@ class Subscription:
 
         try:
             sockets.tune(sock, nodelay=self.tcp_nodelay)
+            shares_memory = self._shares_memory and not self._on_loop and shared_memory.may_share(sock)
             fields = subscriber_header(
                 self.topic,
                 self.type,
@@ -516,6 +555,7 @@ class Subscription:
                 tcp_nodelay=self.tcp_nodelay,
                 # Send only ROS 1's header fields to peers on other hosts.
                 split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
+                shared_memory=shares_memory,
             )
             await tcp.send_header(sock, fields)
             header = await tcp.receive_header(sock, memory=self._header_memory)
@@ -524,7 +564,8 @@ class Subscription:
             sock.close()
             raise
         # Like rospy, count the sent header as well.
-        link = InLink(uri, address, sock, header, received_bytes=len(serialize_header(fields)))
+        received_bytes = len(serialize_header(fields))
+        link = InLink(uri, address, sock, header, received_bytes=received_bytes, shares_memory=shares_memory)
         # Third-party nodes omit the topic, but user code reads it.
         header.setdefault("topic", self.topic)
         return link
@@ -561,6 +602,7 @@ class Subscription:
                 on_latched_frame if header.get("latching") == "1" else on_frame,
                 self,
                 self._readers,
+                shares_memory=link.shares_memory,
             )
         except (OSError, WireError) as error:
             link.fault = error

@@ -13,9 +13,13 @@ import time
 from collections import deque
 from collections.abc import Callable
 from itertools import islice
+from typing import TYPE_CHECKING
 
 from minirospy.core.wire.framing import LargeFrame
 from minirospy.runtime.transport.sockets import FAMILIES, is_writable
+
+if TYPE_CHECKING:
+    from minirospy.runtime.transport.shared_memory import RingSender, Sharing
 
 __all__ = ["OutLink"]
 
@@ -35,7 +39,7 @@ class OutLink:
     loop sends; if more than ``queue_size`` frames are queued, the oldest is dropped (0: no limit). Before dropping, the thread
     waits a few milliseconds for space, but only if the peer is on this machine and has read since the last wait.
     ``header`` is sent first, when the link is opened; frames that are published before that are queued after it.
-    With ``split`` large messages are sent as split frames if possible.
+    With ``split`` large messages are sent as split frames if possible. With ``ring`` they go through shared memory if possible.
     """
 
     def __init__(
@@ -48,6 +52,7 @@ class OutLink:
         *,
         header: bytes = b"",
         split: bool = False,
+        ring: RingSender | None = None,
     ) -> None:
         self.peer = peer
         self.address = "unknown"
@@ -57,6 +62,7 @@ class OutLink:
         self.sent_bytes = len(header)
         self.sent = 0
         self.dropped = 0
+        self.ring = ring  # this end of the shared memory, or None if the subscriber cannot read any
 
         self._is_same_host = sock.family not in FAMILIES
         if self._is_same_host:
@@ -111,14 +117,14 @@ class OutLink:
             self._help()
         self._start_writing()
 
-    def send(self, frame: bytes | LargeFrame) -> None:
-        """Send ``frame`` immediately, or queue it after the pending ones."""
+    def send(self, frame: bytes | LargeFrame, sharing: Sharing | None = None) -> None:
+        """Send ``frame`` immediately, or queue it after the pending ones. ``sharing`` can write it into shared memory."""
         with self._drained:
             if self._closed:
                 return
             self.sent += 1
             if isinstance(frame, LargeFrame):
-                self._send_large(frame)
+                self._send_large(frame, sharing)
                 return
             self.sent_bytes += len(frame)
             if self._outbox and self._has_to_wait(frame):
@@ -156,6 +162,8 @@ class OutLink:
             self._closed = True
             self._outbox.clear()
             self._drained.notify_all()
+            if self.ring:
+                self.ring.close()
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         self._sock.close()
@@ -193,11 +201,19 @@ class OutLink:
         if not self._outbox:
             self._drained.notify_all()
 
-    def _send_large(self, frame: LargeFrame) -> None:
+    def _send_large(self, frame: LargeFrame, sharing: Sharing | None) -> None:
         buffers: list[bytes | memoryview] = [*frame.buffers(split=self._split)]
         self.sent_bytes += 4 + frame.size
         if self._outbox and self._has_to_wait(buffers):
             return
+        if sharing and self.ring:
+            # Announce it only if the outbox is empty: announcements and frames arrive in the order of the messages.
+            try:
+                if self.ring.announce(sharing, may_wait=self._may_stay()):
+                    return
+            except OSError:
+                self._post(self.close)
+                return
 
         size = sum(map(len, buffers))
         left = size
@@ -299,9 +315,11 @@ class OutLink:
             outbox.popleft()
 
     def _readable(self) -> None:
-        """Close the link. A subscriber never sends data, so a readable socket means end of file."""
+        """Close the link at the end of file. A subscriber sends no data but its answers about shared memory."""
         try:
-            if self._sock.recv(4096):
+            if data := self._sock.recv(4096):
+                if self.ring:
+                    self.ring.answered(data)
                 return
         except (BlockingIOError, InterruptedError):
             return

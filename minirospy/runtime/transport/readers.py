@@ -17,6 +17,7 @@ from typing import Protocol
 
 from minirospy.base.errors import WireError
 from minirospy.base.steps import Steps
+from minirospy.core.wire import ring
 from minirospy.core.wire.framing import (
     CHUNK,
     LENGTH_BYTES,
@@ -29,6 +30,7 @@ from minirospy.core.wire.framing import (
     parse_length,
     split_sizes,
 )
+from minirospy.runtime.transport.shared_memory import RingReceiver
 from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive, is_readable, may_busy_poll
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
@@ -60,14 +62,20 @@ class ReaderSet:
 
 
 def read_frames(
-    sock: socket.socket, deliver: Callable[[Frame], None], size: QueueSize, readers: ReaderSet
+    sock: socket.socket,
+    deliver: Callable[[Frame], None],
+    size: QueueSize,
+    readers: ReaderSet,
+    *,
+    shares_memory: bool = False,
 ) -> None:
     """Read frames in the calling thread until the peer closes, then close the socket.
 
     If several frames are ready when the thread reads, only the newest ``size.newest`` of them are delivered (0: all), so
-    that a slow receiver gets recent data. Raise OSError if the connection fails, WireError if the data is invalid.
+    that a slow receiver gets recent data. ``shares_memory``: the publisher was told that this side can map its memory.
+    Raise OSError if the connection fails, WireError if the data is invalid.
     """
-    source = _FrameSource(sock, readers)
+    source = _FrameSource(sock, readers, shares_memory=shares_memory)
     try:
         sock.setblocking(True)
         with contextlib.suppress(_Ended):
@@ -81,7 +89,7 @@ def read_frames(
     finally:
         if readers.last is source:
             readers.last = None
-        sock.close()
+        source.close()
 
 
 def watch_frames(
@@ -166,7 +174,7 @@ def watch_frames_in_turns(
 class _FrameSource:
     """Reads frames from a blocking socket: small ones together into one buffer, each large one into separate memory."""
 
-    def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
+    def __init__(self, sock: socket.socket, readers: ReaderSet, *, shares_memory: bool = False) -> None:
         self.sock = sock
         self._readers = readers
         self._reader = FrameReader(gathers=False)
@@ -174,6 +182,13 @@ class _FrameSource:
         self._was_large = False
         self._may_busy_poll = may_busy_poll(sock)
         self._is_fast = False
+        self._ring = RingReceiver() if shares_memory else None
+
+    def close(self) -> None:
+        """Close the socket and the shared memory."""
+        self.sock.close()
+        if self._ring:
+            self._ring.close()
 
     def read(self) -> Iterable[Frame]:
         """Wait for the next frames. Small frames are valid only until the next call; large frames stay valid.
@@ -186,7 +201,7 @@ class _FrameSource:
             word = self._take(LENGTH_BYTES)
             length = parse_length(word)
             if length > CHUNK:
-                return (self._large(length),)
+                return self._follow(length)
             self._was_large = False
             reader.put_back(word)
         count = self._receive(reader.space())
@@ -196,6 +211,10 @@ class _FrameSource:
 
     def _receive(self, space: memoryview) -> int:
         """Wait for bytes; busy-poll if the previous ones arrived faster than a thread wakes up."""
+        if self._ring and self._ring.expects_files:
+            data = self._ring.receive(self.sock, len(space))
+            space[: len(data)] = data
+            return len(data)
         start = time.perf_counter()
         count = None
         if self._is_fast and self._readers.last is self:
@@ -212,10 +231,35 @@ class _FrameSource:
     def _small(self, count: int) -> Iterator[Frame]:
         reader = self._reader
         yield from reader.received(count)
-        if reader.unfinished:
+        while reader.unfinished:
             (length, self._rest), reader.unfinished = reader.unfinished, None
             self._was_large = True
-            yield self._large(length)
+            yield from self._follow(length)
+            if not self._rest:
+                return
+            # Words about shared memory are short, so other frames may have arrived with them.
+            rest, self._rest = self._rest, b""
+            self._was_large = False
+            reader.put_back(rest)
+            yield from reader.received(0)
+
+    def _follow(self, word: int) -> tuple[Frame, ...]:
+        """Return the frame that follows a length over ``CHUNK``, or the result of a word about shared memory."""
+        if not self._ring or word < ring.PREPARE_WORD:
+            return (self._large(word),)
+        if word == ring.PLACE_WORD:
+            where = self._take(ring.ANNOUNCEMENT_BYTES)
+            try:
+                return (self._ring.read(where),)
+            except MemoryError:
+                raise WireError("no memory for a message in shared memory") from None
+        if word == ring.PREPARE_WORD:
+            self._ring.prepare(self.sock)
+        elif word == ring.OFFER_WORD:
+            self._ring.take_offer(self.sock, self._take(ring.OFFER_BYTES))
+        else:
+            raise WireError(f"a message of {word} bytes is over the limit of {MAX_FRAME}")
+        return ()
 
     def _large(self, word: int) -> Frame:
         size = word & ~SPLIT
@@ -235,7 +279,7 @@ class _FrameSource:
     def _take(self, count: int) -> bytes:
         """Return exactly ``count`` bytes. Raise _Ended if the peer closes, OSError if the connection fails."""
         if not self._rest:
-            data = self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
+            data = self._receive_bytes(count)
             if len(data) == count:
                 return data
             if not data:
@@ -248,12 +292,17 @@ class _FrameSource:
         parts = [data]
         missing = count - len(data)
         while missing:
-            data = self.sock.recv(min(missing, _CLAIM), _WAIT_ALL)
+            data = self._receive_bytes(missing)
             if not data:
                 raise _Ended
             parts.append(data)
             missing -= len(data)
         return b"".join(parts)
+
+    def _receive_bytes(self, count: int) -> bytes:
+        if self._ring and self._ring.expects_files:
+            return self._ring.receive(self.sock, min(count, _CLAIM), _WAIT_ALL)
+        return self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
 
 
 def _deliver_newest(

@@ -41,9 +41,9 @@ STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "s
 FOREIGN = {"md5sum": ANY, "type": STRING.name, "callerid": "/foreign"}
 
 
-@pytest.fixture(params=["auto", "tcp"])
+@pytest.fixture(params=["auto", "unix", "tcp"])
 def transport(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let nodes on this machine use any transport, or only TCP."""
+    """Let nodes on this machine use any transport, no shared memory, or only TCP."""
     monkeypatch.setenv("MINIROSPY_TRANSPORT", request.param)
 
 

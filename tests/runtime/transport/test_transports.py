@@ -442,7 +442,7 @@ def test_a_node_on_tcp_looks_for_no_unix_socket() -> None:
     run(scene)
 
 
-@pytest.mark.parametrize("transport", ["auto", "tcp"])
+@pytest.mark.parametrize("transport", ["auto", "unix", "tcp"])
 def test_image_arrives_by_unix_socket_without_a_copy(transport: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MINIROSPY_TRANSPORT", transport)
     from sensor_msgs.msg import Image
@@ -462,7 +462,7 @@ def test_image_arrives_by_unix_socket_without_a_copy(transport: str, monkeypatch
 
     run(scene)
     ((frame, image),) = got
-    if transport == "auto":
+    if transport != "tcp":
         assert isinstance(frame, SplitFrame)
         assert image.data is frame.tail
     assert image == sent
@@ -481,7 +481,7 @@ rospy.spin()
 """
 
 
-@pytest.mark.parametrize("transport", ["auto", "tcp"])
+@pytest.mark.parametrize("transport", ["auto", "unix", "tcp"])
 def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
     transport: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -541,7 +541,7 @@ def start_listener(master_port: int) -> subprocess.Popen[str]:
 
 def test_the_environment_names_a_transport_that_there_is() -> None:
     assert Environment.read({"MINIROSPY_TRANSPORT": "TCP"}).transport == "tcp"
-    with pytest.raises(UsageError, match=r"MINIROSPY_TRANSPORT \[shm\] is neither 'tcp' nor 'auto'"):
+    with pytest.raises(UsageError, match=r"MINIROSPY_TRANSPORT \[shm\] is neither 'tcp', 'unix' nor 'auto'"):
         Environment.read({"MINIROSPY_TRANSPORT": "shm"})
 
 

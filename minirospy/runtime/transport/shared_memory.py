@@ -1,0 +1,523 @@
+"""The memory of a topic's ring, and both ends of a connection that uses it: Linux only, between processes of one user.
+
+:class:`SharedRing` is the publisher's, one per topic; :class:`RingSender` its end of one connection; :class:`RingReceiver` the
+subscriber's end. The decisions are in :mod:`minirospy.core.wire.ring`. The ring is an anonymous file without a name, so nothing
+is left behind when a process is killed. Source: docs/shared_memory.md.
+"""
+
+from __future__ import annotations
+
+import array
+import asyncio
+import contextlib
+import logging
+import mmap
+import os
+import select
+import socket
+import sys
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from minirospy.base.errors import WireError
+from minirospy.core.wire import ring
+from minirospy.core.wire.framing import SplitFrame, may_split
+from minirospy.core.wire.ring import Announcement, Layout, Places, Step
+from minirospy.runtime.transport.sockets import peer
+
+if TYPE_CHECKING:
+    from minirospy.core.wire.framing import LargeFrame
+
+__all__ = ["FIELD", "RingReceiver", "RingSender", "SharedRing", "Sharing", "is_possible", "may_share"]
+
+FIELD = "shared_memory"
+"""The connection header's field by which a subscriber says that it can read from a ring."""
+
+QUIET_SECONDS = 5.0  # seconds without a large message after which a ring's memory is given back
+
+# Seconds for which a publishing thread waits for a subscriber to release a place: as long as it pushes to a full socket
+_WAIT_SECONDS = 0.005
+_WAIT_MS = 1  # milliseconds per wait during that time
+_FILES = 2  # file descriptors that come with an offer: the ring, the counter of released places
+
+_log = logging.getLogger(__name__)
+
+
+def is_possible() -> bool:
+    """Return whether this system has what a ring needs."""
+    return sys.platform == "linux" and hasattr(os, "memfd_create") and hasattr(os, "eventfd")
+
+
+def may_share(sock: socket.socket) -> bool:
+    """Return whether the process at the other end of ``sock`` is on this machine and belongs to this process's user.
+
+    Another user could shrink a ring that this process reads, or read the memory of a topic longer than it is connected.
+    """
+    return is_possible() and sock.family == socket.AF_UNIX and peer(sock).user == os.geteuid()
+
+
+class _Memory:
+    """One ring's memory at the publisher. Use everything but :meth:`fill` with the lock of the :class:`SharedRing` held."""
+
+    def __init__(self, layout: Layout) -> None:
+        """Create the file and map it. It has no memory yet. Raise OSError if that is not possible."""
+        self.layout = layout
+        self.places = Places(layout.places)
+        self._backed = [0] * layout.places  # bytes at the start of each place that have memory
+        self.file = os.memfd_create("minirospy-ring", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        self.read_only = -1
+        try:
+            os.ftruncate(self.file, layout.size)
+            _seal(self.file)
+            # Subscribers receive a descriptor with which the ring cannot be written.
+            self.read_only = os.open(f"/proc/self/fd/{self.file}", os.O_RDONLY | os.O_CLOEXEC)
+            self._map = mmap.mmap(self.file, layout.size)
+        except BaseException:
+            self.close()
+            raise
+
+    def take(self, size: int) -> int | None:
+        """Return a free place with memory for ``size`` bytes, or None. Raise OSError if the machine has no memory."""
+        place = self.places.take()
+        if place is not None and self._backed[place] < size:
+            try:
+                # Without this, a write beyond the machine's memory would end the process with SIGBUS.
+                os.posix_fallocate(self.file, place * self.layout.place_size, size)
+            except BaseException:
+                self.places.let_go(place)
+                raise
+            self._backed[place] = size
+        return place
+
+    def fill(self, place: int, frame: LargeFrame) -> None:
+        """Write a message into a place that the calling thread has taken."""
+        start = place * self.layout.place_size
+        for piece in frame.pieces:
+            end = start + len(piece)
+            self._map[start:end] = piece
+            start = end
+
+    def give_back(self) -> None:
+        """Return the memory of free places to the system. They receive new memory when they are used again."""
+        for place in self.places.free:
+            if self._backed[place]:
+                self._map.madvise(mmap.MADV_REMOVE, place * self.layout.place_size, self.layout.place_size)
+                self._backed[place] = 0
+
+    @property
+    def backed_bytes(self) -> int:
+        """Return the number of bytes that have memory."""
+        return sum(self._backed)
+
+    def close(self) -> None:
+        """Close the files. The memory stays mapped while a thread fills a place or a subscriber reads one."""
+        for file in (self.file, self.read_only):
+            if file >= 0:
+                os.close(file)
+        self.file = self.read_only = -1
+
+
+class SharedRing:
+    """A topic's ring at the publisher: it is created by the first large message, and replaced if its places are too small.
+
+    A ring is also replaced if a connection closes before it has released its places: its subscriber may still read them, so
+    they must not be written again. ``senders`` are the connections that may use it. Thread-safe.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self.lock = threading.Lock()
+        self.memory: _Memory | None = None
+        self._loop = loop
+        self._senders: set[RingSender] = set()
+        self._is_off = False
+        self._was_used = False
+        self._timer: asyncio.TimerHandle | None = None
+        self._is_watched = False  # whether the timer runs, or is about to
+
+    @property
+    def memory_bytes(self) -> int:
+        """Return the number of bytes that this process has allocated for the ring."""
+        with self.lock:
+            return self.memory.backed_bytes if self.memory else 0
+
+    def share(self, frame: LargeFrame) -> Sharing:
+        """Return the object that writes ``frame`` into the ring when the first connection needs it."""
+        with self.lock:
+            self.collect()
+        return Sharing(self, frame)
+
+    def add(self, sock: socket.socket) -> RingSender:
+        """Return the publisher's end of a new connection."""
+        sender = RingSender(self, sock)
+        with self.lock:
+            self._senders.add(sender)
+        return sender
+
+    def remove(self, sender: RingSender) -> None:
+        """Forget a closed connection. Call this with the lock held."""
+        self._senders.discard(sender)
+        if not self._senders:
+            self.retire()
+
+    def collect(self) -> None:
+        """Free the places that subscribers have released. Call this with the lock held."""
+        for sender in self._senders:
+            sender.collect()
+
+    def fitting(self, size: int) -> _Memory | None:
+        """Return the memory if a message of ``size`` bytes fits into its places; replace it if not.
+
+        Return None if there is no memory. Call this with the lock held.
+        """
+        if self.memory and size <= self.memory.layout.place_size:
+            return self.memory
+        if self._is_off:
+            return None
+        self.retire()
+        try:
+            self.memory = _Memory(ring.layout_for(size))
+        except (OSError, ValueError) as error:
+            self.turn_off(error)
+        return self.memory
+
+    def turn_off(self, error: Exception) -> None:
+        """Use sockets only from now on. Call this with the lock held."""
+        _log.debug("no shared memory for a topic's large messages: %s", error)
+        self._is_off = True
+        self.retire()
+
+    def retire(self) -> None:
+        """Stop using the current memory. Subscribers that have mapped it keep it. Call this with the lock held."""
+        if self.memory:
+            self.memory.close()
+            self.memory = None
+
+    def close(self) -> None:
+        """Use sockets only from now on, and stop the timer. Call this on the loop. Idempotent."""
+        with self.lock:
+            self._is_off = True
+            self.retire()
+        if self._timer:
+            self._timer.cancel()
+
+    def note_use(self) -> None:
+        """Keep the memory for a while. Call this with the lock held."""
+        self._was_used = True
+        if not self._is_watched:
+            self._is_watched = True
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._watch)
+
+    def _watch(self) -> None:
+        if not self._is_off:
+            self._timer = self._loop.call_later(QUIET_SECONDS, self._look)
+
+    def _look(self) -> None:
+        """Give memory back if no place was used since the last look."""
+        with self.lock:
+            if self._was_used:
+                self._was_used = False
+            elif self.memory:
+                self.collect()
+                try:
+                    self.memory.give_back()
+                except OSError as error:
+                    self.turn_off(error)
+            self._is_watched = bool(self.memory and self.memory.backed_bytes)
+            if self._is_watched:
+                self._watch()
+
+
+class Sharing:
+    """One message on its way to all subscribers: written once, into a place that it holds until :meth:`close`."""
+
+    def __init__(self, shared: SharedRing, frame: LargeFrame) -> None:
+        self.frame = frame
+        self._ring = shared
+        # the place, and its memory: an old one if the ring was replaced in the meantime
+        self._memory: _Memory | None = None
+        self._place = 0
+
+    def place_in(self, memory: _Memory) -> int | None:
+        """Return the message's place in ``memory``; write it first if it is not there. None if no place is free."""
+        if self._memory is memory:
+            return self._place
+        self.close()
+        with self._ring.lock:
+            if self._ring.memory is not memory:
+                return None
+            try:
+                place = memory.take(self.frame.size)
+            except OSError as error:
+                self._ring.turn_off(error)
+                return None
+            if place is None:
+                return None
+            self._memory, self._place = memory, place
+            self._ring.note_use()
+        memory.fill(place, self.frame)
+        return place
+
+    def close(self) -> None:
+        """Stop holding the place; subscribers hold it until they have read it."""
+        memory, self._memory = self._memory, None
+        if memory:
+            with self._ring.lock:
+                memory.places.let_go(self._place)
+
+    def __enter__(self) -> Sharing:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class RingSender:
+    """The publisher's end of one connection. Use it with the link's lock held, except :meth:`answered` and :meth:`collect`."""
+
+    def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
+        self.step = Step.NEW
+        self.announced = 0  # number of messages that went through the ring
+        self._ring = shared
+        self._sock = sock
+        self._memory: _Memory | None = None  # the memory that was offered last
+        self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
+        self._is_releasing = True  # whether the last wait for a release was successful
+
+    def announce(self, sharing: Sharing, *, may_wait: bool) -> bool:
+        """Announce a message in the ring. Return False if it has to go through the socket.
+
+        ``may_wait``: wait some milliseconds for the subscriber to release a place. Raise OSError if the connection has failed.
+        """
+        step = self.step
+        if step is Step.IN_USE:
+            memory = self._memory
+            assert memory is not None
+            if memory is self._ring.memory and sharing.frame.size <= memory.layout.place_size:
+                return self._announce(memory, sharing, may_wait=may_wait)
+            step = self.step = Step.NEW
+        try:
+            # Take the step first: the answer may arrive before this thread continues.
+            if step is Step.NEW:
+                self.step = Step.ASKED
+                self._send(ring.prepare())
+            elif step is Step.LISTENING:
+                self._offer(sharing.frame.size)
+        except (BlockingIOError, InterruptedError):
+            self.step = step
+        return False
+
+    def answered(self, data: bytes) -> None:
+        """Handle what the subscriber has sent. Call this on the loop."""
+        for byte in data:
+            self.step = ring.ANSWERS.get((self.step, bytes((byte,))), self.step)
+
+    def collect(self) -> None:
+        """Free the places that the subscriber has released. Call this with the ring's lock held."""
+        memory = self._memory
+        if memory is None or memory is not self._ring.memory or not memory.places.held_by(self):
+            return
+        try:
+            count = os.eventfd_read(self._counter)
+        except BlockingIOError:
+            return
+        self._is_releasing = True
+        if not memory.places.release(self, count):
+            self.step = Step.OFF
+
+    def close(self) -> None:
+        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced."""
+        with self._ring.lock:
+            self.collect()
+            memory, self._memory = self._memory, None
+            if memory and memory is self._ring.memory and memory.places.held_by(self):
+                self._ring.retire()
+            self._ring.remove(self)
+            self.step = Step.OFF
+            self._close_counter()
+
+    def _announce(self, memory: _Memory, sharing: Sharing, *, may_wait: bool) -> bool:
+        frame = sharing.frame
+        places = memory.places
+        with self._ring.lock:
+            has_room = places.may_hold(self, frame.size)
+        if not has_room and not (may_wait and self._wait_for_room(places, frame.size)):
+            return False
+        place = sharing.place_in(memory)
+        if place is None:
+            return False
+
+        tail = (
+            len(frame.pieces[1])
+            if len(frame.pieces) == 2 and may_split(frame.pieces[0], len(frame.pieces[1]))
+            else 0
+        )
+        with self._ring.lock:
+            places.hold(self, place, frame.size)
+        try:
+            self._send(ring.announcement(place * memory.layout.place_size, frame.size, tail))
+        except (BlockingIOError, InterruptedError):
+            with self._ring.lock:
+                places.take_back(self)
+            return False
+        self.announced += 1
+        return True
+
+    def _wait_for_room(self, places: Places, size: int) -> bool:
+        """Wait briefly for the subscriber to release a place; return whether it may hold one more.
+
+        Return False immediately if it released none during the last wait and none since.
+        """
+        if not self._is_releasing:
+            return False
+        poll = select.poll()
+        poll.register(self._counter, select.POLLIN)
+        end = time.monotonic() + _WAIT_SECONDS
+        while True:
+            is_released = poll.poll(_WAIT_MS)
+            with self._ring.lock:
+                self.collect()
+                if self.step is not Step.IN_USE:
+                    return False
+                if places.may_hold(self, size):
+                    return True
+            if not is_released or time.monotonic() > end:
+                self._is_releasing = False
+                return False
+
+    def _offer(self, size: int) -> None:
+        with self._ring.lock:
+            memory = self._ring.fitting(size)
+            if memory is None:
+                self.step = Step.OFF
+                return
+            self._close_counter()
+            try:
+                self._counter = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+            except OSError as error:
+                # This process has reached its limit of open files.
+                _log.debug("no shared memory for a connection: %s", error)
+                self.step = Step.OFF
+                return
+            self._memory = memory
+            self._is_releasing = True
+            self.step = Step.OFFERED
+            files = array.array("i", [memory.read_only, self._counter])
+            self._send(ring.offer(memory.layout.size), [(socket.SOL_SOCKET, socket.SCM_RIGHTS, files)])
+
+    def _send(self, data: bytes, ancillary: list[tuple[int, int, array.array[int]]] | None = None) -> None:
+        """Send a few bytes. Raise OSError if the connection has failed, BlockingIOError if its buffer is full."""
+        sent = self._sock.sendmsg([data], ancillary) if ancillary else self._sock.send(data)
+        if sent != len(data):
+            # Linux accepts so few bytes all or not at all.
+            raise OSError("a Unix socket has accepted a part of some bytes")
+
+    def _close_counter(self) -> None:
+        if self._counter >= 0:
+            os.close(self._counter)
+            self._counter = -1
+
+
+class RingReceiver:
+    """The subscriber's end of one connection. Use it in the thread that reads the socket."""
+
+    def __init__(self) -> None:
+        self.expects_files = False  # whether the next bytes may come with file descriptors
+        self._files: list[int] = []  # file descriptors that have arrived
+        self._map: mmap.mmap | None = None
+        self._size = 0
+        self._counter = -1
+
+    def prepare(self, sock: socket.socket) -> None:
+        """Answer the publisher's request: from now on, file descriptors are received."""
+        self.expects_files = True
+        _answer(sock, ring.READY)
+
+    def receive(self, sock: socket.socket, count: int, flags: int = 0) -> bytes:
+        """Receive up to ``count`` bytes and any file descriptors that come with them."""
+        space = socket.CMSG_SPACE(_FILES * array.array("i").itemsize)
+        data, ancillary, _, _ = sock.recvmsg(count, space, flags | socket.MSG_CMSG_CLOEXEC)
+        for level, kind, payload in ancillary:
+            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
+                files = array.array("i")
+                files.frombytes(payload[: len(payload) - len(payload) % files.itemsize])
+                self._files += files
+        return data
+
+    def take_offer(self, sock: socket.socket, data: bytes) -> None:
+        """Map the ring that the publisher offers, and answer. Raise WireError if the offer is invalid."""
+        size = ring.parse_offer(data)
+        self.expects_files = False
+        files, self._files = self._files, []
+        self._release_ring()
+        try:
+            # Descriptors are missing if this process has reached its limit of open files.
+            if len(files) == _FILES and may_share(sock) and _is_sealed(files[0], size):
+                self._map = mmap.mmap(files[0], size, mmap.MAP_SHARED, mmap.PROT_READ)
+                self._size, self._counter = size, files.pop()
+        except (OSError, ValueError) as error:
+            _log.debug("a publisher's shared memory is not used: %s", error)
+        finally:
+            for file in files:
+                os.close(file)
+        _answer(sock, ring.MAPPED if self._map else ring.REFUSED)
+
+    def read(self, data: bytes) -> bytes:
+        """Return a copy of an announced message, and release its place. Raise WireError if the announcement is invalid."""
+        offset, size, tail = self._parse(data)
+        assert self._map is not None
+        end = offset + size
+        if tail:
+            head, array_ = self._map[offset : end - tail], self._map[end - tail : end]
+        else:
+            head, array_ = self._map[offset:end], b""
+        os.eventfd_write(self._counter, 1)
+        if not tail:
+            return head
+        if not may_split(head, tail):
+            raise WireError("a split message was not split where its array begins")
+        return SplitFrame(head, array_)
+
+    def close(self) -> None:
+        """Unmap the ring and close all descriptors. Idempotent."""
+        self._release_ring()
+        for file in self._files:
+            os.close(file)
+        self._files = []
+
+    def _parse(self, data: bytes) -> Announcement:
+        if self._map is None:
+            raise WireError("a message in shared memory was announced before any memory was offered")
+        return ring.parse_announcement(data, self._size)
+
+    def _release_ring(self) -> None:
+        if self._map:
+            self._map.close()
+            self._map = None
+        if self._counter >= 0:
+            os.close(self._counter)
+            self._counter = -1
+
+
+def _answer(sock: socket.socket, byte: bytes) -> None:
+    # A publisher that has closed may have sent messages before: they are read, and then the end.
+    with contextlib.suppress(OSError):
+        sock.send(byte)
+
+
+def _seal(file: int) -> None:
+    """Fix a file's size, so that no process that maps it can be killed by another one that shrinks it."""
+    import fcntl
+
+    fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+
+
+def _is_sealed(file: int, size: int) -> bool:
+    """Return whether a file has this size and cannot shrink. Raise OSError if it cannot be sealed at all."""
+    import fcntl
+
+    return os.fstat(file).st_size == size and bool(fcntl.fcntl(file, fcntl.F_GET_SEALS) & fcntl.F_SEAL_SHRINK)

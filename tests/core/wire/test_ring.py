@@ -1,0 +1,144 @@
+"""core/wire/ring: the words of shared memory, and its places against a slow, readable model."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from minirospy.base.errors import WireError
+from minirospy.core.wire import ring
+from minirospy.core.wire.framing import MAX_FRAME, SPLIT
+from minirospy.core.wire.ring import Announcement, Places, Step, layout_for
+
+
+def test_words_are_no_lengths() -> None:
+    words = [ring.PREPARE_WORD, ring.OFFER_WORD, ring.PLACE_WORD]
+    assert all(word > MAX_FRAME | SPLIT for word in words)
+    assert ring.prepare() == b"\x01\x00\x00\xc0"
+    assert ring.offer(ring.PAGE) == b"\x02\x00\x00\xc0\x00\x00\x01\x00"
+    assert ring.announcement(1, 2, 3) == b"\x03\x00\x00\xc0\x01\0\0\0\x02\0\0\0\x03\0\0\0"
+
+
+def test_announcements_and_offers_are_read_back() -> None:
+    data = ring.announcement(65_536, 100_000, 99_000)[4:]
+    assert len(data) == ring.ANNOUNCEMENT_BYTES
+    assert ring.parse_announcement(data, 200_000) == Announcement(65_536, 100_000, 99_000)
+    assert ring.parse_offer(ring.offer(ring.MAX_RING)[4:]) == ring.MAX_RING
+
+
+@pytest.mark.parametrize(
+    ("offset", "size", "tail", "words"),
+    [
+        (0, 131_073, 0, "outside the ring"),
+        (131_072, 1, 0, "outside the ring"),
+        (1, 0xFFFFFFFF, 0, "outside the ring"),
+        (0xFFFFFFFF, 1, 0, "outside the ring"),
+        (0, 1000, 997, "ends with an array of 997"),
+        (0, 3, 1, "ends with an array of 1"),
+    ],
+)
+def test_an_announcement_outside_the_ring_is_refused(offset: int, size: int, tail: int, words: str) -> None:
+    with pytest.raises(WireError, match=words):
+        ring.parse_announcement(ring.announcement(offset, size, tail)[4:], 131_072)
+
+
+@pytest.mark.parametrize("size", [0, ring.MAX_RING + 1, 0xFFFFFFFF])
+def test_a_ring_of_any_size_is_not_mapped(size: int) -> None:
+    with pytest.raises(WireError, match="over the limit"):
+        ring.parse_offer(ring.offer(size)[4:])
+
+
+@given(st.integers(1, ring.MAX_MESSAGE))
+def test_a_layout_holds_its_message_within_the_limit(size: int) -> None:
+    layout = layout_for(size)
+    assert size <= layout.place_size
+    assert layout.place_size % ring.PAGE == 0
+    assert ring.MIN_PLACES <= layout.places <= ring.MAX_PLACES
+    assert layout.size <= ring.MAX_RING
+
+
+def test_only_the_expected_answer_changes_the_step() -> None:
+    for step in Step:
+        for answer in (ring.READY, ring.MAPPED, ring.REFUSED, b"x"):
+            after = ring.ANSWERS.get((step, answer), step)
+            assert after is step or step in (Step.ASKED, Step.OFFERED)
+    # A subscriber cannot be announced places before it has mapped the ring that was offered last.
+    assert [key for key, step in ring.ANSWERS.items() if step is Step.IN_USE] == [(Step.OFFERED, ring.MAPPED)]
+
+
+def test_the_place_that_became_free_last_is_used_first() -> None:
+    places = Places(3)
+    first, second = places.take(), places.take()
+    assert first is not None
+    assert second is not None
+    places.let_go(second)
+    places.let_go(first)
+    assert places.take() == first
+
+
+def test_a_slow_connection_holds_a_few_places_and_a_few_bytes() -> None:
+    places = Places(16)
+
+    def announce(size: int) -> bool:
+        if not places.may_hold("slow", size):
+            return False
+        place = places.take()
+        assert place is not None
+        places.hold("slow", place, size)
+        places.let_go(place)
+        return True
+
+    assert [announce(30_000_000) for _ in range(3)] == [True, True, False]
+    assert places.release("slow", 2)
+    assert [announce(1_000_000) for _ in range(5)] == [True] * 4 + [False]
+
+
+Operation = tuple[str, int, int]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["publish", "publish", "release", "lie", "take_back"]),
+            st.integers(0, 2),
+            st.integers(0, 7),
+        ),
+        max_size=60,
+    ),
+    st.integers(2, 5),
+)
+def test_random_operations_against_a_model(operations: list[Operation], count: int) -> None:
+    """The model keeps the list of each connection's places. A place with contents that anyone may read is never taken."""
+    places = Places(count)
+    model: dict[int, list[int]] = {0: [], 1: [], 2: []}
+
+    for name, connection, number in operations:
+        if name == "publish":
+            # ``number`` has a bit for each connection that the message is announced on.
+            place = places.take()
+            in_use = {each for held in model.values() for each in held}
+            assert (place is None) == (len(in_use) == count)
+            if place is None:
+                continue
+            assert place not in in_use
+            for other, held in model.items():
+                if number >> other & 1:
+                    places.hold(other, place, 1)
+                    held.append(place)
+            places.let_go(place)
+        elif name == "release":
+            few = min(number, len(model[connection]))
+            assert places.release(connection, few)
+            del model[connection][:few]
+        elif name == "lie":
+            assert not places.release(connection, len(model[connection]) + 1 + number)
+        elif model[connection]:
+            places.take_back(connection)
+            model[connection].pop()
+
+        held_places = Counter(each for held in model.values() for each in held)
+        assert sorted([*places.free, *held_places]) == list(range(count))
+        assert [places.held_by(each) for each in model] == [len(held) for held in model.values()]
