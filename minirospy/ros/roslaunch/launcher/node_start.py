@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from minirospy.base.environment import Environment
@@ -11,6 +13,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher.command import node_command, node_environment, node_folder
 from minirospy.ros.roslaunch.launcher.master import LaunchMaster
 from minirospy.ros.roslaunch.launcher.options import RunOptions
+from minirospy.ros.roslaunch.launcher.preload import MIN_NODES, Preload, Start
 from minirospy.ros.roslaunch.launcher.process import Process, start_process
 from minirospy.ros.roslaunch.launcher.spec import NodeSpec
 from minirospy.workspace.packages import Packages
@@ -29,17 +32,31 @@ class NodeStarter:
         self._options = options
         self._master = master
         self._has_warned = False
+        self._preload = Preload()
+
+    def prepare(self, nodes: Sequence[NodeSpec]) -> None:
+        """Start the preloaded processes from which similar ones of ``nodes`` will be forked."""
+        if len(nodes) < MIN_NODES:
+            return
+        starts = []
+        for node in nodes:
+            # start() reports the error.
+            with contextlib.suppress(MinirospyError):
+                command = node_command(node, self._packages)
+                folder = node_folder(node, self._packages, self._environment)
+                starts.append(Start(tuple(command), self._variables(node), self._made(folder)))
+        self._preload.prepare(starts)
+
+    def close(self) -> None:
+        """End the preloaded processes. Later starts do not use them. Idempotent."""
+        self._preload.close()
 
     def start(self, node: NodeSpec, name: str) -> Process:
         """Start a node as the process ``name``. Raise MinirospyError if the process or its folder cannot be created."""
         command = node_command(node, self._packages)
         folder = node_folder(node, self._packages, self._environment)
-        environ = node_environment(node, self._environment)
+        environ = self._variables(node)
         screen = self._uses_screen(node)
-        if not screen or not sys.stdout.isatty():
-            # Show a node's output immediately.
-            # On a terminal, Python flushes each line anyway, and writes whole lines, so that the nodes' lines do not mix.
-            environ.setdefault("PYTHONUNBUFFERED", "1")
         folder = self._made(folder)
 
         log = self._master.log_folder / name.replace("/", "-")
@@ -50,10 +67,20 @@ class NodeStarter:
             folder=folder,
             stdout_file=None if screen else log.with_name(f"{log.name}-stdout.log"),
             log_errors=self._options.log_errors,
+            preload=self._preload,
         )
         process.node = node
         process.log_files = f"{log}*.log" if self._master.has_logs else "none"
         return process
+
+    def _variables(self, node: NodeSpec) -> dict[str, str]:
+        """Return the environment variables for a node's process."""
+        environ = node_environment(node, self._environment)
+        if not self._uses_screen(node) or not sys.stdout.isatty():
+            # Show a node's output immediately.
+            # On a terminal, Python flushes each line anyway, and writes whole lines, so that the nodes' lines do not mix.
+            environ.setdefault("PYTHONUNBUFFERED", "1")
+        return environ
 
     def _made(self, folder: Path) -> Path:
         """Create a node's working folder and return it. If ROS_HOME is not writable, return the temporary folder."""

@@ -18,6 +18,7 @@ from minirospy.base import private_files
 from minirospy.base.child_lifetime import guard_children, start_outside_of_job
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher import guardian
+from minirospy.ros.roslaunch.launcher.preload import ForkedProcess, Preload, Start
 from minirospy.ros.roslaunch.launcher.spec import NodeSpec
 
 __all__ = ["Guardian", "Process", "Timeouts", "end_processes", "start_process"]
@@ -39,7 +40,7 @@ class Process:
 
     name: str
     command: Sequence[str]
-    popen: subprocess.Popen[bytes]
+    popen: subprocess.Popen[bytes] | ForkedProcess
     node: NodeSpec | None = None
     log_files: str = ""
     stdout_file: Path | None = None
@@ -139,14 +140,18 @@ def start_process(
     log_errors: bool = False,
     stdin: int | None = subprocess.DEVNULL,
     stdout: int | None = None,
+    preload: Preload | None = None,
 ) -> Process:
     """Start a process. Its stdout (if ``log_errors``, also its stderr) is written to ``stdout_file``, or is inherited.
+
+    ``preload``: fork the process from a preloaded one if possible; its stdin is empty then.
 
     Raise MinirospyError if the process cannot be started or the file cannot be written.
     """
     try:
         with _opened(stdout_file) as output:
-            popen = subprocess.Popen(
+            forked = _forked(preload, command, environ, folder, output, log_errors) if preload else None
+            popen = forked or subprocess.Popen(
                 command,
                 env=dict(environ),
                 cwd=folder,
@@ -204,6 +209,23 @@ def _own_group() -> _Group:
     return {"start_new_session": True}
 
 
+def _forked(
+    preload: Preload,
+    command: Sequence[str],
+    environ: Mapping[str, str],
+    folder: Path | None,
+    output: IO[str] | None,
+    log_errors: bool,
+) -> ForkedProcess | None:
+    """Fork a process from a preloaded one. Return None if it must be started as usual."""
+    if folder is None:
+        return None
+    stdout = output.fileno() if output else 1
+    with open(os.devnull, "rb") as stdin:
+        fds = (stdin.fileno(), stdout, stdout if log_errors and output else 2)
+        return preload.fork(Start(tuple(command), environ, folder), fds)
+
+
 @contextlib.contextmanager
 def _opened(path: Path | None) -> Iterator[IO[str] | None]:
     if path is None:
@@ -218,21 +240,21 @@ def _opened(path: Path | None) -> Iterator[IO[str] | None]:
         yield file
 
 
-def _interrupt(popen: subprocess.Popen[bytes]) -> None:
+def _interrupt(popen: subprocess.Popen[bytes] | ForkedProcess) -> None:
     if _WINDOWS:
         popen.send_signal(signal.CTRL_BREAK_EVENT)  # type: ignore[attr-defined,unused-ignore]
     else:
         os.killpg(popen.pid, signal.SIGINT)
 
 
-def _terminate(popen: subprocess.Popen[bytes]) -> None:
+def _terminate(popen: subprocess.Popen[bytes] | ForkedProcess) -> None:
     if _WINDOWS:
         popen.terminate()
     else:
         os.killpg(popen.pid, signal.SIGTERM)
 
 
-def _kill(popen: subprocess.Popen[bytes]) -> None:
+def _kill(popen: subprocess.Popen[bytes] | ForkedProcess) -> None:
     """Kill the process and its descendants."""
     import psutil
 

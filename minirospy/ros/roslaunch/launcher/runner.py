@@ -128,6 +128,7 @@ class Launcher:
             self._master.find_run_id()
         self._show(here, elsewhere)
 
+        self._starter.prepare(here)
         if not had_master:
             self._start_master()
         self._output.print(f"ROS_MASTER_URI={self._environment.master_uri}", bold=True)
@@ -143,6 +144,7 @@ class Launcher:
             self._start_remote(elsewhere)
         for node in here:
             self.start_node(node)
+        self._starter.close()
 
     def set_parameters(self) -> None:
         """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
@@ -309,6 +311,7 @@ class Launcher:
 
     def close(self) -> None:
         """Terminate all processes: the nodes in reverse order, then the master. Idempotent."""
+        self._starter.close()
         if self._remote:
             self._remote.close()
             self._remote = None

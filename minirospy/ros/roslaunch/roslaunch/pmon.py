@@ -25,6 +25,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher import process as processes
 from minirospy.ros.roslaunch.launcher.command import node_command, node_environment
 from minirospy.ros.roslaunch.launcher.output import Output
+from minirospy.ros.roslaunch.launcher.preload import ForkedProcess
 from minirospy.ros.roslaunch.launcher.runner import Launcher, RunOptions
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, NodeSpec
 from minirospy.ros.roslaunch.own_processes import DeadProcess, OwnProcesses, Process, ProcessListener
@@ -125,8 +126,8 @@ class LaunchedProcess(Process):
         return self.process is not None and self.process.is_ending
 
     @property
-    def popen(self) -> subprocess.Popen[bytes] | None:
-        """Return the process as a subprocess.Popen."""
+    def popen(self) -> subprocess.Popen[bytes] | ForkedProcess | None:
+        """Return the process, with the interface of subprocess.Popen."""
         return self.process.popen if self.process else None
 
     @property

@@ -1,0 +1,244 @@
+"""Forks Python nodes from processes that have already imported rospy: ``preloaded.py``, which this module starts.
+
+Importing rospy and asyncio takes most of the time and the memory of a small node, and forked nodes share both. Only Linux can
+change the command line of a forked process, and the libraries of macOS do not support fork without exec. So nodes start as
+usual on other systems, and if their process would differ from a started one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import marshal
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from minirospy.ros.roslaunch.launcher import preloaded
+
+__all__ = ["MIN_NODES", "ForkedProcess", "Preload", "Start"]
+
+MIN_NODES = 3  # similar nodes for which a preloaded process pays off
+REPLY_SECONDS = 30.0  # for a preloaded process to answer, on a busy machine
+POLL_SECONDS = 0.01  # between two checks whether a process has exited
+
+_PR_SET_CHILD_SUBREAPER = 36
+
+_MIRRORED = frozenset(
+    ("PYTHONPATH", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING", "PYTHONUTF8")
+)
+"""Python's variables that have the same effect in a forked process. With any other one, a node starts as usual."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """How to start a process: its command line, environment and working folder."""
+
+    command: tuple[str, ...]
+    environ: Mapping[str, str]
+    folder: Path
+
+    @property
+    def is_plain_python(self) -> bool:
+        """Return whether it is a Python program without options of the interpreter, debuggers or measurements."""
+        return (
+            len(self.command) > 1
+            and self.command[0] == sys.executable
+            and not self.command[1].startswith("-")
+            and os.path.isabs(self.command[1])
+            and os.access(self.command[1], os.R_OK)
+            and not any(
+                name.startswith("COVERAGE_") or (name.startswith("PYTHON") and name not in _MIRRORED)
+                for name in self.environ
+            )
+        )
+
+    @property
+    def kind(self) -> _Kind:
+        """Return what processes must have in common with the process that forks them."""
+        shared = frozenset((name, value) for name, value in self.environ.items() if name != "ROS_NAMESPACE")
+        return _Kind(shared, self.folder)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """The environment without ROS_NAMESPACE, and the working folder."""
+
+    environ: frozenset[tuple[str, str]]
+    folder: Path
+
+
+class ForkedProcess:
+    """A child of this process that another one has forked. The interface is that of subprocess.Popen. Thread-safe."""
+
+    # The streams are files, not pipes to this process.
+    stdin: IO[bytes] | None = None
+    stdout: IO[bytes] | None = None
+    stderr: IO[bytes] | None = None
+
+    def __init__(self, args: Sequence[str], pid: int) -> None:
+        self.args = args
+        self.pid = pid
+        self.returncode: int | None = None
+        self._lock = threading.Lock()
+
+    def poll(self) -> int | None:
+        """Return the exit status as in subprocess, or None while the process is running."""
+        with self._lock:
+            if self.returncode is None:
+                try:
+                    pid, status = os.waitpid(self.pid, os.WNOHANG)
+                except ChildProcessError:
+                    # SIGCHLD is ignored, so the system has discarded the status. subprocess returns 0 then, too.
+                    self.returncode = 0
+                else:
+                    if pid:
+                        self.returncode = os.waitstatus_to_exitcode(status)
+            return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait until the process has exited; return its exit status.
+
+        Raise subprocess.TimeoutExpired after ``timeout`` seconds.
+        """
+        end = None if timeout is None else time.monotonic() + timeout
+        while (status := self.poll()) is None:
+            if end is not None and time.monotonic() >= end:
+                assert timeout is not None
+                raise subprocess.TimeoutExpired(list(self.args), timeout)
+            time.sleep(POLL_SECONDS)
+        return status
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless the process has exited."""
+        if self.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Send SIGTERM."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """Send SIGKILL."""
+        self.send_signal(signal.SIGKILL)
+
+
+class Preload:
+    """The preloaded processes of a launch, one for each kind of node that the launch starts often."""
+
+    def __init__(self) -> None:
+        self._parents: dict[_Kind, _Parent] = {}
+
+    def prepare(self, starts: Sequence[Start]) -> None:
+        """Start the processes that will fork ``starts``. They import rospy while the launch continues.
+
+        The environment variable MINIROSPY_PRELOAD=0 turns this off.
+        """
+        if sys.platform != "linux" or os.environ.get("MINIROSPY_PRELOAD") == "0":
+            return
+        similar: dict[_Kind, list[Start]] = {}
+        for start in starts:
+            if start.is_plain_python:
+                similar.setdefault(start.kind, []).append(start)
+        for kind, members in similar.items():
+            if len(members) >= MIN_NODES:
+                with contextlib.suppress(OSError):
+                    self._parents[kind] = _Parent(members[0])
+
+    def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
+        """Fork a process whose standard streams are ``fds``. Return None if it must be started as usual."""
+        parent = self._parents.get(start.kind) if self._parents and start.is_plain_python else None
+        if parent is None:
+            return None
+        try:
+            return parent.fork(start, fds)
+        except OSError:
+            self._parents.pop(start.kind).close()
+            return None
+
+    def close(self) -> None:
+        """End the preloaded processes. Idempotent."""
+        while self._parents:
+            self._parents.popitem()[1].close()
+
+
+class _Parent:
+    """A preloaded process, and the socket to it."""
+
+    def __init__(self, start: Start) -> None:
+        self._is_ready = False
+        self._socket, theirs = socket.socketpair()
+        self._socket.settimeout(REPLY_SECONDS)
+        environ = {name: value for name, value in start.environ.items() if name != "ROS_NAMESPACE"}
+        try:
+            self._popen = subprocess.Popen(
+                [sys.executable, preloaded.__file__, str(theirs.fileno())],
+                env=environ,
+                cwd=start.folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+        except OSError:
+            self._socket.close()
+            raise
+        finally:
+            theirs.close()
+
+    def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
+        """Fork a process; return None if its program must be started as usual. Raise OSError if the process does not answer."""
+        if not self._is_ready:
+            if self._socket.recv(len(preloaded.READY)) != preloaded.READY:
+                raise ConnectionError("the process exited, or cannot fork nodes")
+            self._is_ready = True
+        for fd in fds:
+            os.fstat(fd)
+
+        body = marshal.dumps((list(start.command), dict(start.environ)))
+        gate, opener = os.pipe()
+        with open(opener, "wb", buffering=0) as starter:
+            try:
+                _set_subreaper(True)
+                head = len(body).to_bytes(preloaded.LENGTH_SIZE, "little")
+                socket.send_fds(self._socket, [head], [*fds, gate])
+                self._socket.sendall(body)
+                answer = self._socket.recv(64)
+            finally:
+                _set_subreaper(False)
+                os.close(gate)
+            if answer == preloaded.REFUSED:
+                return None
+            if not answer:
+                raise ConnectionError("the process exited")
+            # If this process ends before it writes, the node exits without running its program.
+            starter.write(b"1")
+        return ForkedProcess(start.command, int(answer))
+
+    def close(self) -> None:
+        """End the process."""
+        self._socket.close()
+        try:
+            self._popen.wait(1)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            self._popen.wait()
+
+
+def _set_subreaper(is_on: bool) -> None:
+    """Let this process become the parent of orphaned descendants, or not. Raise OSError if the system refuses."""
+    import ctypes
+
+    library = ctypes.CDLL(None, use_errno=True)
+    library.prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
+    if library.prctl(_PR_SET_CHILD_SUBREAPER, int(is_on), 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")

@@ -1,0 +1,293 @@
+"""A script that imports rospy once and then forks Python nodes for roslaunch. Linux only.
+
+``python preloaded.py FD`` answers requests on the Unix socket ``FD``; its client is ``preload.py``. A forked node runs its
+program like ``python PROGRAM ARGUMENTS``: Python's C function for that compiles and runs the file in a new ``__main__``,
+and prints tracebacks. The node sets the kernel's pointers to its command line and environment, so that ``ps``, ``pgrep -f``
+and /proc show the same as for a started process. PR_SET_MM_MAP of prctl(2) does this without privileges. The node is a
+child of roslaunch, because roslaunch is the subreaper when the process in between exits.
+
+The script has one thread, and exits when its socket is closed. It imports only rospy and the modules that a node needs.
+Importing these starts no thread, reads no arguments and opens no files.
+"""
+
+from __future__ import annotations
+
+import sys
+
+# A node's path contains the folder of its program, not that of this script.
+if __name__ == "__main__" and not getattr(sys.flags, "safe_path", False):
+    del sys.path[0]
+
+import contextlib
+import ctypes
+import gc
+import io
+import marshal
+import mmap
+import os
+import socket
+import threading
+from importlib import import_module
+from types import ModuleType
+from typing import Any, NamedTuple, TextIO
+
+PRELOADED = (
+    "rospy",
+    "encodings.ascii",
+    "std_msgs.msg",
+    "minirospy.runtime.master.log_file",
+    "minirospy.runtime.node.node",
+    "minirospy.runtime.node.service_client",
+    "minirospy.runtime.node.services",
+    "minirospy.runtime.node.topics",
+    "minirospy.runtime.transport.loop",
+    "minirospy.runtime.transport.readers",
+)
+"""The modules of a node that has created publishers, subscribers and services."""
+
+LENGTH_SIZE = 8  # bytes of the length in front of a request
+FDS = 4  # of a request: stdin, stdout, stderr, and a pipe that roslaunch writes to when the node may start
+READY, REFUSED = b"ready", b"refused"  # answers instead of a process id
+
+_SUFFIXES = (".py", ".pyc", ".so")  # of files that Python can import
+_PR_SET_MM, _PR_SET_MM_MAP = 35, 14
+
+
+class Order(NamedTuple):
+    """A node to fork: the command line, and the value of ROS_NAMESPACE (None: unset). ``environ`` is the complete environment."""
+
+    arguments: list[str]
+    environ: dict[str, str]
+
+    @property
+    def program(self) -> str:
+        """Return the path of the node's program."""
+        return self.arguments[1]
+
+
+class _MemoryMap(ctypes.Structure):
+    """The kernel's struct prctl_mm_map. The fields up to ``env_end`` are addresses."""
+
+    _fields_ = [
+        *((name, ctypes.c_uint64) for name in ("start_code", "end_code", "start_data", "end_data")),
+        *((name, ctypes.c_uint64) for name in ("start_brk", "brk", "start_stack")),
+        *((name, ctypes.c_uint64) for name in ("arg_start", "arg_end", "env_start", "env_end")),
+        ("auxv", ctypes.c_void_p),
+        ("auxv_size", ctypes.c_uint32),
+        ("exe_fd", ctypes.c_uint32),
+    ]
+
+
+_kept: list[mmap.mmap] = []
+"""The command line and environment of this process. The kernel reads them at any time."""
+
+
+def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
+    """Change what /proc shows as this process's command line and environment. Raise OSError if the kernel refuses."""
+    words = b"".join(os.fsencode(word) + b"\0" for word in arguments)
+    variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in environ.items())
+    area = mmap.mmap(-1, len(words) + len(variables) + 1, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    area.write(words + variables)
+    start = ctypes.addressof(ctypes.c_char.from_buffer(area))
+
+    with open("/proc/self/stat", "rb") as file:
+        fields = [b"", b"", *file.read().rpartition(b")")[2].split()]
+    library = ctypes.CDLL(None, use_errno=True)
+    library.sbrk.restype = ctypes.c_void_p
+    library.sbrk.argtypes = [ctypes.c_ssize_t]
+    # proc(5) counts the fields from 1.
+    code_start, code_end, stack, data_start, data_end, heap = (
+        int(fields[n - 1]) for n in (26, 27, 28, 45, 46, 47)
+    )
+    new = _MemoryMap(
+        *(code_start, code_end, data_start, data_end, heap, library.sbrk(0), stack),
+        *(start, start + len(words), start + len(words), start + len(words) + len(variables)),
+        None,
+        0,
+        0xFFFFFFFF,
+    )
+    library.prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
+    if library.prctl(_PR_SET_MM, _PR_SET_MM_MAP, ctypes.addressof(new), ctypes.sizeof(new), 0):
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_MM_MAP)")
+    _kept.append(area)
+
+
+def hides_module(folder: str, loaded: set[str]) -> bool:
+    """Return whether a file in ``folder`` would be imported instead of one of the top-level modules ``loaded``."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            stem, _, suffix = entry.name.partition(".")
+            if stem in loaded and (
+                f".{suffix}".endswith(_SUFFIXES) or os.path.exists(os.path.join(entry.path, "__init__.py"))
+            ):
+                return True
+    return False
+
+
+def serve(control: socket.socket) -> Order | None:
+    """Fork nodes until the socket is closed; return None then. In a forked node, return its order once it may start."""
+    while True:
+        head, fds, _, _ = socket.recv_fds(control, LENGTH_SIZE, FDS)
+        if not head:
+            return None
+        try:
+            size = int.from_bytes(head, "little")
+            body = bytearray()
+            while len(body) < size:
+                body += control.recv(size - len(body)) or sys.exit(1)
+            order = Order(*marshal.loads(bytes(body)))
+            loaded = {name for name in sys.modules if "." not in name}
+            if hides_module(folder_of(order.program), loaded):
+                control.sendall(REFUSED)
+                continue
+            pid = _fork(order, control, fds)
+        except OSError:
+            control.sendall(REFUSED)
+            continue
+        finally:
+            for fd in fds:
+                os.close(fd)
+        if pid == 0:
+            return order
+        control.sendall(str(pid).encode())
+
+
+def _fork(order: Order, control: socket.socket, fds: list[int]) -> int:
+    """Fork a node; return its process id, or 0 in the node. Raise OSError if it cannot be forked."""
+    reader, writer = os.pipe()
+    with open(reader, "rb") as report:
+        middle = os.fork()
+        if middle == 0:
+            # The node's parent exits, so that roslaunch becomes its parent.
+            try:
+                pid = os.fork()
+            except OSError:
+                os._exit(1)
+            if pid:
+                os._exit(0)
+            report.close()
+            control.close()
+            _prepare(order, fds, writer)
+            return 0
+        os.close(writer)
+        os.waitpid(middle, 0)
+        pid = report.read()
+    if not pid:
+        raise ChildProcessError("the node exited before it started")
+    return int(pid)
+
+
+def _prepare(order: Order, fds: list[int], report: int) -> None:
+    """Set up the kernel's view of the node, report its process id, and wait until roslaunch lets it start."""
+    try:
+        os.setsid()
+        for number, fd in enumerate(fds[:3]):
+            os.dup2(fd, number)
+        set_command_line(order.arguments, order.environ)
+        os.write(report, str(os.getpid()).encode())
+        os.close(report)
+        # roslaunch closes the pipe without writing to it if it has given up, or was killed.
+        if os.read(fds[3], 1):
+            return
+    except OSError:
+        pass
+    os._exit(1)
+
+
+def folder_of(program: str) -> str:
+    """Return the folder of a program that Python searches first."""
+    return os.path.dirname(os.path.realpath(program))
+
+
+def become(order: Order, main: dict[str, Any]) -> None:
+    """Set up the interpreter's view of the node. ``main`` contains the first attributes of a ``__main__``."""
+    namespace = order.environ.get("ROS_NAMESPACE")
+    if namespace is None:
+        os.environ.pop("ROS_NAMESPACE", None)
+    else:
+        os.environ["ROS_NAMESPACE"] = namespace
+    sys.argv = order.arguments[1:]
+    sys.orig_argv[:] = order.arguments
+    sys.path.insert(0, folder_of(order.program))
+    # Python 3.13 and older keep the id that the thread had before the fork.
+    threading.main_thread()._set_native_id()  # type: ignore[attr-defined]
+
+    sys.stdin = sys.__stdin__ = _stream(0, "<stdin>", "r", sys.stdin)  # type: ignore[misc]
+    sys.stdout = sys.__stdout__ = _stream(1, "<stdout>", "w", sys.stdout)  # type: ignore[misc]
+    sys.stderr = sys.__stderr__ = _stream(2, "<stderr>", "w", sys.stderr)  # type: ignore[misc]
+
+    module = ModuleType("__main__")
+    module.__dict__.update(main)
+    sys.modules["__main__"] = module
+    # Importing rospy does this with the program's __main__.
+    from minirospy.base.script_names import find_packages_named_like_scripts
+
+    module.__file__ = order.program
+    find_packages_named_like_scripts()
+    del module.__file__
+
+
+def _stream(fd: int, name: str, mode: str, like: TextIO) -> io.TextIOWrapper:
+    """Return a standard stream as Python creates it at its start, with the encoding of ``like``."""
+    assert isinstance(like, io.TextIOWrapper)
+    unbuffered = sys.stdout.write_through  # type: ignore[union-attr]
+    buffer: Any = open(fd, f"{mode}b", 0 if unbuffered and mode == "w" else -1, closefd=False)  # noqa: SIM115
+    raw = getattr(buffer, "raw", buffer)
+    raw.name = name
+    stream = io.TextIOWrapper(
+        buffer,
+        like.encoding,
+        like.errors,
+        "\n",
+        line_buffering=not unbuffered and (raw.isatty() or fd == 2),
+        write_through=unbuffered,
+    )
+    stream.mode = mode  # type: ignore[misc]
+    return stream
+
+
+def open_program(path: str) -> int | None:
+    """Open a file for C code; return its FILE*, or None if it cannot be opened."""
+    library = ctypes.CDLL(None)
+    library.fopen.restype = ctypes.c_void_p
+    file: int | None = library.fopen(os.fsencode(path), b"rbe")
+    return file
+
+
+def main(fd: int) -> Order | None:
+    """Import the modules, and serve on the socket ``fd`` until it is closed; in a forked node, return its order."""
+    control = socket.socket(fileno=fd)
+    # Refuse before any node is waiting if the kernel cannot show the nodes' command lines.
+    set_command_line(sys.orig_argv, dict(os.environ))
+    for name in PRELOADED:
+        import_module(name)
+    if len(os.listdir("/proc/self/task")) > 1 or "minirospy.client" not in sys.modules:
+        # A module has started a thread, or the real rospy is installed.
+        return None
+    gc.collect()
+    gc.freeze()
+    with contextlib.suppress(OSError):
+        control.sendall(READY)
+        return serve(control)
+    return None
+
+
+if __name__ == "__main__":
+    _first = {
+        _name: globals()[_name]
+        for _name in ("__name__", "__package__", "__loader__", "__spec__", "__builtins__")
+    }
+    _order = main(int(sys.argv[1]))
+    if _order is None:
+        os._exit(0)
+    if sys.version_info < (3, 14):
+        _first["__annotations__"] = {}
+    become(_order, {"__doc__": None, **_first})
+    _file = open_program(_order.program)
+    _run = ctypes.pythonapi.PyRun_SimpleFileExFlags
+    _run.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_void_p]
+    # The call is at this level, so that the program's stack has one frame below its own.
+    _has_failed = _file is None or _run(_file, os.fsencode(_order.program), 1, None)
+    # After Ctrl-C, Python itself ends this process with SIGINT when the script ends.
+    if _has_failed and getattr(sys, "last_type", None) is not KeyboardInterrupt:
+        sys.exit(1)
