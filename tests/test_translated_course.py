@@ -276,6 +276,7 @@ def test_hand_edited_german_page_is_named(course: Path) -> None:
         ("one\ntwo\n\nthree\n", ["one two", "three"]),
         ("1. one\n   two\n2. three\n", ["one two", "three"]),
         ("text:\n- one\n  - two\n", ["text:", "one", "two"]),
+        ("- [ ] one\n- [x] two\n- [three](four.md)\n", ["one", "two", "[three](four.md)"]),
         ("text\n```sh\nls # a comment\n```\nmore\n", ["text", "more"]),
         ("```sh\nls\n", []),
         ("| `a` | | 12 | b \\| c |\n", ["b \\| c"]),

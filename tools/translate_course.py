@@ -61,7 +61,7 @@ _CODE = re.compile(r"`[^`]*`")
 _LINK = re.compile(r"(?<=\]\()(?!https?:|mailto:)[^)\s]+(?=\))")
 _RULE = re.compile(r"[|\s:-]+")  # the line below a table's head
 _CELL_END = re.compile(r"(?<!\\)\|")
-_ITEM = re.compile(r"\s*(?:[-*]|\d+\.) ")
+_ITEM = re.compile(r"\s*(?:[-*]|\d+\.) (?:\[[ x]\] )?")
 _NOTICE = "<!-- Written by tools/translate_course.py from ../{page} and {catalogue}: change those. -->\n\n"
 
 
