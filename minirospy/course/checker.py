@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from minirospy.base.errors import MessageException, NotFoundError, ServiceException, UsageError
+from minirospy.base.errors import BoardError, MessageException, MinirospyError, ServiceException, UsageError
 from minirospy.base.log_levels import LEVEL_NAMES
 from minirospy.course import expectations
 from minirospy.course.exercise import Exercise, Step
@@ -191,7 +191,9 @@ class _Run:
             return is_fine
         try:
             _ACTIONS[step.kind](trial, step)
-        except (NotFoundError, MessageException, ServiceException) as error:
+        except BoardError:
+            raise
+        except (MinirospyError, MessageException, ServiceException) as error:
             self._add(Finding(f"{phrase[:1].upper()}{phrase[1:]}" or step.kind, False, str(error), step.hint))
         return True
 
