@@ -200,7 +200,7 @@ def _values(world: World, arrival: Arrival, path: str) -> list[object]:
 def _with_parameters(world: World, options: Mapping[str, Any]) -> Mapping[str, Any]:
     """Replace ``{param: /name}`` in an expectation: by the parameter's value or, in a range, by 70 to 140 % of it.
 
-    Raise NotFoundError if the parameter is not set, or is not a number where one is needed.
+    Raise NotFoundError if the parameter is not set, or is not a number if one is needed.
     """
     found = dict(options)
     for key in ("equals", "between"):
