@@ -14,7 +14,7 @@ import pytest
 
 from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.course.checker import Report, check
-from minirospy.course.exercise import Exercise, parse_exercise
+from minirospy.course.exercise import Exercise, ExerciseError, parse_exercise
 
 LAMP = """
 name: lamp
@@ -251,3 +251,11 @@ def test_error_of_a_step_is_an_observation(step: str, observed: str, tmp_path: P
     assert observed in lines(report)
     assert report.findings[0].holds is False
     assert report.findings[-1].holds
+
+
+def test_program_of_the_exercise_that_does_not_run_is_an_error_of_the_exercise(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text("raise SystemExit('no scanner')\n")
+    exercise = parse_exercise(f"name: t\ntitle: t\nsteps:\n- start: {own}\n- node: /x\n", "t.yaml")
+    with pytest.raises(ExerciseError, match=r"own\.py, which the exercise starts, does not run: no scanner"):
+        check(exercise, [])
