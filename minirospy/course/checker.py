@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
-from minirospy.base.errors import MessageException, NotFoundError, ServiceException, UsageError
+from minirospy.base.errors import BoardError, MessageException, MinirospyError, ServiceException, UsageError
 from minirospy.base.log_levels import LEVEL_NAMES
 from minirospy.course import expectations
-from minirospy.course.exercise import Exercise, Step
+from minirospy.course.exercise import Exercise, ExerciseError, Step
 from minirospy.course.expectations import Trial, expect
 from minirospy.course.programs import Program
 from minirospy.course.wording import action_phrase, sentence
@@ -20,6 +20,7 @@ from minirospy.course.world import World
 __all__ = ["Finding", "Report", "check", "words_of"]
 
 START_SECONDS = 15.0  # for a node to register, on a slow laptop with a virus scanner
+OWN_START_SECONDS = 60.0  # for a program of the exercise itself, without which it cannot be checked
 _LAST_LINES = 8  # lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # time for which `click` holds a button: longer than two polls of a node with 10 Hz
 _REPEAT_HERTZ = 10.0  # of published messages, unless an exercise says otherwise
@@ -191,7 +192,9 @@ class _Run:
             return is_fine
         try:
             _ACTIONS[step.kind](trial, step)
-        except (NotFoundError, MessageException, ServiceException) as error:
+        except BoardError:
+            raise
+        except (MinirospyError, MessageException, ServiceException) as error:
             self._add(Finding(f"{phrase[:1].upper()}{phrase[1:]}" or step.kind, False, str(error), step.hint))
         return True
 
@@ -207,12 +210,15 @@ class _Run:
         for word in words:
             before = world.nodes()
             program = world.start(word, is_work=step.subject == "work" or isinstance(step.subject, int))
-            runs = world.wait_until(partial(_has_started, world, before, program), START_SECONDS)
+            # A short patience is for the student's program: the exercise needs its own programs in any case.
+            seconds = START_SECONDS if program.is_work else OWN_START_SECONDS / min(1.0, world.patience)
+            runs = world.wait_until(partial(_has_started, world, before, program), seconds)
             if not program.is_work:
                 if not runs or program.status is not None:
                     program.wait_for_output()
-                    raise UsageError(
-                        f"{word}, which the exercise starts, does not run: {' | '.join(program.last_lines(3))}"
+                    last = " | ".join(program.last_lines(3))
+                    raise ExerciseError(
+                        self._exercise.name, 0, f"{word}, which the exercise starts, does not run: {last}"
                     )
             elif not runs:
                 self._add(

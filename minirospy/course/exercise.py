@@ -33,6 +33,7 @@ FOLDER = Path(__file__).parent / "exercises"
 DEFAULT_SECONDS = (
     10.0  # time limit of an expectation without `within`: a program starts within this time on a slow laptop
 )
+MAX_HERTZ = 1000.0  # the largest rate of published messages
 MAX_SECONDS = 3600.0  # the largest accepted time limit
 
 # Each kind of step with the options that it accepts besides those of all steps.
@@ -289,14 +290,19 @@ class _Reader:
             self._seconds(words.get("for", subject), place)
         if kind == "person" and not _is_place(subject):
             raise self._error(f"{place}: [{subject}] is not a distance in metres, [ahead, left] or away")
+        if "apart" in words and not _is_range(words["apart"]):
+            raise self._error(
+                f"{place}: apart [{words['apart']}] is not two numbers of seconds such as [0.3, 0.8]"
+            )
+        if kind == "publish" and not (
+            _is_number(words.get("rate", 1)) and 0 <= words.get("rate", 1) <= MAX_HERTZ
+        ):
+            raise self._error(f"{place}: rate [{words['rate']}] is not a number from 0 to {MAX_HERTZ:g}")
+        if not _is_number(words.get("tolerance", 0)):
+            raise self._error(f"{place}: tolerance [{words['tolerance']}] is not a number such as 0.2")
         if "between" in words:
             pair = words["between"]
-            if not _is_parameter(pair) and not (
-                isinstance(pair, list)
-                and len(pair) == 2
-                and all(map(_is_number, pair))
-                and pair[0] <= pair[1]
-            ):
+            if not _is_parameter(pair) and not _is_range(pair):
                 raise self._error(f"{place}: between [{pair}] is not two numbers such as [8, 12]")
         if isinstance(words.get("between"), dict) and not words.get("says"):
             raise self._error(
@@ -319,6 +325,8 @@ class _Reader:
             "publish",
             "call",
             "node",
+            "param",
+            "set_param",
         ) and not (isinstance(subject, str) and subject):
             raise self._error(f"{place}: [{subject}] is not a name such as /button_state")
 
@@ -357,6 +365,15 @@ def _is_number(value: object) -> bool:
 
 def _is_parameter(value: object) -> bool:
     return isinstance(value, dict) and list(value) == ["param"] and isinstance(value["param"], str)
+
+
+def _is_range(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) == 2
+        and all(map(_is_number, value))
+        and bool(value[0] <= value[1])
+    )
 
 
 def _is_pin(value: object) -> bool:

@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from minirospy.base.errors import (
+    BoardError,
     MessageException,
+    MinirospyError,
     NotFoundError,
     RpcRefused,
     ServiceException,
@@ -59,7 +61,9 @@ def expect(trial: Trial, step: Step) -> Outcome:
     """Wait for an expectation. Errors of the graph, such as a node that has gone, count as not holding."""
     try:
         return EXPECTATIONS[step.kind](trial, step)
-    except (NotFoundError, MessageException, ServiceException) as error:
+    except BoardError:
+        raise
+    except (MinirospyError, MessageException, ServiceException) as error:
         return Outcome(False, str(error))
 
 
@@ -196,11 +200,11 @@ def _values(world: World, arrival: Arrival, path: str) -> list[object]:
 def _with_parameters(world: World, options: Mapping[str, Any]) -> Mapping[str, Any]:
     """Replace ``{param: /name}`` in an expectation: by the parameter's value or, in a range, by 70 to 140 % of it.
 
-    Raise NotFoundError if the parameter is not set, or is not a number where one is needed.
+    Raise NotFoundError if the parameter is not set, or is not a number if one is needed.
     """
     found = dict(options)
     for key in ("equals", "between"):
-        if not isinstance(found.get(key), dict):
+        if not isinstance(found.get(key), dict) or "param" not in found[key]:
             continue
         name = str(found[key]["param"])
         try:

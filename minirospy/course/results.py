@@ -30,7 +30,6 @@ __all__ = [
     "Record",
     "Result",
     "Student",
-    "address_towards",
     "class_table",
     "gather",
     "join",

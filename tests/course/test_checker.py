@@ -14,7 +14,7 @@ import pytest
 
 from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.course.checker import Report, check
-from minirospy.course.exercise import Exercise, parse_exercise
+from minirospy.course.exercise import Exercise, ExerciseError, parse_exercise
 
 LAMP = """
 name: lamp
@@ -228,3 +228,34 @@ def test_rostest_is_a_step(tmp_path: Path) -> None:
     bad = check(parse_exercise(text.format("none.test"), "t.yaml"), [])
     assert not bad.passed
     assert "none.test" in lines(bad)
+
+
+@pytest.mark.parametrize(
+    ("step", "observed"),
+    [
+        ("{message: /chatter, field: 'x[', equals: 1}", "field path [x[]"),
+        ("{response: /nothing, field: success, equals: true, within: 0.2}", "service [/nothing] not found"),
+        ("{publish: /x, type: std_msgs/Nothing}", "[std_msgs/Nothing] not found"),
+        ("{publish: /x, type: std_msgs/Bool, message: {dat: 1}}", "dat"),
+        ("{param: /missing, within: 0.2}", "it is not set"),
+    ],
+)
+def test_error_of_a_step_is_an_observation(step: str, observed: str, tmp_path: Path) -> None:
+    """A teacher's mistake that only the graph reveals is one line, and the check goes on."""
+    publisher = (
+        "import rospy\nfrom std_msgs.msg import Bool\nrospy.init_node('lamp')\n"
+        "p = rospy.Publisher('/chatter', Bool, queue_size=1, latch=True)\np.publish(True)\nrospy.spin()\n"
+    )
+    text = f"name: t\ntitle: t\nwork:\n- about: node\nsteps:\n- start: work\n- {step}\n- {{node: /lamp}}\n"
+    report = run(parse_exercise(text, "t.yaml"), tmp_path, publisher)
+    assert observed in lines(report)
+    assert report.findings[0].holds is False
+    assert report.findings[-1].holds
+
+
+def test_program_of_the_exercise_that_does_not_run_is_an_error_of_the_exercise(tmp_path: Path) -> None:
+    own = tmp_path / "own.py"
+    own.write_text("raise SystemExit('no scanner')\n")
+    exercise = parse_exercise(f"name: t\ntitle: t\nsteps:\n- start: {own}\n- node: /x\n", "t.yaml")
+    with pytest.raises(ExerciseError, match=r"own\.py, which the exercise starts, does not run: no scanner"):
+        check(exercise, [])
