@@ -6,33 +6,24 @@ import numpy as np
 from geometry_msgs.msg import Point32
 from sensor_msgs.msg import ChannelFloat32, PointCloud
 
-from minirospy.ros.gazebo_plugins.rays import read_rays
-from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+from minirospy.ros.gazebo_plugins.rays import RayPlugin
 
 __all__ = ["BlockLaser"]
 
 
-class BlockLaser(SensorPlugin):
+class BlockLaser(RayPlugin):
     """The plugin. Parameters: topicName, frameName, gaussianNoise (of the coordinates and the intensity)."""
 
     def load(self) -> None:
         """Read the sensor's rays."""
-        self.shown_rays = self._rays = read_rays(self.sensor)
-        self._frame = self.frame("frameName", "/world")
+        self.load_rays("/world", PointCloud)
         self._noise = self.number("gaussianNoise", 0.0)
-        self._publisher = self.publish_to(self.text("topicName", "/world"), PointCloud)
-
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self._publisher.get_num_connections() > 0
 
     def sense(self) -> None:
         """Publish the points in the sensor's frame; a ray that hits nothing has its point at the range's end."""
-        rays, random = self._rays, self.simulation.random
-        hits = self.simulation.cast_rays(
-            self.sensor_pose, rays.directions, rays.max_range, min_range=rays.min_range
-        )
-        ranges = np.minimum(rays.noisy(self.simulation, np.asarray(hits.distances)), rays.max_range)
+        rays, random = self.rays, self.simulation.random
+        measured = rays.noisy(self.simulation, rays.cast(self.simulation, self.sensor_pose))
+        ranges = np.minimum(measured, rays.max_range)
         points = rays.directions * ranges[:, None]
         intensities = np.zeros(len(ranges))
         if self._noise > 0:
@@ -41,7 +32,7 @@ class BlockLaser(SensorPlugin):
             intensities = random.normal(0.0, self._noise, len(ranges))
         cloud = PointCloud()
         cloud.header.stamp = self.now
-        cloud.header.frame_id = self._frame
+        cloud.header.frame_id = self.frame_id
         cloud.points = [Point32(*each) for each in points.tolist()]
         cloud.channels = [ChannelFloat32(values=intensities.tolist())]
-        self._publisher.publish(cloud)
+        self.publisher.publish(cloud)

@@ -252,10 +252,7 @@ class HectorSonar(SensorPlugin):
     def sense(self) -> None:
         """Publish the shortest distance."""
         rays, now_ns = self._rays, self.simulation.time_ns
-        hits = self.simulation.cast_rays(
-            self.sensor_pose, rays.directions, rays.max_range, min_range=rays.min_range
-        )
-        shortest = min(float(np.min(hits.distances)), rays.max_range)
+        shortest = min(float(np.min(rays.cast(self.simulation, self.sensor_pose))), rays.max_range)
         if shortest < rays.max_range:
             measured = self._errors.measured(np.array([shortest]), (now_ns - self._last_ns) / 1e9)
             shortest = float(np.clip(measured[0], rays.min_range, rays.max_range))

@@ -5,28 +5,21 @@ from __future__ import annotations
 import numpy as np
 from sensor_msgs.msg import LaserScan
 
-from minirospy.ros.gazebo_plugins.rays import read_rays
-from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+from minirospy.ros.gazebo_plugins.rays import RayPlugin
 
 __all__ = ["Laser"]
 
 
-class Laser(SensorPlugin):
+class Laser(RayPlugin):
     """The plugin. Parameters: topicName, frameName."""
 
     def load(self) -> None:
         """Read the sensor's rays."""
-        self.shown_rays = self._rays = read_rays(self.sensor)
-        self._frame = self.frame("frameName", "/world")
-        self._publisher = self.publish_to(self.text("topicName", "/world"), LaserScan)
-
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self._publisher.get_num_connections() > 0
+        self.load_rays("/world", LaserScan)
 
     def sense(self) -> None:
         """Publish a scan."""
-        rays = self._rays
+        rays = self.rays
         first = len(rays.directions) // rays.count // 2 * rays.count  # the middle row, if there are several
         directions = rays.directions[first : first + rays.count]
         hits = self.simulation.cast_rays(
@@ -35,11 +28,11 @@ class Laser(SensorPlugin):
         ranges = rays.noisy(self.simulation, np.asarray(hits.distances))
         scan = LaserScan()
         scan.header.stamp = self.now
-        scan.header.frame_id = self._frame
+        scan.header.frame_id = self.frame_id
         scan.angle_min, scan.angle_max = rays.min_angle, rays.max_angle
         scan.angle_increment = (rays.max_angle - rays.min_angle) / max(rays.count - 1, 1)
         scan.range_min, scan.range_max = rays.min_range, rays.max_range
         ranges = np.where(ranges >= rays.max_range, np.inf, ranges)
         scan.ranges = np.where(ranges <= rays.min_range, -np.inf, ranges).tolist()
         scan.intensities = [0.0] * rays.count
-        self._publisher.publish(scan)
+        self.publisher.publish(scan)

@@ -1,4 +1,4 @@
-"""The rays of a ``<ray>`` sensor."""
+"""The rays of a ``<ray>`` sensor, and the base class of the plugins that cast them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from minirospy import client as rospy
 from minirospy.base.xml_text import XmlElement
-from minirospy.core.sdf.model import Sensor
+from minirospy.core.sdf.model import Pose, Sensor
 from minirospy.ros.gazebo_ros.parameters import PluginError, number_of, text_of
 from minirospy.ros.gazebo_ros.physics import Simulation
+from minirospy.ros.gazebo_ros.plugins import SensorPlugin
 
-__all__ = ["Rays", "read_rays"]
+__all__ = ["RayPlugin", "Rays", "read_rays"]
 
 MAX_RAYS = 1_000_000  # of one sensor; more would fill the memory
 
@@ -34,12 +36,30 @@ class Rays:
     noise_mean: float = 0.0
     noise_deviation: float = 0.0
 
+    def cast(self, simulation: Simulation, pose: Pose) -> NDArray[np.float64]:
+        """Return the distances that the rays measure from a pose, infinite if they hit nothing."""
+        return simulation.cast_rays(pose, self.directions, self.max_range, min_range=self.min_range).distances
+
     def noisy(self, simulation: Simulation, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return distances with noise, within the range's limits. Infinite distances are not changed."""
         if self.noise_deviation <= 0 and self.noise_mean == 0:
             return ranges
         noise = simulation.random.normal(self.noise_mean, self.noise_deviation, len(ranges))
         return np.where(np.isfinite(ranges), np.clip(ranges + noise, self.min_range, self.max_range), ranges)
+
+
+class RayPlugin(SensorPlugin):
+    """A plugin with rays and one topic. Parameters: topicName, frameName."""
+
+    def load_rays(self, topic: str, kind: type[rospy.Message]) -> None:
+        """Read the sensor's rays, and start the topic; ``topic`` is its default."""
+        self.shown_rays = self.rays = read_rays(self.sensor)
+        self.frame_id = self.frame("frameName", "/world")
+        self.publisher = self.publish_to(self.text("topicName", topic), kind)
+
+    def is_needed(self) -> bool:
+        """Return whether there is a subscriber."""
+        return self.publisher.get_num_connections() > 0
 
 
 def read_rays(sensor: Sensor) -> Rays:

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
-from minirospy.ros.gazebo_plugins.rays import read_rays
-from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+from minirospy.ros.gazebo_plugins.rays import RayPlugin
 
 __all__ = ["Velodyne"]
 
@@ -21,7 +20,7 @@ _KINDS = {"<f4": PointField.FLOAT32, "<u2": PointField.UINT16}
 _POINT = np.dtype(list(_FIELDS.items()))
 
 
-class Velodyne(SensorPlugin):
+class Velodyne(RayPlugin):
     """The plugin.
 
     Parameters: topicName, frameName, organize_cloud, min_range, max_range, min_intensity, gaussianNoise (of ranges, in m).
@@ -29,28 +28,21 @@ class Velodyne(SensorPlugin):
 
     def load(self) -> None:
         """Read the sensor's rays."""
-        self.shown_rays = self._rays = rays = read_rays(self.sensor)
-        frame = self.frame("frameName", "/world")
-        self._frame = f"{self.namespace.strip('/')}/{frame}" if self.namespace else frame
+        self.load_rays("/points", PointCloud2)
+        rays = self.rays
+        if self.namespace:
+            self.frame_id = f"{self.namespace.strip('/')}/{self.frame_id}"
         self._is_organized = self.flag("organize_cloud", False)
         self._nearest = max(self.number("min_range", 0.0), rays.min_range)
         self._farthest = min(self.number("max_range", math.inf), rays.max_range)
         # All intensities are 0: a higher minimum leaves no points.
         self._has_points = self._is_organized or self.number("min_intensity", 0.0) <= 0
         self._noise = self.number("gaussianNoise", 0.0)
-        self._publisher = self.publish_to(self.text("topicName", "/points"), PointCloud2)
-
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self._publisher.get_num_connections() > 0
 
     def sense(self) -> None:
         """Publish the points in the sensor's frame: all rows of the first direction, then those of the next one."""
-        rays, random = self._rays, self.simulation.random
-        hits = self.simulation.cast_rays(
-            self.sensor_pose, rays.directions, rays.max_range, min_range=rays.min_range
-        )
-        ranges = rays.noisy(self.simulation, np.asarray(hits.distances))
+        rays, random = self.rays, self.simulation.random
+        ranges = rays.noisy(self.simulation, rays.cast(self.simulation, self.sensor_pose))
         is_valid = self._is_between(ranges)
         if self._noise > 0:
             ranges = ranges + random.normal(0.0, self._noise, len(ranges))
@@ -64,7 +56,7 @@ class Velodyne(SensorPlugin):
         points, is_valid = (each.reshape(rows, rays.count).T.ravel() for each in (points, is_valid))
 
         cloud = PointCloud2(height=1, point_step=_POINT.itemsize, is_dense=not self._is_organized)
-        cloud.header.stamp, cloud.header.frame_id = self.now, self._frame
+        cloud.header.stamp, cloud.header.frame_id = self.now, self.frame_id
         offset = 0
         for name, kind in _FIELDS.items():
             cloud.fields.append(PointField(name, offset, _KINDS[kind], 1))
@@ -78,7 +70,7 @@ class Velodyne(SensorPlugin):
             cloud.width = len(points)
         cloud.row_step = cloud.point_step * cloud.width
         cloud.data = points.tobytes()
-        self._publisher.publish(cloud)
+        self.publisher.publish(cloud)
 
     def _is_between(self, ranges: NDArray[np.float64]) -> NDArray[np.bool_]:
         return (self._nearest < ranges) & (ranges < self._farthest)

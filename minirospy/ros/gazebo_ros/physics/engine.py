@@ -159,7 +159,7 @@ class Engine:
         """Write each ray's first geom and its distance, or -1. ``vectors`` are (n, 3) unit vectors in world axes."""
         # Newer versions have an argument for normals.
         normals = (None,) if self._has_normals else ()
-        # MuJoCo looks at all geoms for each ray; a room of one mesh has thousands that no ray hits, behind the one that it does.
+        # MuJoCo looks at all geoms of a body for each ray. A room that is one mesh has thousands for contacts, after the mesh.
         counts = self.model.body_geomnum
         all_counts = counts.copy()
         counts[:] = self._ray_counts

@@ -19,7 +19,7 @@ from minirospy.ros.gazebo_ros.physics.builder import Builder
 from minirospy.ros.gazebo_ros.physics.engine import Engine
 from minirospy.ros.gazebo_ros.physics.handles import SimModel
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
-from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, PART
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_CONTACT_ONLY, PART
 from minirospy.ros.gazebo_ros.physics.states import Contact, LostModel, RayHits, Wrench
 
 if TYPE_CHECKING:
@@ -334,7 +334,7 @@ class Simulation:
             inner = engine.geoms_within(origin, min_range)
             groups = engine.model.geom_group
             shown = groups[inner]
-            groups[inner] = GROUP_VISUAL
+            groups[inner] = GROUP_CONTACT_ONLY
             engine.cast(origin, vectors, ids, distances, max_range, body)
             groups[inner] = shown
             # Another near geom, such as a wall, is passed by single rays that begin at the smallest range.
