@@ -15,7 +15,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, chdir, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -185,7 +185,8 @@ def main() -> None:
     options = parser.parse_args()
     folder = options.folder.absolute()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home, ExitStack() as stack:
-        stack.enter_context(chdir(home))
+        stack.callback(os.chdir, Path.cwd())
+        os.chdir(home)
         make_bag(Path(home, "walk.bag"), 10)
         served = stack.enter_context(scene(Path(home)))
         for name in options.names or PICTURES:
