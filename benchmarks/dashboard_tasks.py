@@ -83,7 +83,8 @@ def robot(*, is_large: bool = True) -> Iterator[str]:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as home, contextlib.ExitStack() as stack:
         os.environ.update(ROS_MASTER_URI=uri, ROS_HOSTNAME="localhost", ROS_HOME=home)
         os.environ["MINIROSPY_RUNTIME_DIR"] = home
-        stack.enter_context(contextlib.chdir(home))
+        stack.callback(os.chdir, Path.cwd())
+        os.chdir(home)
         start(stack, str(BIN / "roscore"), "-p", uri.rpartition(":")[2])
         wait_for_master()
         if is_large:

@@ -51,6 +51,7 @@ export const GERMAN = {
   "{count} warning": "{count} Warnung",
   "{count} warnings": "{count} Warnungen",
   "as `minirospy doctor` finds": "wie `minirospy doctor` es findet",
+  "Rate or load": "Rate oder Last",
   "checking …": "prüft …",
   "Nothing to do.": "Nichts zu tun.",
   "Show more": "Mehr zeigen",
@@ -60,8 +61,7 @@ export const GERMAN = {
   "No line yet.": "Noch keine Zeile.",
   "Hold: button of GPIO {pin}": "Halten: Taster an GPIO {pin}",
   "topics": "Topics",
-  "{topic} is silent: {nodes} published on it, or should, and sends nothing":
-    "{topic} ist stumm: {nodes} hat darauf gesendet oder sollte es, und sendet nichts",
+  "{topic} is silent: {nodes} sends nothing": "{topic} ist stumm: {nodes} sendet nichts",
   "look at that node's log lines, and at the device that it reads":
     "die Log-Zeilen dieser Node ansehen und das Gerät, das sie liest",
   // findings of minirospy doctor

@@ -255,7 +255,7 @@ function showLanguage() {
   setText(button, others[0].toUpperCase());
   button.lang = others[0];
   button.title = LANGUAGES[others[0]];
-  button.setAttribute("aria-label", LANGUAGES[others[0]]);
+  button.setAttribute("aria-label", `${others[0].toUpperCase()}: ${LANGUAGES[others[0]]}`);
   for (const [id, title] of [
     ["find", "Find a view, topic, service or node (Ctrl-K)"],
     ["theme", "Dark or light"],

@@ -19,7 +19,11 @@ export class VirtualList {
     this.followed = 0; // where it last scrolled by itself
     this.pool = [];
     this.space = h("div", { class: "space" });
-    this.element = h("div", { class: "virtual", tabindex: "0", onscroll: () => this.scrolled() }, this.space);
+    this.element = h(
+      "div",
+      { class: "virtual", role: "group", tabindex: "0", onscroll: () => this.scrolled() },
+      this.space,
+    );
     this.observer = new ResizeObserver(() => this.measure());
     this.observer.observe(this.element);
   }

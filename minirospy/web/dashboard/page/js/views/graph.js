@@ -257,7 +257,7 @@ export class Graph {
       partOf(from).setEdge(
         from,
         to,
-        width ? { width, height: label ? 46 : 30, labelpos: "c", index, isLevel: rankdir === "LR" } : { index },
+        width ? { width, height: label ? 50 : 34, labelpos: "c", index, isLevel: rankdir === "LR" } : { index },
         String(index),
       );
     });
@@ -302,11 +302,11 @@ export class Graph {
       "g",
       { class: isBeside ? "edge beside" : "edge" },
       svg("path", { d: path, "marker-end": `url(#${this.arrow})` }),
-      hasText && edge.label ? [svg("title", {}, edge.label), svg("text", { x, y: y - 4 }, brief(edge.label))] : null,
+      hasText && edge.label ? [svg("title", {}, edge.label), svg("text", { x, y: y - 6 }, brief(edge.label))] : null,
     );
     if (hasText) {
-      const above = svg("text", { class: "traffic", x, y: edge.label ? y + 12 : y - 4 });
-      const below = svg("text", { class: "traffic", x, y: edge.label ? y + 26 : y + 13 });
+      const above = svg("text", { class: "traffic", x, y: edge.label ? y + 15 : y - 6 });
+      const below = svg("text", { class: "traffic", x, y: edge.label ? y + 29 : y + 15 });
       this.drawn.push({ above, below, edge });
       part.append(above, below);
     }

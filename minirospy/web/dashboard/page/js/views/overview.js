@@ -2,7 +2,7 @@
 
 import { fragmentOf } from "../address.js";
 import { BoardStrip } from "../board_strip.js";
-import { bandwidth, breakable, fill, h, refill, setText } from "../dom.js";
+import { bandwidth, fill, h, refill, setText } from "../dom.js";
 import { translated } from "../findings.js";
 import { TopicHealth, linesToShow, nodesOf, signatureOf, verdictOf, viewOf } from "../health.js";
 import { NAMES, linesOf, timeText } from "../logs.js";
@@ -230,7 +230,7 @@ export class Overview {
       .map(({ topic, publishers }) => ({
         status: "warning",
         check: "topics",
-        text: t("{topic} is silent: {nodes} published on it, or should, and sends nothing", {
+        text: t("{topic} is silent: {nodes} sends nothing", {
           topic,
           nodes: publishers.join(", "),
         }),
@@ -257,7 +257,7 @@ export class Overview {
           "tr",
           { class: trouble ? "bad" : "" },
           h("td", {}, mark(trouble ? "bad" : "good", trouble ? "no answer" : "it answers")),
-          h("th", { scope: "row" }, h("a", { href: fragmentOf("nodes", { node: name }) }, breakable(name))),
+          h("th", { scope: "row" }, h("a", { href: fragmentOf("nodes", { node: name }) }, name)),
           h("td", { class: "num" }, trouble ? t("no answer") : Number.isFinite(cpu) ? `${cpu.toFixed(1)} % CPU` : host),
         );
         row.dataset.node = name;
@@ -286,11 +286,7 @@ export class Overview {
           "tr",
           { class: isBad ? "bad" : "" },
           h("td", {}, mark(isBad ? "bad" : state === "flows" ? "good" : "none", title)),
-          h(
-            "th",
-            { scope: "row", title: type || null },
-            h("a", { href: linkOf(topic, state, publishers) }, breakable(topic)),
-          ),
+          h("th", { scope: "row", title: type || null }, h("a", { href: linkOf(topic, state, publishers) }, topic)),
           h("td", { class: "num", title: hz ? bandwidth(bytes) : null }, isBad ? t(STATES[state]) : rate),
         );
         row.dataset.topic = topic;
@@ -366,7 +362,10 @@ function panel(title, href, ...content) {
 }
 
 function table(name, body) {
-  return h("table", { class: "well", "aria-label": name }, body);
+  const heads = ["State", "Name", "Rate or load"].map((each) =>
+    h("th", { scope: "col" }, h("span", { class: "spoken" }, t(each))),
+  );
+  return h("table", { class: "well", "aria-label": name }, h("thead", {}, h("tr", {}, heads)), body);
 }
 
 function mark(kind, title) {
