@@ -16,7 +16,7 @@ from typing import NamedTuple
 import psutil
 import pytest
 
-from minirospy.ros.roslaunch.launcher import preload as preload_module
+from minirospy.ros.roslaunch.launcher import preloaded
 from minirospy.ros.roslaunch.launcher.preload import MIN_NODES, ForkedProcess, Preload, Start
 from tests.conftest import free_port
 from tests.ros.roslaunch.conftest import Running
@@ -301,7 +301,7 @@ def test_program_is_started_if_the_preloaded_process_was_killed(runner: Runner) 
     start = runner.start(runner.write("print(1)"))
     assert runner.forked(start).stdout == "1\n"
     for process in psutil.Process().children():
-        if str(preload_module.preloaded.__file__) in process.cmdline():
+        if str(preloaded.__file__) in process.cmdline():
             process.kill()
     assert runner.fork(start, 1, 2) is None
     assert runner.fork(start, 1, 2) is None

@@ -21,8 +21,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from minirospy.ros.roslaunch.launcher import preloaded
-
 __all__ = ["MIN_NODES", "ForkedProcess", "Preload", "Start"]
 
 MIN_NODES = 3  # similar nodes for which a preloaded process pays off
@@ -150,7 +148,8 @@ class Preload:
                 similar.setdefault(start.kind, []).append(start)
         for kind, members in similar.items():
             if len(members) >= MIN_NODES:
-                with contextlib.suppress(OSError):
+                # A Python without libffi has no ctypes.
+                with contextlib.suppress(OSError, ImportError):
                     self._parents[kind] = _Parent(members[0])
 
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
@@ -174,6 +173,10 @@ class _Parent:
     """A preloaded process, and the socket to it."""
 
     def __init__(self, start: Start) -> None:
+        # Import it here, because it imports ctypes, which few launches need.
+        from minirospy.ros.roslaunch.launcher import preloaded
+
+        self._protocol = preloaded
         self._is_ready = False
         self._socket, theirs = socket.socketpair()
         self._socket.settimeout(REPLY_SECONDS)
@@ -198,7 +201,7 @@ class _Parent:
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
         """Fork a process; return None if its program must be started as usual. Raise OSError if the process does not answer."""
         if not self._is_ready:
-            if self._socket.recv(len(preloaded.READY)) != preloaded.READY:
+            if self._socket.recv(len(self._protocol.READY)) != self._protocol.READY:
                 raise ConnectionError("the process exited, or cannot fork nodes")
             self._is_ready = True
         for fd in fds:
@@ -209,14 +212,14 @@ class _Parent:
         with open(opener, "wb", buffering=0) as starter:
             try:
                 _set_subreaper(True)
-                head = len(body).to_bytes(preloaded.LENGTH_SIZE, "little")
+                head = len(body).to_bytes(self._protocol.LENGTH_SIZE, "little")
                 socket.send_fds(self._socket, [head], [*fds, gate])
                 self._socket.sendall(body)
                 answer = self._socket.recv(64)
             finally:
                 _set_subreaper(False)
                 os.close(gate)
-            if answer == preloaded.REFUSED:
+            if answer == self._protocol.REFUSED:
                 return None
             if not answer:
                 raise ConnectionError("the process exited")

@@ -171,10 +171,10 @@ def _fork(order: Order, control: socket.socket, fds: list[int]) -> int:
             return 0
         os.close(writer)
         os.waitpid(middle, 0)
-        pid = report.read()
-    if not pid:
+        reported = report.read()
+    if not reported:
         raise ChildProcessError("the node exited before it started")
-    return int(pid)
+    return int(reported)
 
 
 def _prepare(order: Order, fds: list[int], report: int) -> None:
