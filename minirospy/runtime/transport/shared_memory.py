@@ -314,7 +314,10 @@ class RingSender:
     def answered(self, data: bytes) -> None:
         """Handle what the subscriber has sent. Call this on the loop."""
         for byte in data:
-            self.step = ring.ANSWERS.get((self.step, bytes((byte,))), self.step)
+            after = ring.ANSWERS.get((self.step, bytes((byte,))))
+            # A publishing thread may take another step meanwhile, but none from a step that waits for an answer.
+            if after:
+                self.step = after
 
     def collect(self) -> None:
         """Free the places that the subscriber has released. Call this with the ring's lock held."""
