@@ -69,6 +69,7 @@ class Examiner:
             try:
                 if self._is_closed:
                     end_processes([process], _TIMEOUTS, lambda _: None)
+                assert isinstance(process.popen, subprocess.Popen)  # only roslaunch's nodes are forked
                 output, _ = process.popen.communicate()
             finally:
                 self._process = None
