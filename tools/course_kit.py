@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import html
 import re
-import shutil
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -30,6 +29,10 @@ EXERCISE = ("Exercise", "Aufgabe")
 CHECK = re.compile(r"`(minirospy check \w+)")
 LINK = re.compile(r"\[([^\]]+)\]\([^)]*\)")
 PROGRAM = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LANGUAGES = re.compile(
+    r"^(?:\[English\]\([^)]*\) \| Deutsch|English \| \[Deutsch\]\([^)]*\))\n\n?", re.MULTILINE
+)
+COMMENT = re.compile(r"^<!-- Written by .*?-->\n\n?", re.MULTILINE | re.DOTALL)  # not those in a launch file
 TEACHERS = "instructor.md"
 CARD_LINES = range(5, 25)  # lines of a program on the card
 MAX_CARD_PROGRAMS = 2  # programs of a chapter on the card
@@ -189,6 +192,11 @@ def _slide(lines: list[str]) -> str:
     return "\n\n".join(shown)
 
 
+def read_page(file: Path) -> str:
+    """Return a page without the line that links to the other language, and without the translation tool's comment."""
+    return COMMENT.sub("", LANGUAGES.sub("", file.read_text(encoding="utf-8")))
+
+
 def page_names(folder: Path) -> list[str]:
     """Return the names of the chapters, in the order of index.md."""
     return re.findall(
@@ -199,15 +207,15 @@ def page_names(folder: Path) -> list[str]:
 def write_kit(pages: Path, out: Path) -> None:
     """Write the kit into a folder, which may exist."""
     names = page_names(pages)
-    texts = [(pages / name).read_text(encoding="utf-8") for name in names]
+    texts = [read_page(pages / name) for name in names]
     for folder in ("students", "teachers"):
         (out / folder).mkdir(parents=True, exist_ok=True)
     for name, text in zip(names, texts, strict=True):
         (out / "students" / name).write_text(without_solutions(text), encoding="utf-8")
         (out / "teachers" / name).write_text(text, encoding="utf-8")
     for name in ("index.md", TEACHERS):
-        shutil.copyfile(pages / name, out / "teachers" / name)
-    index = (pages / "index.md").read_text(encoding="utf-8")
+        (out / "teachers" / name).write_text(read_page(pages / name), encoding="utf-8")
+    index = read_page(pages / "index.md")
     # The page for teachers and the record of the course have the solutions.
     kept = [each for each in index.split("\n\n") if TEACHERS not in each]
     (out / "students" / "index.md").write_text("\n\n".join(kept), encoding="utf-8")

@@ -116,6 +116,7 @@ def _check(
     if one_master and join is None:
         raise Misuse("--one-master needs --join URI")
     if join is not None or name is not None:
+        from minirospy.course.results import class_master
         from minirospy.course.results import join as join_class
 
         join_class(record, join or "", name or "")
@@ -123,7 +124,13 @@ def _check(
         if one_master:
             _print_exports(record)
             return 0
-        print(f"{record.to_parameter()['student']}: results go to {record.master or environment.master_uri}")
+        uri = class_master(record, environment)
+        where = (
+            f"results go to {uri}"
+            if uri
+            else "results stay on this computer; --join URI sends them to the teacher"
+        )
+        print(f"{record.to_parameter()['student']}: {where}")
         if exercise is None and not share:
             return 0
     if exercise is not None and (share or shows_class or snapshot is not None):

@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING
 
 from minirospy.base.child_lifetime import guard_children
@@ -65,6 +66,7 @@ def _demo(presses: int | None) -> int:
 
     with (
         guard_children(),
+        _exit_on_signals(),
         _own_world() as folder,
         _launched(folder / "roslaunch.log") as launch,
         Board() as board,
@@ -91,6 +93,33 @@ def _is_dumb() -> bool:
     from rich.console import Console
 
     return Console().is_dumb_terminal
+
+
+@contextlib.contextmanager
+def _exit_on_signals() -> Iterator[None]:
+    """Raise SystemExit at SIGTERM, and at SIGHUP except under nohup, so that the ``finally`` blocks stop roslaunch.
+
+    Further signals do not interrupt them.
+    """
+
+    def leave(number: int, _: FrameType | None) -> None:
+        for each in before:
+            signal.signal(each, signal.SIG_IGN)
+        raise SystemExit(128 + number)
+
+    found = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
+    before = {
+        number: signal.getsignal(number)
+        for number in found
+        if number is not None and signal.getsignal(number) != signal.SIG_IGN
+    }
+    for number in before:
+        signal.signal(number, leave)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextlib.contextmanager

@@ -30,6 +30,7 @@ __all__ = [
     "Record",
     "Result",
     "Student",
+    "class_master",
     "class_table",
     "gather",
     "join",
@@ -55,7 +56,7 @@ class Result:
 
 @dataclass
 class Record:
-    """The results of this computer, the student's name, and the URI of the class's master (empty: ROS_MASTER_URI)."""
+    """The results of this computer, the student's name, and the URI of the class's master (empty: see `class_master`)."""
 
     path: Path
     student: str = ""
@@ -161,12 +162,25 @@ def join(record: Record, uri: str, name: str) -> None:
         send(record, uri)
 
 
+def class_master(record: Record, environment: Environment) -> str:
+    """Return the URI of the class's master: that of `--join`, or that of ROS_MASTER_URI if it is on another computer.
+
+    Return an empty string if there is none. A master on this computer is the student's own: the results would be extra
+    parameters in the output of `rosparam list`, which the pages of the course show.
+    """
+    if record.master:
+        return record.master
+    return "" if environment.master_is_local else environment.master_uri
+
+
 def publish(record: Record, environment: Environment) -> str:
     """Send the record to the class's master. Return its URI, or an empty string if there is no such master.
 
     Raise MasterUnreachableError only if the student has joined a class whose master does not respond.
     """
-    uri = record.master or environment.master_uri
+    uri = class_master(record, environment)
+    if not uri:
+        return ""
     try:
         send(record, uri)
     except MasterUnreachableError:

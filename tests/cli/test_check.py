@@ -101,7 +101,8 @@ def test_unreadable_record_counts_as_empty(command: Command) -> None:
 
 def test_result_is_at_the_master(command: Command, master: str, question: str) -> None:
     assert "No results" in command("check", "--class").out
-    assert command("check", "--name", "Anna B.").out == f"Anna B.: results go to {master}\n"
+    words = ("--join", master, "--name", "Anna B.")
+    assert command("check", *words).out == f"Anna B.: results go to {master}\n"
     assert command("check", question, "map").status == 1
     [student] = gather(master)
     assert student.key.startswith("Anna_B__")
@@ -114,6 +115,33 @@ def test_result_is_at_the_master(command: Command, master: str, question: str) -
     assert out[2].startswith("Anna B., question, ")
     assert command("check", question, "odom").status == 0
     assert command("check", "--class").out == "         question\nAnna B.  yes\n"
+
+
+def test_own_master_gets_no_parameters_without_join(command: Command, master: str, question: str) -> None:
+    """A student's `rosparam list` shows what the pages of the course show."""
+    proxy = MasterProxy(master, "/test")
+    before = proxy.get_param_names()
+    stays = "Anna: results stay on this computer; --join URI sends them to the teacher\n"
+    assert command("check", "--name", "Anna").out == stays
+    assert command("check", question, "odom") == (
+        0,
+        "question: A title\nWhat?: yes\nPassed: all 1 points hold.\n",
+        "",
+    )
+    assert proxy.get_param_names() == before
+    assert command("check", "--join", master).status == 0
+    assert f"{CLASS_PARAMETER}/Anna/student" in proxy.get_param_names()
+    proxy.close()
+
+
+def test_master_on_another_computer_gets_the_results(
+    command: Command, master: str, question: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A laptop whose ROS_MASTER_URI is the teacher's master needs no --join."""
+    monkeypatch.setattr("minirospy.base.environment.is_own_host", lambda host, own="": False)
+    assert command("check", "--name", "Anna").out == f"Anna: results go to {master}\n"
+    assert command("check", question, "odom").status == 0
+    assert [student.name for student in gather(master)] == ["Anna"]
 
 
 def test_one_master_is_one_command(command: Command, master: str) -> None:
@@ -150,6 +178,7 @@ def test_master_that_has_gone_does_not_fail_the_check(command: Command, question
 
 
 def test_values_that_are_no_record_are_left_out(command: Command, master: str, question: str) -> None:
+    assert command("check", "--join", master).status == 0
     assert command("check", question, "odom").status == 0
     proxy = MasterProxy(master, "/hostile")
     for key, value in {"a": 5, "b": {"student": "x"}, "c": {"student": "x", "exercises": [1]}}.items():

@@ -425,3 +425,26 @@ def test_the_demo_shows_the_led_following_and_leaves_no_file_of_its_board(
     _, left = psutil.wait_procs(boards, timeout=30)
     assert not left
     assert not list(folder.iterdir())
+
+
+@posix
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_the_demo_stops_its_nodes_at_a_signal(
+    started: list[subprocess.Popen[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    monkeypatch.delenv("MINIROSPY_BOARD")
+    monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(tmp_path / "boards"))
+    demo = start(started, "minirospy", "demo", "--presses", "1000")
+    read_until(demo, "1: button 1 released")
+    children = psutil.Process(demo.pid).children(recursive=True)
+    assert len(children) >= 4  # roslaunch, the master and both nodes
+    try:
+        demo.send_signal(number)
+        demo.communicate(timeout=100)
+        assert demo.returncode == 128 + number
+        _, left = psutil.wait_procs(children, timeout=30)
+        assert not left
+    finally:
+        for child in children:
+            with contextlib.suppress(psutil.Error):
+                child.kill()

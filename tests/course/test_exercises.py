@@ -6,20 +6,25 @@ import re
 import subprocess
 import sys
 import threading
-import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from minirospy.board.board import Board
-from minirospy.course.checker import Report, check, words_of
-from minirospy.course.exercise import Exercise, built_in_names, find_exercise
+from minirospy.course import checker
+from minirospy.course.checker import Finding, Report, check, words_of
+from minirospy.course.exercise import Exercise, Step, built_in_names, find_exercise
 
 from .conftest import PAGES
 
 EXERCISES = [find_exercise(name) for name in built_in_names()]
 WITH_PROGRAM = [exercise.name for exercise in EXERCISES if not exercise.live]
-PATIENCE = 8.0  # multiplies the time limits: tests run on loaded machines
+PATIENCE = 8.0  # multiplies the time limits of what must happen: tests run on loaded machines
+START_SECONDS = 120.0  # for a program to start or to exit
+FAILURE_SECONDS = 1.0  # time limit of an expectation that must fail
+MEASURED_SECONDS = 1.0  # time over which a rate is measured: 20 to 40 messages, or 3.5 to 6.5
 
 BALL = """
 import rospy
@@ -37,6 +42,12 @@ rospy.spin()
 GPIO.cleanup()
 """
 
+FAST = """
+<launch>
+  <include file="$(find {package})/{name}"><arg name="parameters" value="$(dirname)/fast.yaml"/></include>
+</launch>
+"""
+
 
 def solution_of(exercise: Exercise, folder: Path) -> list[str]:
     """Return the page's solution as the words of a command line."""
@@ -48,6 +59,13 @@ def solution_of(exercise: Exercise, folder: Path) -> list[str]:
         file.write_text(BALL.format(line=line[1]))
         return [str(file)]
     assert exercise.solution
+    if exercise.name == "run_parameters":
+        # The page's ten runs take ten seconds.
+        (folder / "fast.yaml").write_text("number_of_runs: 10\nled_frequency: 12\n")
+        package, _, name = exercise.solution[0].partition("/")
+        file = folder / "fast.launch"
+        file.write_text(FAST.format(package=package, name=name))
+        return [str(file)]
     return list(exercise.solution)
 
 
@@ -82,24 +100,59 @@ def test_each_expectation_has_a_hint(exercise: Exercise) -> None:
     assert [step for step in exercise.steps if step.is_expectation and not step.hint] == []
 
 
+class _FirstFailureError(Exception):
+    """Ends a check at its first failure, so that a test need not wait for the others."""
+
+    def __init__(self, finding: Finding) -> None:
+        super().__init__(str(finding))
+        self.finding = finding
+
+
+def first_failure(exercise: Exercise, programs: Sequence[str], patience: float = 1.0) -> Finding:
+    """Run a check until its first failure, and return that."""
+
+    def tell(finding: Finding) -> None:
+        if finding.holds is False:
+            raise _FirstFailureError(finding)
+
+    try:
+        report = check(exercise, programs, patience=patience, tell=tell)
+    except _FirstFailureError as failure:
+        return failure.finding
+    pytest.fail(f"nothing fails: {failed(report)}")
+
+
+def measured_quickly(step: Step) -> Step:
+    """Return a step that measures a rate, or watches LEDs, for a shorter time."""
+    if step.kind in ("still", "runs_along"):
+        return replace(step, subject=MEASURED_SECONDS)
+    return replace(step, options={**step.options, "for": MEASURED_SECONDS}) if step.kind == "rate" else step
+
+
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", WITH_PROGRAM)
 def test_solution_of_the_page_passes(name: str, workspace: Path) -> None:
     exercise = find_exercise(name)
+    exercise = replace(exercise, steps=tuple(map(measured_quickly, exercise.steps)))
     report = check(exercise, solution_of(exercise, workspace), patience=PATIENCE)
     assert report.passed, failed(report)
 
 
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", WITH_PROGRAM)
-def test_empty_program_fails_with_a_hint(name: str, tmp_path: Path) -> None:
+def test_empty_program_fails_with_a_hint(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Skip what the exercise starts first: an empty program uses none of it."""
     exercise = find_exercise(name)
+    start = next(number for number, step in enumerate(exercise.steps) if step.subject == "work")
+    exercise = replace(exercise, steps=exercise.steps[start:])
     file = tmp_path / ("empty.launch" if "launch file" in exercise.work[0].about else "empty.py")
     file.write_text("<launch/>\n" if file.suffix == ".launch" else "")
-    report = check(exercise, [str(file)], patience=0.3)
-    assert not report.passed
-    assert report.failures
-    assert report.failures[0].hint, failed(report)
+    patience = FAILURE_SECONDS / 10  # the default time limit is ten seconds
+    monkeypatch.setattr(checker, "START_SECONDS", START_SECONDS / patience)
+    finding = first_failure(exercise, [str(file)], patience)
+    assert finding.hint, finding
+    if not exercise.ends:
+        assert "it ended by itself" in finding.observed
 
 
 # The program's text, or a replacement in the page's solution; and the hint of the first failure.
@@ -109,12 +162,12 @@ WRONG = {
     "warnings": (("message.level >= Log.WARN", "True"), "The levels are numbers"),
     "square": (("math.pi / 2", "0.0"), "turn for one second"),
     "ball": (("< 80, message.data >= 80", "< 80, message.data >= 0"), "Are both pins set up"),
-    "scanner_button": (("NEAR = 0.2", "NEAR = 2.0"), "The limit is 0.2 m"),
+    "scanner_button": (("NEAR = 0.2", "NEAR = 1.0"), "The limit is 0.2 m"),
     "move_light": (("(1 if request.data else -1)", "(1)"), "False moves the light to the left"),
     "traffic_light": (('("yellow", (4, 5))', '("yellow", (4, 6))'), "The foot of a person at 0.45 m"),
     "stop_when_near": (("client.cancel_goal()", "pass"), "client.cancel_goal()"),
     "scanner_launch": (("led_actuator.py", "run_debug.py"), "Start your LED's node"),
-    "run_parameters": (("$(arg parameters)", "$(dirname)/other.yaml"), "number_of_runs and led_frequency"),
+    "run_parameters": (("fast.yaml", "other.yaml"), "number_of_runs and led_frequency"),
 }
 
 
@@ -125,8 +178,9 @@ def test_there_is_a_wrong_program_for_each_exercise() -> None:
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", WITH_PROGRAM)
 def test_wrong_program_fails_with_the_hint_for_its_mistake(
-    name: str, workspace: Path, tmp_path: Path
+    name: str, workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The expectations before the mistake hold, with long time limits; the first one that fails has its hint."""
     from minirospy.course.programs import find_command
     from minirospy.workspace.packages import Packages
 
@@ -144,29 +198,44 @@ def test_wrong_program_fails_with_the_hint_for_its_mistake(
             (tmp_path / "other.yaml").write_text("number_of_runs: 2\n")
             words[number] = str(file)
     assert changed, "the solution does not contain the text to replace"
-    report = check(exercise, words, patience=1.0)
-    assert not report.passed
-    assert any(hint in failure.hint for failure in report.failures), failed(report)
+    steps = [
+        replace(step, within=FAILURE_SECONDS if hint in step.hint else step.within * PATIENCE)
+        for step in exercise.steps
+    ]
+    monkeypatch.setattr(checker, "START_SECONDS", START_SECONDS)
+    finding = first_failure(replace(exercise, steps=tuple(steps)), words)
+    assert hint in finding.hint, finding
 
 
-def run_later(*words: str) -> threading.Thread:
-    """Run commands of minirospy, one after the other, while a check watches."""
+def typed_while_checked(
+    exercise: Exercise, first: Callable[[], object], then: Callable[[], object]
+) -> Report:
+    """Run a check while ``first`` happens, and ``then`` after the check has seen that."""
+    seen = threading.Event()
 
-    def run() -> None:
-        for word in words:
-            time.sleep(0.5)
-            subprocess.run([sys.executable, "-m", "minirospy", *word.split()], check=True)
+    def type_both() -> None:
+        first()
+        assert seen.wait(START_SECONDS)
+        then()
 
-    thread = threading.Thread(target=run)
+    thread = threading.Thread(target=type_both)
     thread.start()
-    return thread
+    report = check(exercise, [], patience=PATIENCE, tell=lambda _: seen.set())
+    thread.join()
+    return report
+
+
+def run_minirospy(words: str) -> None:
+    subprocess.run([sys.executable, "-m", "minirospy", *words.split()], check=True)
 
 
 def test_commands_of_the_page_light_the_led_of_the_own_board() -> None:
     with Board():
-        typed = run_later("board set 4 1", "board set 4 0")
-        report = check(find_exercise("board"), [])
-        typed.join()
+        report = typed_while_checked(
+            find_exercise("board"),
+            lambda: run_minirospy("board set 4 1"),
+            lambda: run_minirospy("board set 4 0"),
+        )
     assert report.passed, failed(report)
 
 
@@ -180,17 +249,15 @@ def test_package_is_created_and_deleted(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     package = tmp_path / "rpi_feros_bringup_test"
 
-    def type_commands() -> None:
+    def create() -> None:
         package.mkdir()
         (package / "package.xml").write_text("<package><name>rpi_feros_bringup_test</name></package>")
-        time.sleep(2)
+
+    def delete() -> None:
         (package / "package.xml").unlink()
         package.rmdir()
 
-    typed = threading.Thread(target=type_commands)
-    typed.start()
-    report = check(find_exercise("package"), [])
-    typed.join()
+    report = typed_while_checked(find_exercise("package"), create, delete)
     assert report.passed, failed(report)
     report = check(find_exercise("package"), [], patience=0.01)
     assert "catkin_create_pkg" in report.failures[0].hint

@@ -40,7 +40,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_students_have_each_page_without_its_solution(out: Path) -> None:
     for page in PAGES.glob("*.md"):
-        assert (out / "teachers" / page.name).read_text("utf-8") == page.read_text("utf-8")
+        assert (out / "teachers" / page.name).read_text("utf-8") == kit.read_page(page)
         if page.name == "instructor.md":
             continue
         text = (out / "students" / page.name).read_text("utf-8")
@@ -56,6 +56,28 @@ def test_students_have_each_page_without_its_solution(out: Path) -> None:
     for name in built_in_names():
         assert f"`minirospy check {name}" in students
     assert "Next: [Topics](topics.md)" in (out / "students" / "nodes.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("pages", [PAGES, PAGES / "de"], ids=["english", "german"])
+def test_pages_of_the_kit_have_neither_the_language_line_nor_comment(pages: Path, tmp_path: Path) -> None:
+    """The kit has one language, and no file that the comment names."""
+    kit.write_kit(pages, tmp_path)
+    for page in pages.glob("*.md"):
+        text = page.read_text("utf-8")
+        for folder in ("students", "teachers"):
+            made = tmp_path / folder / page.name
+            if not made.exists():
+                assert (folder, page.name) == ("students", "instructor.md")
+                continue
+            # The title is followed by the first paragraph.
+            [title, empty, paragraph] = made.read_text("utf-8").splitlines()[:3]
+            assert title == text.splitlines()[0]
+            assert empty == ""
+            assert paragraph in text
+            assert "Deutsch" not in made.read_text("utf-8")
+            assert "<!--" not in made.read_text("utf-8")
+    for name in ("slides.md", "card.html"):
+        assert "translate_course" not in (tmp_path / name).read_text("utf-8")
 
 
 @pytest.mark.parametrize(

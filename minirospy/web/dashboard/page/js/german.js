@@ -123,6 +123,7 @@ export const GERMAN = {
   "Continue": "Weiter",
   "PNG": "PNG",
   "CSV": "CSV",
+  "Parquet": "Parquet",
   "Stop": "Stopp",
   "Save": "Speichern",
   "Delete": "Löschen",
