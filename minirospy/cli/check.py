@@ -1,4 +1,4 @@
-"""`minirospy check`: run a student's program on a new master and a new virtual board, and print what holds and what does not."""
+"""`minirospy check`: run a student's program on a new master and a new virtual board, and print which expectations hold."""
 
 from __future__ import annotations
 

@@ -30,13 +30,12 @@ __all__ = [
 
 FOLDER = Path(__file__).parent / "exercises"
 
-DEFAULT_SECONDS = (
-    10.0  # time limit of an expectation without `within`: a program starts within this time on a slow laptop
-)
+# Time limit of an expectation without `within`: a program starts within this time on a slow laptop.
+DEFAULT_SECONDS = 10.0
 MAX_HERTZ = 1000.0  # the largest rate of published messages
 MAX_SECONDS = 3600.0  # the largest accepted time limit
 
-# Each kind of step with the options that it accepts besides those of all steps.
+# Each kind of step, with the options that only this kind accepts.
 ACTIONS: Mapping[str, frozenset[str]] = {
     "start": frozenset(),
     "stop": frozenset(),

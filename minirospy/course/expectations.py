@@ -1,4 +1,4 @@
-"""The expectations of exercises: each waits until it holds or its time limit has passed, and returns what was observed."""
+"""The expectations of exercises: each waits until it holds or its time limit has passed, and returns an Outcome."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _RATE_SECONDS = 3.0  # time over which a rate is measured, if an exercise does n
 
 
 class Outcome(NamedTuple):
-    """Whether an expectation holds; ``observed`` says what happened instead if it does not."""
+    """Whether an expectation holds; if not, ``observed`` describes the observation instead."""
 
     holds: bool
     observed: str = ""
@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
 
 @dataclass
 class Trial:
-    """The state of one check: its surroundings, when the last action started, and the student's answers that are left."""
+    """The state of one check: its surroundings, when the last action started, and the student's remaining answers."""
 
     world: World
     since: float = field(default_factory=time.monotonic)
@@ -337,7 +337,7 @@ def _log_entry(line: Line) -> tuple[float, str] | None:
 
 
 def _in_order(expected: list[str], texts: list[str]) -> list[int] | None:
-    """Return the places of the expected texts among ``texts``, in this order, or None if they are not there."""
+    """Return the indexes in ``texts`` of the expected texts, or None if ``texts`` does not have all of them in this order."""
     places: list[int] = []
     for each in expected:
         start = places[-1] + 1 if places else 0
@@ -457,7 +457,7 @@ def _printed(trial: Trial) -> list[Line]:
 
 
 def _or_ended(trial: Trial, fits: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a condition that also becomes true when all the student's programs have exited: nothing more will come."""
+    """Return a condition that also becomes true when all the student's programs have exited and their output is complete."""
 
     def holds() -> bool:
         has_ended = bool(trial.work) and all(each.status is not None for each in trial.work)

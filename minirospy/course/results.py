@@ -1,4 +1,4 @@
-"""What a computer has passed: a file in ROS_HOME, and a parameter at the master that the class shares.
+"""The results of a computer: a file in ROS_HOME, and a parameter at the master that the class shares.
 
 The parameter ``/minirospy_class/STUDENT`` is a dictionary: the student's name, and the exercises. A parameter stays at the
 master after the check has ended, so that the teacher's page shows it whenever it is opened.
@@ -46,7 +46,10 @@ _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a co
 
 @dataclass(frozen=True)
 class Result:
-    """The last result of one exercise: when (seconds since 1970), and what did not hold. ``ever`` is true once it was passed."""
+    """The last result of one exercise.
+
+    ``time`` is in seconds since 1970, ``failures`` has the sentences that did not hold, ``ever`` is true once it was passed.
+    """
 
     passed: bool
     time: float
@@ -194,7 +197,7 @@ def send(record: Record, uri: str) -> None:
     """Send the record to a master. Raise MasterUnreachableError if it does not respond."""
     master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=_SECONDS)
     try:
-        # One call for each part: what the computer shows now (share.py) stays.
+        # Set each part separately, which keeps the state that share.py stores under the same parameter.
         for part, value in record.to_parameter().items():
             master.set_param(f"{record.class_parameter}/{part}", value)
     finally:

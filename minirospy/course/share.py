@@ -20,8 +20,8 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 __all__ = ["share"]
 
 _POLL_SECONDS = 0.2  # an LED that blinks faster than 2.5 Hz is shown at some of its states
-_BEAT_SECONDS = 3.0  # the page shows a computer as gone after three beats without one
-_ASK_SECONDS = 2.0  # timeout for a master that does not answer
+_BEAT_SECONDS = 3.0  # between heartbeats; the page shows a computer as gone after three missed ones
+_ASK_SECONDS = 2.0  # timeout of a call to a master
 
 
 def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:

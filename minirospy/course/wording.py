@@ -1,4 +1,4 @@
-"""The sentences of a check: what each step expects, and after which action. Pure."""
+"""The sentences of a check: each describes an expectation and the action before it. Pure."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ __all__ = ["action_phrase", "button_name", "leds_text", "sentence", "shown"]
 
 
 def sentence(step: Step, after: str = "", patience: float = 1.0) -> str:
-    """Return what an expectation says, as "The LED at GPIO 7 lights within 1 s after button 1 is pressed".
+    """Return the sentence for an expectation, such as "The LED at GPIO 7 lights within 1 s after button 1 is pressed".
 
     ``after`` is the phrase of the action before it.
     """
     if step.says:
         return step.says
-    text = _claim(step)
+    text = _untimed_sentence(step)
     if step.kind in _UNTIMED:
         return text
     within = step.within * patience
@@ -27,7 +27,7 @@ def sentence(step: Step, after: str = "", patience: float = 1.0) -> str:
 
 
 def action_phrase(step: Step) -> str:
-    """Return the phrase for an action, as "button 1 is pressed"; an empty string for actions that cause nothing by themselves."""
+    """Return the phrase for an action, such as "button 1 is pressed", or an empty string if the action has no visible effect."""
     subject = step.subject
     match step.kind:
         case "press" | "click":
@@ -55,7 +55,7 @@ def button_name(pin: int) -> str:
 
 
 def leds_text(pins: Sequence[int]) -> str:
-    """Return names for LEDs, as "the LEDs at GPIO 2 and 3 are lit", or "no LED is lit"."""
+    """Return names for LEDs, such as "the LEDs at GPIO 2 and 3 are lit", or "no LED is lit"."""
     if not pins:
         return "no LED is lit"
     if len(pins) == 1:
@@ -80,7 +80,7 @@ def shown(value: object) -> str:
 _UNTIMED = frozenset({"prints_not", "answer", "rostest", "still", "runs_along"})
 
 
-def _claim(step: Step) -> str:
+def _untimed_sentence(step: Step) -> str:
     subject: Any = step.subject
     options = step.options
     of_type = f" with the type {options['type']}" if options.get("type") else ""

@@ -41,13 +41,10 @@ __all__ = ["Arrival", "World"]
 
 _POLL_SECONDS = 0.02
 _KEPT_MESSAGES = 5000  # messages kept per topic: a minute of a topic with 80 Hz
-_STOP_SECONDS = (
-    10.0  # wait for a program after Ctrl-C; roslaunch itself waits up to 15 s for a node that ignores it
-)
-_LAUNCH_STOP_SECONDS = 25.0
+_STOP_SECONDS = 10.0  # wait for a program after Ctrl-C
+_LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
+# ROS's variables that programs under test keep; the others describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
-"""ROS's variables that programs under test keep; the others describe the student's own master and network."""
-
 _GUARDIAN_SECONDS = (
     "2",
     "1",
@@ -71,7 +68,7 @@ def _keep(kept: deque[Arrival], received: Received) -> None:
 
 
 class _Repeat:
-    """A thread that publishes a message again and again."""
+    """A thread that publishes a message repeatedly."""
 
     def __init__(self, publisher: TopicPublisher, message: Message, rate: float) -> None:
         self._ended = threading.Event()
@@ -92,7 +89,7 @@ class _Repeat:
 class World:
     """Context manager for the surroundings of one check. ``patience`` multiplies all time limits.
 
-    ``board``: the virtual board; ``environment``: that of the programs; ``programs``: all that were started, in order.
+    ``board`` is the virtual board, ``environment`` the programs' environment, ``programs`` all started programs, in order.
     """
 
     def __init__(

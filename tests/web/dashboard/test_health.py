@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xmlrpc.client import ServerProxy
 
 import pytest
@@ -46,13 +46,13 @@ def test_findings_are_those_of_the_doctor(serve: Callable[..., Served]) -> None:
 def test_pages_that_ask_at_once_get_one_examination(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
     examiner = Examiner(master)
     started: list[object] = []
-    popen = subprocess.Popen
 
-    def count(*words: object, **options: object) -> object:
-        started.append(words)
-        return popen(*words, **options)  # type: ignore[call-overload]
+    class CountedPopen(subprocess.Popen[bytes]):
+        def __init__(self, *words: Any, **options: Any) -> None:
+            started.append(words)
+            super().__init__(*words, **options)
 
-    monkeypatch.setattr(subprocess, "Popen", count)
+    monkeypatch.setattr(subprocess, "Popen", CountedPopen)
     found: list[object] = []
     threads = [threading.Thread(target=lambda: found.append(examiner.findings())) for _ in range(3)]
     for thread in threads:
