@@ -23,7 +23,6 @@ from minirospy.web.dashboard.views import VIEWS, link
 __all__ = ["Frame", "view"]
 
 _HEIGHT = 420  # pixels
-_NO_MASTER = "no ROS master answers"  # the dashboard waits for one before it prints its link
 
 
 class Frame:
@@ -65,7 +64,8 @@ def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterabl
 
     ``name``: plot, 3d, graph, image, console or another view; ``height``: pixels; ``fields``: the view's settings in its
     link, as ``path="/odom/twist/twist/linear/x"`` of a plot or ``topic="/camera/image_raw"`` of an image. The first call
-    starts the dashboard. Raise MinirospyError if there is no such view, or the dashboard does not start.
+    starts the dashboard; while there is no master, the view says how to start one. Raise MinirospyError if there is no such
+    view, or the dashboard does not start.
     """
     if name not in VIEWS:
         known = ", ".join(VIEWS)
@@ -102,8 +102,5 @@ def _start() -> _Dashboard:
             # Discard the rest, so that the process never waits for a reader.
             threading.Thread(target=deque, args=(process.stdout, 0), daemon=True).start()
             return _Dashboard(process, url)
-        if _NO_MASTER in line:
-            process.kill()
-            break
     said.append(process.communicate()[0])  # also closes the pipes
     raise MinirospyError(f"the dashboard did not start: {''.join(said).strip()}")

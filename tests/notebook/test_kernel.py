@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import urllib.error
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -148,11 +149,25 @@ def test_dashboard_survives_an_interrupt_of_the_kernel_and_its_group(master: str
         kernel.stdin.close()
 
 
-def test_view_without_a_master_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
-    with pytest.raises(
-        MinirospyError, match=r"the dashboard did not start: .*no ROS master answers at http://localhost:1"
-    ):
+def test_view_without_a_master_says_so() -> None:
+    environ = {**os.environ, "ROS_MASTER_URI": "http://localhost:1"}
+    with subprocess.Popen(
+        [sys.executable, "-c", SHOW], env=environ, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as kernel:
+        assert kernel.stdout
+        kernel.stdout.readline()
+        base, _, token = kernel.stdout.readline().strip().partition("#/graph?token=")
+        request = urllib.request.Request(f"{base}status", headers={"Authorization": f"Bearer {token}"})
+        with pytest.raises(urllib.error.HTTPError, match="503") as refused:
+            urllib.request.urlopen(request, timeout=30)
+        assert b"no ROS master answers at http://localhost:1" in refused.value.read()
+        assert kernel.stdin
+        kernel.stdin.close()
+
+
+def test_dashboard_that_cannot_start_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "localhost")
+    with pytest.raises(MinirospyError, match=r"the dashboard did not start: .*ROS_MASTER_URI"):
         view("plot")
 
 
