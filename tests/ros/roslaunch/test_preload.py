@@ -209,9 +209,15 @@ def test_forked_program_ends_like_a_started_one(tmp_path: Path, unbuffered: str)
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP])
 def test_signal_ends_a_forked_program_like_a_started_one(runner: Runner, number: signal.Signals) -> None:
-    # The traceback names one line, whenever the signal arrives.
     start = runner.start(runner.write("import os, time\nos.write(1, b'ready\\n') and time.sleep(60)\n"))
-    result = runner.both(start, lambda pid: os.killpg(pid, number))
+
+    def end(pid: int) -> None:
+        # The traceback marks the call that the signal interrupts.
+        while psutil.Process(pid).status() != psutil.STATUS_SLEEPING:
+            pass
+        os.killpg(pid, number)
+
+    result = runner.both(start, end)
     assert result.status == -number
 
 
