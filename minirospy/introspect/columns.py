@@ -11,8 +11,11 @@ from enum import Enum
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-__all__ = ["Column", "Kind", "columns", "leaves"]
+from minirospy.base.errors import BagError
 
+__all__ = ["MAX_COLUMNS", "Column", "Kind", "columns", "leaves"]
+
+MAX_COLUMNS = 20_000  # of a table; a scan has some 3,000
 _NUMBERS = {
     *("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"),
     *("float32", "float64", "bool", "char", "byte"),
@@ -60,7 +63,10 @@ def _class_of(message_class: Any, name: str, type_: str) -> Any:
 
 
 def columns(messages: Sequence[Any]) -> list[Column]:
-    """Return the columns of messages, which must all be of the same type. No messages have no columns."""
+    """Return the columns of messages, which must all be of the same type. No messages have no columns.
+
+    Raise BagError if an array has values for more than MAX_COLUMNS names.
+    """
     if not messages:
         return []
     fields = list(leaves(type(messages[0])))
@@ -102,6 +108,8 @@ def _belong(names: Sequence[Any], values: Sequence[Any]) -> bool:
 
 def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[Any]]) -> Iterator[Column]:
     known = list(dict.fromkeys(name for own in names for name in own))
+    if len(known) > MAX_COLUMNS:
+        raise BagError(f"{path} has values for more than {MAX_COLUMNS:,} names: too many columns for a table")
     found: dict[str, list[Any]] = {name: [None] * len(values) for name in known}
     for row, (own, array) in enumerate(zip(names, values, strict=True)):
         for name, value in zip(own, array, strict=False):

@@ -20,6 +20,7 @@ from minirospy.base.errors import BagError, NotFoundError, UsageError
 from minirospy.core.bag.writer import BagWriter
 from minirospy.introspect import bag_export
 from minirospy.introspect.bag_export import export, file_name
+from minirospy.introspect.columns import columns
 
 SECOND = 10**9
 
@@ -89,6 +90,29 @@ def test_batches_with_other_columns_are_one_table(tmp_path: Path, monkeypatch: p
     rows = table(tmp_path, messages)
     assert [sum(row[f"ranges[{index}]"] != "" for index in range(3)) for row in rows] == [1, 0, 3, 2, 0]
     assert list(rows[0])[-3:] == ["ranges[0]", "ranges[1]", "ranges[2]"]
+
+
+def test_table_with_too_many_columns_is_refused(tmp_path: Path) -> None:
+    wide = [TFMessage([])] * 3 + [TFMessage([TransformStamped()] * 2_500)]
+    names = [JointState(name=[f"{second}_{each}" for each in range(5_001)]) for second in range(5)]
+    for message in names:
+        message.position = [0.0] * len(message.name)
+    bag = write(tmp_path / "a.bag", {"/tf": wide, "/joints": names})
+    for topic, text in (("/tf", "topic /tf has too many columns"), ("/joints", "position has values for")):
+        with pytest.raises(BagError, match=f"{text}.*more than 20,000|{text} more than 20,000 names"):
+            export(bag, [topic], str(tmp_path), "csv")
+    assert [each.name for each in tmp_path.iterdir()] == ["a.bag"]
+
+
+def test_batches_have_a_limited_number_of_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bag_export, "_MAX_CELLS", 800)
+    rows: list[int] = []
+    monkeypatch.setattr(
+        bag_export, "columns", lambda messages: rows.append(len(messages)) or columns(messages)
+    )
+    scans = [LaserScan(ranges=[1.0] * count) for count in (1, 1, 1, 100, 1)]
+    assert [row["ranges[99]"] for row in table(tmp_path, scans)] == ["", "", "", "1.0", ""]
+    assert rows[:3] == [3, 1, 1]  # none beside the long one in the first pass
 
 
 def test_bytes_are_left_out_and_named(tmp_path: Path) -> None:
