@@ -116,7 +116,14 @@ def _export_topic(
     types = sorted({each.type for each in connections})
     if len(types) > 1:
         raise BagError(f"topic {topic} has messages of several types: {', '.join(types)}")
-    message_class = class_of_connection(connections[0], warn)
+    definitions = {(each.md5sum, each.definition): each for each in connections}
+    classes = [class_of_connection(each, warn) for each in definitions.values()]
+    message_class = classes[0]
+    md5sums = sorted({each._md5sum for each in classes})
+    if len(md5sums) > 1:
+        raise BagError(
+            f"topic {topic} has messages of several definitions of {types[0]}, with the md5sums {', '.join(md5sums)}"
+        )
     fields = list(leaves(message_class))
     is_fixed = format_ == "csv" and not any(field.type.endswith("]") for field in fields)
     left_out = [

@@ -18,6 +18,7 @@ from tf2_msgs.msg import TFMessage
 
 from minirospy.base.errors import BagError, NotFoundError, UsageError
 from minirospy.core.bag.writer import BagWriter
+from minirospy.core.idl.load import class_from_text
 from minirospy.introspect import bag_export
 from minirospy.introspect.bag_export import export, file_name
 from minirospy.introspect.columns import columns
@@ -140,6 +141,14 @@ def test_mistakes_are_refused_before_anything_is_written(tmp_path: Path) -> None
         export(bag, ["/c"], folder, "csv", force=True)
     assert (tmp_path / "a_c.csv").read_text(encoding="utf-8") == "kept"
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.bag", "a_c.csv"]
+
+
+def test_topic_with_several_definitions_of_its_type_is_refused(tmp_path: Path) -> None:
+    kinds = [class_from_text("my_msgs/P", f"float64 {one}\nfloat64 {two}\n") for one, two in ("xy", "yx")]
+    bag = write(tmp_path / "a.bag", {"/p": [kind() for kind in kinds]})
+    with pytest.raises(BagError, match="several definitions of my_msgs/P"):
+        export(bag, [], str(tmp_path), "csv")
+    assert [each.name for each in tmp_path.iterdir()] == ["a.bag"]
 
 
 def test_interrupted_export_leaves_no_file(tmp_path: Path) -> None:
