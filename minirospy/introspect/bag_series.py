@@ -165,7 +165,8 @@ def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterat
         if before.time > time:
             continue
         share = (time - before.time) / (after.time - before.time) if after.time > before.time else 1.0
-        other = before.value + share * (after.value - before.value)
+        # Use a point at exactly this time as it is: the one before it may be NaN.
+        other = after.value if share == 1.0 else before.value + share * (after.value - before.value)
         yield Point(f"{label} - {after.label}", time, value - other)
 
 

@@ -110,6 +110,12 @@ def test_difference_is_interpolated_at_the_times_of_the_first() -> None:
     assert both == series("/a - /b", (1, -10))
 
 
+@pytest.mark.parametrize("neighbour", [math.nan, math.inf, 1e300])
+def test_difference_uses_a_point_of_the_same_time_as_it_is(neighbour: float) -> None:
+    second = series("/b", (0, neighbour), (1, 3))
+    assert list(bag_series.differences(series("/a", (1, 5)), second)) == series("/a - /b", (1, 2))
+
+
 def test_difference_uses_the_first_of_several_series() -> None:
     many = [Point("/a/x", 0, 5), Point("/a/y", 0, 50), Point("/a/x", 1, 6), Point("/a/y", 1, 60)]
     assert [each.value for each in bag_series.differences(many, many)] == [0, 0]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from minirospy.base.errors import BagError, BagUnindexedError, MinirospyError, UsageError
 from minirospy.core.bag.base import BagReader
 from minirospy.introspect import bag_series
-from minirospy.introspect.bag_series import Sampler
+from minirospy.introspect.bag_series import FieldPath, Sampler
 from minirospy.introspect.bags import open_reader
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.json_session import Fields, number, text_of
@@ -18,9 +18,8 @@ __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
 _MAX_COLUMNS = 10_000
 _MAX_SERIES = 100  # paths in one request
-_MARGIN_SECONDS = (
-    10.0  # read before and after a range, so that a subtrahend has points around each of the minuend's
-)
+_MARGIN_SECONDS = 10.0  # read before a range, so that a subtrahend has a point before each of the minuend's
+_WIDER = 4  # times, if the subtrahend has no point there
 
 
 class Operand(NamedTuple):
@@ -141,13 +140,9 @@ def _read(
             subtrahend = bag_series.field_path(
                 minus.path, {each.topic for each in other.connections.values()}
             )
-            margin = max(_MARGIN_SECONDS, (shown[1] - shown[0]) / 10)
-            around = bag_series.points(
-                other,
-                [subtrahend],
-                None if start is None else max(0.0, start - margin),
-                None if end is None else end + margin,
-            )
+            # Read on behind the end as far as the difference needs it.
+            before = None if start is None else _start_before(other, subtrahend, start, on_time)
+            around = bag_series.points(other, [subtrahend], before, None, on_time)
             difference = bag_series.differences((point for _, point in found), (point for _, point in around))
             found = ((0, point) for point in difference)
         samplers = bag_series.sample(found, len(paths), *shown, request.columns)
@@ -157,6 +152,18 @@ def _read(
             errors[key] = f"no number at {path.topic} in the messages of this bag"
         series += [_series(key, label, sampler, length) for label, sampler in own.items()]
     return series
+
+
+def _start_before(
+    reader: BagReader, path: FieldPath, start: float, on_time: Callable[[float], object]
+) -> float | None:
+    """Return a time from which a series has a point before ``start``; None, the bag's start, if there is none."""
+    margin = _MARGIN_SECONDS
+    while margin < start:
+        for _ in bag_series.points(reader, [path], start - margin, start, on_time):
+            return start - margin
+        margin *= _WIDER
+    return None
 
 
 def _series(key: str, label: str, sampler: Sampler, length: float) -> Fields:
