@@ -1,7 +1,8 @@
 """Arrange the fields of messages of one type as columns. Pure.
 
 A field's column has the path of the field as its name, such as ``pose.pose.position.x``. Arrays whose values belong to the
-names in a field ``name``, as in sensor_msgs/JointState, have one column for each name: ``position[elbow]``.
+names in a field ``name``, as in sensor_msgs/JointState, have one column for each name: ``position[elbow]``. In messages with
+another number of names, the array is the value of its field, ``position``.
 """
 
 from __future__ import annotations
@@ -84,8 +85,14 @@ def columns(messages: Sequence[Any]) -> list[Column]:
         if field.type in ("time", "duration"):
             kind = Kind.TIME if field.type == "time" else Kind.DURATION
             found.append(Column(field.path, kind, [value.to_nsec() for value in values]))
-        elif names and _belong(names, values):
-            found += _named(field.path, names, values)
+        elif names and any(belong := _belong(names, values)):
+            named = [each if fits else () for each, fits in zip(values, belong, strict=True)]
+            found += _named(field.path, names, named)
+            whole = [
+                None if fits or not len(each) else each for each, fits in zip(values, belong, strict=True)
+            ]
+            if any(each is not None for each in whole):
+                found.append(Column(field.path, Kind.PLAIN, whole))
         else:
             found.append(Column(field.path, Kind.PLAIN, values))
     return found
@@ -100,10 +107,9 @@ def _names_of(field: _Leaf) -> str:
     return f"{base}{dot}name"
 
 
-def _belong(names: Sequence[Any], values: Sequence[Any]) -> bool:
-    """Return whether each array has as many values as there are names, or none."""
-    fits = (len(array) in (0, len(own)) for own, array in zip(names, values, strict=True))
-    return all(fits) and any(map(len, values))
+def _belong(names: Sequence[Any], values: Sequence[Any]) -> list[bool]:
+    """Return for each array whether it has values, as many as there are names."""
+    return [0 < len(array) == len(own) for own, array in zip(names, values, strict=True)]
 
 
 def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[Any]]) -> Iterator[Column]:

@@ -76,6 +76,17 @@ def test_joints_have_columns_by_name_and_rows_without_them_are_empty(tmp_path: P
     assert "velocity" not in rows[0]
 
 
+def test_one_message_with_another_number_of_names_changes_no_cell_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bag_export, "MAX_BATCH", 2)
+    messages = [JointState(name=["elbow"], position=[float(at)]) for at in range(5)]
+    messages[2].position = [7.0, 8.0]
+    rows = table(tmp_path, messages)
+    assert [row["position[elbow]"] for row in rows] == ["0.0", "1.0", "", "3.0", "4.0"]
+    assert [row["position[1]"] for row in rows] == ["", "", "8.0", "", ""]
+
+
 def test_elements_of_arrays_have_columns_also_in_messages_in_arrays(tmp_path: Path) -> None:
     first, second = TransformStamped(child_frame_id="a"), TransformStamped(child_frame_id="b")
     second.transform.translation.x = 2.5
