@@ -101,7 +101,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
 
         try:
             found += _read(folder, group, request, report, errors)
-        except (MinirospyError, OSError) as error:
+        except (MinirospyError, OSError, RecursionError, ValueError) as error:
             report(1.0)  # ends here if the page has left
             name = group[0].operand.bag
             text = str(error) if name in str(error) else f"{name}: {error}"
@@ -132,7 +132,7 @@ def _read(
             try:
                 paths.append(bag_series.field_path(each.operand.path, topics))
                 keys.append(each.key)
-            except MinirospyError as error:
+            except (MinirospyError, RecursionError, ValueError) as error:
                 errors[each.key] = str(error)
         found = bag_series.points(reader, paths, start, end, on_time)
         if minus := group[0].minus:

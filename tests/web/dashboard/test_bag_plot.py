@@ -116,6 +116,15 @@ def test_range_of_a_difference_uses_points_far_outside_of_it(tmp_path: Path) -> 
     assert found["values"] == [3.5]
 
 
+@pytest.mark.parametrize("path", ["/camera/height[" + "9" * 5_000 + "]", "/camera" + "/a" * 1_000])
+def test_extreme_path_fails_alone(tmp_path: Path, path: str) -> None:
+    make_bag(tmp_path / "run.bag")
+    good = {"key": "a", "bag": "run.bag", "path": "/camera/height"}
+    answer = ask(tmp_path, good, {"key": "b", "bag": "run.bag", "path": path})
+    assert [each["key"] for each in answer["found"]] == ["a"]
+    assert answer["errors"].keys() == {"b"}
+
+
 @pytest.mark.parametrize(
     "fields",
     [
