@@ -12,6 +12,7 @@ from std_msgs.msg import Float64
 
 from minirospy.base.errors import BagError, UsageError
 from minirospy.core.bag.writer import BagWriter
+from minirospy.introspect import bag_series
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.bag_plot import SeriesRequest, fields_of, series_of
 from tests.web.dashboard.bags import SECOND, START, make_bag
@@ -144,6 +145,18 @@ def test_wrong_requests_are_refused(fields: Any) -> None:
 def test_number_of_paths_is_limited() -> None:
     with pytest.raises(UsageError, match="at most"):
         asked(*[{"key": "a", "bag": "b", "path": "/c"}] * 101)
+
+
+def test_path_above_the_number_of_series_has_a_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_bag(tmp_path / "run.bag")
+    make_bag(tmp_path / "other.bag")
+    monkeypatch.setattr(bag_series, "MAX_SERIES", 1)
+    bags = ("run.bag", "other.bag")
+    answer = ask(tmp_path, *({"key": bag, "bag": bag, "path": "/camera/height"} for bag in bags))
+    assert [each["key"] for each in answer["found"]] == ["run.bag"]
+    assert answer["errors"] == {"other.bag": "a plot has at most 1 series of bags"}
 
 
 def test_reading_ends_if_the_page_leaves(tmp_path: Path) -> None:
