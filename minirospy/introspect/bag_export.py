@@ -89,7 +89,8 @@ def export(
         targets = {
             topic: os.path.join(folder, file_name(bag, topic, format_)) for topic in dict.fromkeys(chosen)
         }
-        if len(set(targets.values())) < len(targets):
+        # Some file systems do not tell capital letters from small ones.
+        if len({target.casefold() for target in targets.values()}) < len(targets):
             raise UsageError("two of these topics have the same file name: export them into two folders")
         for target in targets.values():
             if os.path.lexists(target) and not force:
@@ -326,6 +327,10 @@ class _ParquetWriter(_Writer):
         self._writer = writer
 
     def write(self, batch: _Batch) -> None:
+        if (latest := max(batch.times)) > _MAX_INT64:
+            raise BagError(
+                f"a message's time of receipt, {latest:,} ns, is too late for Parquet: export the topic as CSV"
+            )
         nothing = [None] * len(batch.times)
         arrays = []
         for field in self._schema:

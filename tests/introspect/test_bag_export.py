@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import TransformStamped
+from mcap.writer import Writer as McapWriter
 from rospy import Duration
 from sensor_msgs.msg import Image, JointState, LaserScan
 from std_msgs.msg import Bool, String, UInt64
@@ -136,7 +137,8 @@ def test_bytes_are_left_out_and_named(tmp_path: Path) -> None:
 
 def test_mistakes_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     bag = write(
-        tmp_path / "a.bag", {"/a/b": [String("x")], "/a_b": [String("x")], "/c": [String("x"), Bool(True)]}
+        tmp_path / "a.bag",
+        {"/a/b": [String("x")], "/a_b": [String("x")], "/c": [String("x"), Bool(True)], "/C": [String("x")]},
     )
     (tmp_path / "a_c.csv").write_text("kept", encoding="utf-8")
     folder = str(tmp_path)
@@ -146,6 +148,8 @@ def test_mistakes_are_refused_before_anything_is_written(tmp_path: Path) -> None
         export(bag, ["/a/b", "/d"], folder, "csv")
     with pytest.raises(UsageError, match="same file name"):
         export(bag, ["/a/b", "/a_b"], folder, "csv")
+    with pytest.raises(UsageError, match="same file name"):
+        export(bag, ["/c", "/C"], folder, "csv", force=True)
     with pytest.raises(UsageError, match="exists already"):
         export(bag, ["/a/b", "/c"], folder, "csv")
     with pytest.raises(BagError, match="several types"):
@@ -202,6 +206,22 @@ def test_parquet_has_typed_columns(tmp_path: Path) -> None:
     assert parquet.read_table(paths["a_n"])["data"].to_pylist() == [2**64 - 1]
     assert parquet.read_table(paths["a_b"])["data"].to_pylist() == [True]
     assert str(parquet.read_table(paths["a_d"]).schema.field("data").type) == "duration[ns]"
+
+
+def test_time_that_parquet_does_not_have_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow.parquet")
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros1", "test")
+        schema = writer.register_schema("std_msgs/String", "ros1msg", b"string data\n")
+        channel = writer.register_channel("/s", "ros1", schema, {"md5sum": String._md5sum})
+        writer.add_message(channel, log_time=2**63, publish_time=0, data=b"\1\0\0\0x")
+        writer.finish()
+    with pytest.raises(BagError, match="9,223,372,036,854,775,808 ns, is too late for Parquet"):
+        export(str(tmp_path / "a.mcap"), [], str(tmp_path), "parquet")
+    assert [each.name for each in tmp_path.iterdir()] == ["a.mcap"]
+    [found] = export(str(tmp_path / "a.mcap"), [], str(tmp_path), "csv")
+    assert "9223372036.854775808,x" in Path(found.path).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
