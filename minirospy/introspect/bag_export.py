@@ -21,13 +21,13 @@ from minirospy.base.installation import install_command
 from minirospy.core.bag.base import BagReader
 from minirospy.core.bag.records import Connection
 from minirospy.introspect.bags import class_of_connection, naming_full_disk, open_reader
-from minirospy.introspect.columns import Column, Kind, columns, leaves
+from minirospy.introspect.columns import MAX_COLUMNS, Column, Kind, columns, leaves
 
 __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
 MAX_BATCH = 2_000  # messages
-_BATCH_BYTES = 8_000_000  # of serialized messages, as of scans
+_MAX_CELLS = 8_000_000  # of a batch; a cell of a message is at least one byte of it
 _MAX_ELEMENTS = 10_000  # of an array that have columns
 _SECOND = 10**9
 _MAX_INT64 = (1 << 63) - 1
@@ -89,7 +89,8 @@ def export(
         targets = {
             topic: os.path.join(folder, file_name(bag, topic, format_)) for topic in dict.fromkeys(chosen)
         }
-        if len(set(targets.values())) < len(targets):
+        # Some file systems do not tell capital letters from small ones.
+        if len({target.casefold() for target in targets.values()}) < len(targets):
             raise UsageError("two of these topics have the same file name: export them into two folders")
         for target in targets.values():
             if os.path.lexists(target) and not force:
@@ -116,7 +117,14 @@ def _export_topic(
     types = sorted({each.type for each in connections})
     if len(types) > 1:
         raise BagError(f"topic {topic} has messages of several types: {', '.join(types)}")
-    message_class = class_of_connection(connections[0], warn)
+    definitions = {(each.md5sum, each.definition): each for each in connections}
+    classes = [class_of_connection(each, warn) for each in definitions.values()]
+    message_class = classes[0]
+    md5sums = sorted({each._md5sum for each in classes})
+    if len(md5sums) > 1:
+        raise BagError(
+            f"topic {topic} has messages of several definitions of {types[0]}, with the md5sums {', '.join(md5sums)}"
+        )
     fields = list(leaves(message_class))
     is_fixed = format_ == "csv" and not any(field.type.endswith("]") for field in fields)
     left_out = [
@@ -125,17 +133,18 @@ def _export_topic(
         if field.type.partition("[")[0] in ("uint8", "char") and "[" in field.type
     ]
 
-    schema = _Schema()
+    schema = _Schema(topic)
     if is_fixed:
         schema.columns = {_field_name(field.path): _Cells() for field in fields}
     else:
-        for batch in _batches(reader, connections, message_class, lambda count: add(0)):
+        for batch in _batches(reader, connections, message_class, lambda count: add(0), MAX_BATCH):
             schema.widen(batch)
     partial = f"{target}.active"
     rows = 0
     try:
         with naming_full_disk(target), _writer(format_, partial, schema) as writer:
-            for batch in _batches(reader, connections, message_class, add):
+            most = min(MAX_BATCH, _MAX_CELLS // (len(schema.columns) + 1))
+            for batch in _batches(reader, connections, message_class, add, most):
                 writer.write(batch)
                 rows += len(batch.times)
         private_files.replace_file(partial, target)
@@ -147,12 +156,23 @@ def _export_topic(
 
 
 def _batches(
-    reader: BagReader, connections: Sequence[Connection], message_class: Any, add: Callable[[int], None]
+    reader: BagReader,
+    connections: Sequence[Connection],
+    message_class: Any,
+    add: Callable[[int], None],
+    most: int,
 ) -> Iterator[_Batch]:
+    topic = connections[0].topic
     times: list[int] = []
     messages: list[Any] = []
     size = 0
+    largest = 0  # bytes of a message: each row of the batch may have as many cells
     for stored in reader.messages([each.id for each in connections]):
+        largest = max(largest, len(stored.body))
+        if times and (len(times) == most or (len(times) + 1) * largest > _MAX_CELLS):
+            yield _batch(topic, times, messages)
+            add(size)
+            times, messages, size, largest = [], [], 0, len(stored.body)
         message = message_class()
         try:
             message.deserialize(stored.body)
@@ -163,17 +183,22 @@ def _batches(
         times.append(stored.time)
         messages.append(message)
         size += len(stored.body)
-        if len(times) >= MAX_BATCH or size >= _BATCH_BYTES:
-            yield _batch(times, messages)
-            add(size)
-            times, messages, size = [], [], 0
     if times:
-        yield _batch(times, messages)
+        yield _batch(topic, times, messages)
         add(size)
 
 
-def _batch(times: list[int], messages: list[Any]) -> _Batch:
-    return _Batch(times, {_field_name(name): column for name, column in _flat(columns(messages))})
+def _batch(topic: str, times: list[int], messages: list[Any]) -> _Batch:
+    found: dict[str, Column] = {}
+    for name, column in _flat(columns(messages)):
+        found[_field_name(name)] = column
+        _check_width(topic, len(found))
+    return _Batch(times, found)
+
+
+def _check_width(topic: str, width: int) -> None:
+    if width > MAX_COLUMNS:
+        raise BagError(f"topic {topic} has too many columns for a table: more than {MAX_COLUMNS:,}")
 
 
 def _field_name(name: str) -> str:
@@ -233,13 +258,15 @@ class _Cells:
 class _Schema:
     """The columns of all batches, by name, in the order of their first appearance."""
 
-    def __init__(self) -> None:
+    def __init__(self, topic: str) -> None:
         self.columns: dict[str, _Cells] = {}
+        self._topic = topic
 
     def widen(self, batch: _Batch) -> None:
         """Include a batch's columns."""
         for name, column in batch.columns.items():
             self.columns.setdefault(name, _Cells()).widen(column)
+            _check_width(self._topic, len(self.columns))
 
 
 # --- writers
@@ -300,6 +327,10 @@ class _ParquetWriter(_Writer):
         self._writer = writer
 
     def write(self, batch: _Batch) -> None:
+        if (latest := max(batch.times)) > _MAX_INT64:
+            raise BagError(
+                f"a message's time of receipt, {latest:,} ns, is too late for Parquet: export the topic as CSV"
+            )
         nothing = [None] * len(batch.times)
         arrays = []
         for field in self._schema:

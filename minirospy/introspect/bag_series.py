@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BagTopic",
+    "Budget",
     "FieldPath",
     "Point",
     "Sampler",
@@ -33,6 +34,8 @@ __all__ = [
 ]
 
 MAX_EXACT = 20_000  # points of a series that are returned as they are; the page draws at most 6,000
+MAX_POINTS = 2_000_000  # exact points of all series in a request, 16 bytes each
+MAX_SERIES = 200  # in a request
 MAX_LABELS = 50  # series from one path; slices of slices could select more
 _SECOND = 10**9
 
@@ -165,7 +168,8 @@ def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterat
         if before.time > time:
             continue
         share = (time - before.time) / (after.time - before.time) if after.time > before.time else 1.0
-        other = before.value + share * (after.value - before.value)
+        # Use a point at exactly this time as it is: the one before it may be NaN.
+        other = after.value if share == 1.0 else before.value + share * (after.value - before.value)
         yield Point(f"{label} - {after.label}", time, value - other)
 
 
@@ -178,19 +182,28 @@ def _first_series(found: Iterable[Point]) -> Iterator[Point]:
             yield point
 
 
+class Budget:
+    """The numbers of exact points and of series that a request may still add."""
+
+    def __init__(self) -> None:
+        self.points = MAX_POINTS
+        self.series = MAX_SERIES
+
+
 class Sampler:
     """The points of one series from ``start`` to ``end`` (seconds), added in time order.
 
-    Up to MAX_EXACT points are kept as they are. Of more, each of ``columns`` equal parts of the time keeps its lowest and its
-    highest point.
+    Up to MAX_EXACT points are kept as they are, as long as the budget has points. Of more, each of ``columns`` equal parts of the
+    time keeps its lowest and its highest point.
     """
 
-    def __init__(self, start: float, end: float, columns: int) -> None:
+    def __init__(self, start: float, end: float, columns: int, budget: Budget | None = None) -> None:
         self.count = 0  # all points that were added
         self.times = array("d")
         self.values = array("d")
         self._start = start
         self._width = max(end - start, 1e-9) / max(columns, 1)
+        self._budget = budget or Budget()
         self._columns: dict[int, list[float]] | None = None  # column -> low, its time, high, its time
 
     @property
@@ -206,10 +219,13 @@ class Sampler:
             return
         self.times.append(time)
         self.values.append(value)
-        if len(self.times) > MAX_EXACT:
+        self._budget.points -= 1
+        if len(self.times) > MAX_EXACT or self._budget.points < 0:
             self._columns = {}
             for at, each in zip(self.times, self.values, strict=True):
                 self._widen(at, each)
+            self._budget.points += len(self.times)
+            self.times, self.values = array("d"), array("d")
 
     def _widen(self, time: float, value: float) -> None:
         assert self._columns is not None
@@ -236,16 +252,23 @@ class Sampler:
 
 
 def sample(
-    found: Iterable[tuple[int, Point]], count: int, start: float, end: float, columns: int
+    found: Iterable[tuple[int, Point]],
+    count: int,
+    start: float,
+    end: float,
+    columns: int,
+    budget: Budget | None = None,
 ) -> list[dict[str, Sampler]]:
-    """Return, for each of ``count`` paths, its series' samplers by label."""
+    """Return, for each of ``count`` paths, its series' samplers by label. Series above the budget are left out."""
+    budget = budget or Budget()
     samplers: list[dict[str, Sampler]] = [{} for _ in range(count)]
     for number, (label, time, value) in found:
         own = samplers[number]
         sampler = own.get(label)
         if sampler is None:
-            if len(own) == MAX_LABELS:
+            if len(own) == MAX_LABELS or not budget.series:
                 continue
-            sampler = own[label] = Sampler(start, end, columns)
+            budget.series -= 1
+            sampler = own[label] = Sampler(start, end, columns, budget)
         sampler.add(time, value)
     return samplers

@@ -1,7 +1,8 @@
 """Arrange the fields of messages of one type as columns. Pure.
 
 A field's column has the path of the field as its name, such as ``pose.pose.position.x``. Arrays whose values belong to the
-names in a field ``name``, as in sensor_msgs/JointState, have one column for each name: ``position[elbow]``.
+names in a field ``name``, as in sensor_msgs/JointState, have one column for each name: ``position[elbow]``. In messages with
+another number of names, the array is the value of its field, ``position``.
 """
 
 from __future__ import annotations
@@ -11,8 +12,11 @@ from enum import Enum
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-__all__ = ["Column", "Kind", "columns", "leaves"]
+from minirospy.base.errors import BagError
 
+__all__ = ["MAX_COLUMNS", "Column", "Kind", "columns", "leaves"]
+
+MAX_COLUMNS = 20_000  # of a table; a scan has some 3,000
 _NUMBERS = {
     *("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"),
     *("float32", "float64", "bool", "char", "byte"),
@@ -60,7 +64,10 @@ def _class_of(message_class: Any, name: str, type_: str) -> Any:
 
 
 def columns(messages: Sequence[Any]) -> list[Column]:
-    """Return the columns of messages, which must all be of the same type. No messages have no columns."""
+    """Return the columns of messages, which must all be of the same type. No messages have no columns.
+
+    Raise BagError if an array has values for more than MAX_COLUMNS names.
+    """
     if not messages:
         return []
     fields = list(leaves(type(messages[0])))
@@ -78,8 +85,14 @@ def columns(messages: Sequence[Any]) -> list[Column]:
         if field.type in ("time", "duration"):
             kind = Kind.TIME if field.type == "time" else Kind.DURATION
             found.append(Column(field.path, kind, [value.to_nsec() for value in values]))
-        elif names and _belong(names, values):
-            found += _named(field.path, names, values)
+        elif names and any(belong := _belong(names, values)):
+            named = [each if fits else () for each, fits in zip(values, belong, strict=True)]
+            found += _named(field.path, names, named)
+            whole = [
+                None if fits or not len(each) else each for each, fits in zip(values, belong, strict=True)
+            ]
+            if any(each is not None for each in whole):
+                found.append(Column(field.path, Kind.PLAIN, whole))
         else:
             found.append(Column(field.path, Kind.PLAIN, values))
     return found
@@ -94,14 +107,15 @@ def _names_of(field: _Leaf) -> str:
     return f"{base}{dot}name"
 
 
-def _belong(names: Sequence[Any], values: Sequence[Any]) -> bool:
-    """Return whether each array has as many values as there are names, or none."""
-    fits = (len(array) in (0, len(own)) for own, array in zip(names, values, strict=True))
-    return all(fits) and any(map(len, values))
+def _belong(names: Sequence[Any], values: Sequence[Any]) -> list[bool]:
+    """Return for each array whether it has values, as many as there are names."""
+    return [0 < len(array) == len(own) for own, array in zip(names, values, strict=True)]
 
 
 def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[Any]]) -> Iterator[Column]:
     known = list(dict.fromkeys(name for own in names for name in own))
+    if len(known) > MAX_COLUMNS:
+        raise BagError(f"{path} has values for more than {MAX_COLUMNS:,} names: too many columns for a table")
     found: dict[str, list[Any]] = {name: [None] * len(values) for name in known}
     for row, (own, array) in enumerate(zip(names, values, strict=True)):
         for name, value in zip(own, array, strict=False):

@@ -18,9 +18,11 @@ __all__ = ["Filter", "Named", "Slice", "Step", "parse_steps", "select"]
 
 _MAX_VALUES = 50  # series from one path, as from a whole array
 _MAX_TESTED = 10_000  # elements that a filter tests
+_MAX_PATH = 1_000  # characters; the search for a step's end is quadratic in them
+_MAX_STEPS = 50  # as messages inside messages
 
 _STEP = re.compile(
-    r"[/.](?P<name>\w+)|\[(?P<index>-?\d+)\]|\[(?P<first>\d*):(?P<last>\d*)\]"
+    r"[/.](?P<name>\w+)|\[(?P<index>-?\d{1,9})\]|\[(?P<first>\d{0,9}):(?P<last>\d{0,9})\]"
     r"|\{(?P<path>[\w./]+)\s*(?P<operator>==|!=|<=?|>=?)\s*(?:\"(?P<double>[^\"]*)\"|'(?P<single>[^']*)'|(?P<bare>[^}\"']+))\}"
     r"|\[(?:\"(?P<quoted>[^\"\][]+)\"|'(?P<apostrophe>[^'\][]+)'|(?P<word>[^\][:\"']*[^\][:\"'\d-][^\][:\"']*))\]",
     re.ASCII,
@@ -73,6 +75,8 @@ Step = str | int | Slice | Named | Filter
 
 def parse_steps(text: str) -> list[Step]:
     """Return the steps of a path behind its topic. Raise UsageError if its syntax is invalid."""
+    if len(text) > _MAX_PATH:
+        raise UsageError(f"a path behind its topic has at most {_MAX_PATH:,} characters")
     steps: list[Step] = []
     at = 0
     while at < len(text):
@@ -90,6 +94,8 @@ def parse_steps(text: str) -> list[Step]:
             steps.append(Slice(int(found["first"] or 0), int(found["last"]) if found["last"] else None))
         else:
             steps.append(Named(found["quoted"] or found["apostrophe"] or found["word"]))
+        if len(steps) > _MAX_STEPS:
+            raise UsageError(f"a path behind its topic has at most {_MAX_STEPS} steps")
         at = match.end()
     return steps
 

@@ -16,7 +16,7 @@ from minirospy.core.bag.base import BagReader
 from minirospy.core.bag.reader import open_bag
 from minirospy.core.bag.writer import BagWriter
 from minirospy.introspect import bag_series
-from minirospy.introspect.bag_series import Point, Sampler
+from minirospy.introspect.bag_series import Budget, Point, Sampler
 
 SECOND = 10**9
 START = 1_700_000_000 * SECOND
@@ -110,6 +110,12 @@ def test_difference_is_interpolated_at_the_times_of_the_first() -> None:
     assert both == series("/a - /b", (1, -10))
 
 
+@pytest.mark.parametrize("neighbour", [math.nan, math.inf, 1e300])
+def test_difference_uses_a_point_of_the_same_time_as_it_is(neighbour: float) -> None:
+    second = series("/b", (0, neighbour), (1, 3))
+    assert list(bag_series.differences(series("/a", (1, 5)), second)) == series("/a - /b", (1, 2))
+
+
 def test_difference_uses_the_first_of_several_series() -> None:
     many = [Point("/a/x", 0, 5), Point("/a/y", 0, 50), Point("/a/x", 1, 6), Point("/a/y", 1, 60)]
     assert [each.value for each in bag_series.differences(many, many)] == [0, 0]
@@ -161,3 +167,22 @@ def test_bag_without_messages_has_no_points() -> None:
     reader = bag()
     assert bag_series.bag_span(reader) == (0, 0)
     assert bag_series.bag_topics(reader) == []
+
+
+def test_series_share_the_exact_points_of_a_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bag_series, "MAX_POINTS", 100)
+    found = [(0, Point(f"/a/{at % 5}", at / 5, float(at))) for at in range(1_000)]
+    [own] = bag_series.sample(found, 1, 0, 200, 10)
+    kept = [len(each.result()[0]) for each in own.values()]
+    assert sum(len(each.times) for each in own.values()) <= 100
+    assert [each.count for each in own.values()] == [200] * 5
+    assert min(kept) >= 20  # two of each column
+    assert sum(kept) <= 100 + 5 * 20
+
+
+def test_request_has_a_limited_number_of_series(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bag_series, "MAX_SERIES", 70)
+    budget = Budget()
+    found = [(at % 2, Point(f"/a/{at}", 0, 0)) for at in range(1_000)]
+    assert sum(map(len, bag_series.sample(found, 2, 0, 1, 10, budget))) == 70
+    assert bag_series.sample(found, 2, 0, 1, 10, budget) == [{}, {}]

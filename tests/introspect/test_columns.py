@@ -55,6 +55,15 @@ def test_arrays_that_do_not_belong_to_the_names_stay_whole() -> None:
     assert [list(each) for each in found["position"].values] == [[1.0, 2.0]]
 
 
+def test_one_array_of_another_length_changes_no_column_of_the_others() -> None:
+    right = JointState(name=["elbow", "wrist"], position=[1.0, 2.0])
+    found = named(
+        [right, JointState(name=["elbow", "wrist"], position=[7.0]), JointState(name=["elbow"]), right]
+    )
+    assert found["position[elbow]"].values == [1.0, None, None, 1.0]
+    assert [each and list(each) for each in found["position"].values] == [None, [7.0], None, None]
+
+
 def test_a_name_that_is_no_list_of_names_belongs_to_no_array() -> None:
     class Counted(Message):
         __slots__ = ["name", "values"]

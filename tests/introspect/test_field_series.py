@@ -43,6 +43,22 @@ def test_wrong_syntax_is_refused(path: str) -> None:
         parse_steps(path)
 
 
+@pytest.mark.parametrize(
+    ("path", "why"),
+    [
+        ("[" + "a" * 16_000, "at most 1,000 characters"),
+        ("/a" * 51, "at most 50 steps"),
+        ("/a[" + "9" * 10 + "]", "is not a field"),
+        ("/a[:" + "9" * 10 + "]", "is not a field"),
+    ],
+)
+def test_long_paths_are_refused(path: str, why: str) -> None:
+    with pytest.raises(UsageError, match=why):
+        parse_steps(path)
+    assert len(parse_steps("/a" * 50)) == 50
+    assert parse_steps("[" + "9" * 9 + "]") == [999_999_999]
+
+
 def test_bytes_are_numbers_and_a_whole_array_has_at_most_fifty_series() -> None:
     array = UInt8MultiArray(data=bytes(range(200)))
     assert dict(select(array, parse_steps("/data[7]"))) == {"/data[7]": 7}

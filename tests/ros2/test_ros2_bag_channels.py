@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import JointState
@@ -108,6 +109,42 @@ def test_without_the_room_for_ros2_the_topics_are_left_out(
 
 
 STRING = b"string data\n"
+
+
+def many_channels(path: Path, schema: bytes) -> str:
+    """Write an MCAP file of three channels with this schema; return its path."""
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros2", "test")
+        number = writer.register_schema("std_msgs/msg/String", "ros2msg", schema)
+        for topic in ("/a", "/b", "/c"):
+            writer.register_channel(topic, "cdr", number)
+        writer.finish()
+    return str(path)
+
+
+def test_schema_of_many_channels_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed: list[str] = []
+
+    def counted(type_: str, *rest: Any) -> Any:
+        parsed.append(type_)
+        return ros1_channel(type_, *rest)
+
+    monkeypatch.setattr("minirospy.ros2.bag_channels.ros1_channel", counted)
+    with open_reader(many_channels(tmp_path / "a.mcap", STRING)) as reader:
+        assert sorted(each.topic for each in reader.connections.values()) == ["/a", "/b", "/c"]
+    assert parsed == ["std_msgs/msg/String"]
+    with open_reader(many_channels(tmp_path / "b.mcap", b"string[ data\n")) as reader:
+        assert left_out(reader).count("is not a field") == 3
+    assert len(parsed) == 2
+
+
+def test_long_schema_is_refused(tmp_path: Path) -> None:
+    schema = STRING + b"#" * 1_048_576
+    with open_reader(many_channels(tmp_path / "a.mcap", schema)) as reader:
+        assert left_out(reader).startswith(
+            "/a: [std_msgs/msg/String] its definition has more than 1,048,576 characters"
+        )
 
 
 @pytest.mark.parametrize(

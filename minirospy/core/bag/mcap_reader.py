@@ -17,7 +17,7 @@ from minirospy.base.errors import BagFormatError, McapUnindexedError, MessageExc
 from minirospy.core.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.core.bag.chunks import StoredChunk
 from minirospy.core.bag.compression import NONE
-from minirospy.core.bag.foreign_channels import ros1_channel
+from minirospy.core.bag.foreign_channels import Ros1Channel, ros1_channel
 from minirospy.core.bag.index import ConnectionIndex
 from minirospy.core.bag.mcap_repair import MAGIC, chunk_data, mcap_faults
 from minirospy.core.bag.mcap_writer import check_mcap
@@ -32,6 +32,9 @@ __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
 _TRANSIENT_LOCAL = re.compile(r"durability: *(1|transient_local)\b")  # ROS 2's latching, as rosbag2 stores it
+_MAX_SCHEMA = (
+    1_048_576  # characters, as of a full text of ROS 1; the largest of real packages have some 30,000
+)
 _MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
@@ -64,6 +67,7 @@ class McapReader(BagReader):
         self.stream = stream
         self.foreign: dict[str, str] = {}
         self._converters: dict[int, Callable[[bytes], bytes]] = {}
+        self._converted_schemas: dict[tuple[int, str], Ros1Channel | MinirospyError] = {}
         self.connections = {}
         self._size = size = stream.seek(0, os.SEEK_END)
         stream.seek(max(size - len(MAGIC), 0))
@@ -105,10 +109,13 @@ class McapReader(BagReader):
         if schema is None:
             self.foreign[channel.topic] = "it has no definition"
             return
-        try:
-            found = ros1_channel(schema.name, schema.encoding, schema.data, channel.message_encoding)
-        except MinirospyError as error:
-            self.foreign[channel.topic] = f"[{schema.name}] {' '.join(str(error).split())}"
+        # Many channels may have the same schema: parse it once.
+        key = schema.id, channel.message_encoding
+        found = self._converted_schemas.get(key)
+        if found is None:
+            found = self._converted_schemas[key] = _conversion(schema, channel.message_encoding)
+        if isinstance(found, MinirospyError):
+            self.foreign[channel.topic] = f"[{schema.name}] {' '.join(str(found).split())}"
             return
         header: Fields = {
             "topic": channel.topic.encode(),
@@ -399,6 +406,16 @@ def _read_chunk_header(stream: BinaryIO, position: int, limit: int) -> _ChunkHea
     if name_size > _MAX_NAME or data_position + data_size > min(position + _HEAD.size + length, limit):
         raise BagFormatError("not a whole MCAP file: a chunk's data does not fit into it", position)
     return _ChunkHeader(start, name, size, data_position, data_size)
+
+
+def _conversion(schema: Schema, message_encoding: str) -> Ros1Channel | MinirospyError:
+    """Return the conversion of a schema's messages to ROS 1, or the reason why there is none."""
+    if len(schema.data) > _MAX_SCHEMA:
+        return BagFormatError(f"its definition has more than {_MAX_SCHEMA:,} characters")
+    try:
+        return ros1_channel(schema.name, schema.encoding, schema.data, message_encoding)
+    except MinirospyError as error:
+        return error
 
 
 def _connection(channel: Channel, schema: Schema) -> Connection:

@@ -322,6 +322,8 @@ class BagSession(JsonSession):
             found = await self._loop.run_in_executor(None, write)
         except (MinirospyError, OSError) as error:
             self.send_error(f"{name}: {error}")
+        except Exception as error:  # noqa: BLE001 the page waits for an answer, also if the Parquet library fails
+            self.send_error(f"{name}: {type(error).__name__}: {' '.join(str(error).split())}")
         else:
             rows = [[os.path.basename(each.path), each.rows, each.columns, each.left_out] for each in found]
             self.send({"exported": rows})

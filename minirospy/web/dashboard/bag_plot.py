@@ -9,18 +9,17 @@ from typing import NamedTuple
 from minirospy.base.errors import BagError, BagUnindexedError, MinirospyError, UsageError
 from minirospy.core.bag.base import BagReader
 from minirospy.introspect import bag_series
-from minirospy.introspect.bag_series import Sampler
+from minirospy.introspect.bag_series import Budget, FieldPath, Sampler
 from minirospy.introspect.bags import open_reader
 from minirospy.web.dashboard.bag_folder import BagFolder
 from minirospy.web.dashboard.json_session import Fields, number, text_of
 
 __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
-_MAX_COLUMNS = 10_000
+_MAX_COLUMNS = 5_000  # with MAX_SERIES series 2,000,000 points
 _MAX_SERIES = 100  # paths in one request
-_MARGIN_SECONDS = (
-    10.0  # read before and after a range, so that a subtrahend has points around each of the minuend's
-)
+_MARGIN_SECONDS = 10.0  # read before a range, so that a subtrahend has a point before each of the minuend's
+_WIDER = 4  # times, if the subtrahend has no point there
 
 
 class Operand(NamedTuple):
@@ -90,6 +89,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
     """
     errors: dict[str, str] = {}
     found: list[Fields] = []
+    budget = Budget()
     by_bag: dict[str, list[BagPath]] = {}
     for each in request.paths:
         # Paths in one bag are read together. A difference needs two readers, which may be in different places.
@@ -101,8 +101,8 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
             on_share((done + share) / len(by_bag))
 
         try:
-            found += _read(folder, group, request, report, errors)
-        except (MinirospyError, OSError) as error:
+            found += _read(folder, group, request, report, errors, budget)
+        except (MinirospyError, OSError, RecursionError, ValueError) as error:
             report(1.0)  # ends here if the page has left
             name = group[0].operand.bag
             text = str(error) if name in str(error) else f"{name}: {error}"
@@ -116,6 +116,7 @@ def _read(
     request: SeriesRequest,
     on_share: Callable[[float], object],
     errors: dict[str, str],
+    budget: Budget,
 ) -> list[Fields]:
     with ExitStack() as opened:
         reader = _open(folder, group[0].operand.bag, opened)
@@ -133,7 +134,7 @@ def _read(
             try:
                 paths.append(bag_series.field_path(each.operand.path, topics))
                 keys.append(each.key)
-            except MinirospyError as error:
+            except (MinirospyError, RecursionError, ValueError) as error:
                 errors[each.key] = str(error)
         found = bag_series.points(reader, paths, start, end, on_time)
         if minus := group[0].minus:
@@ -141,22 +142,32 @@ def _read(
             subtrahend = bag_series.field_path(
                 minus.path, {each.topic for each in other.connections.values()}
             )
-            margin = max(_MARGIN_SECONDS, (shown[1] - shown[0]) / 10)
-            around = bag_series.points(
-                other,
-                [subtrahend],
-                None if start is None else max(0.0, start - margin),
-                None if end is None else end + margin,
-            )
+            # Read on behind the end as far as the difference needs it.
+            before = None if start is None else _start_before(other, subtrahend, start, on_time)
+            around = bag_series.points(other, [subtrahend], before, None, on_time)
             difference = bag_series.differences((point for _, point in found), (point for _, point in around))
             found = ((0, point) for point in difference)
-        samplers = bag_series.sample(found, len(paths), *shown, request.columns)
+        samplers = bag_series.sample(found, len(paths), *shown, request.columns, budget)
     series = []
     for key, path, own in zip(keys, paths, samplers, strict=True):
-        if not own and start is None and end is None:
+        if not own and not budget.series:
+            errors[key] = f"a plot has at most {bag_series.MAX_SERIES} series of bags"
+        elif not own and start is None and end is None:
             errors[key] = f"no number at {path.topic} in the messages of this bag"
         series += [_series(key, label, sampler, length) for label, sampler in own.items()]
     return series
+
+
+def _start_before(
+    reader: BagReader, path: FieldPath, start: float, on_time: Callable[[float], object]
+) -> float | None:
+    """Return a time from which a series has a point before ``start``; None, the bag's start, if there is none."""
+    margin = _MARGIN_SECONDS
+    while margin < start:
+        for _ in bag_series.points(reader, [path], start - margin, start, on_time):
+            return start - margin
+        margin *= _WIDER
+    return None
 
 
 def _series(key: str, label: str, sampler: Sampler, length: float) -> Fields:

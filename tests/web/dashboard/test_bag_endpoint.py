@@ -135,6 +135,20 @@ def test_topics_of_an_open_bag_are_exported_into_the_folder(
         assert why in page.error()
 
 
+def test_any_fault_of_an_export_is_answered(
+    client: Callable[..., Client], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise OverflowError("int too\nbig")
+
+    monkeypatch.setattr("minirospy.web.dashboard.bag_endpoint.export", fail)
+    make_bag(folder / "a.bag")
+    page = client()
+    page.send("open", name="a.bag")
+    page.send("export", topics=["/chatter"], format="csv")
+    assert page.error() == "a.bag: OverflowError: int too big"
+
+
 def test_series_and_their_progress_are_sent(client: Callable[..., Client], folder: Path) -> None:
     make_bag(folder / "a.bag")
     page = client()

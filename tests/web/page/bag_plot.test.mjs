@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { bagPathOf, refined, suffices } from "../../../minirospy/web/dashboard/page/js/bag_plot.js";
+import { BagPlot, bagPathOf, refined, suffices } from "../../../minirospy/web/dashboard/page/js/bag_plot.js";
 
 test("a path of a bag names the bag, and what is subtracted", () => {
   assert.equal(bagPathOf("/odom/pose/x"), null);
@@ -42,4 +42,16 @@ test("a part suffices if it has all points, or enough for the range", () => {
   assert.equal(suffices(part, 12, 13), false);
   assert.equal(suffices(part, 9, 17), false);
   assert.equal(suffices({ ...part, isExact: true }, 12, 12.001), true);
+});
+
+test("a part without points of a series does not suffice for finer ranges", () => {
+  const series = {
+    asked: { id: 1, start: 10, end: 20, keys: [] },
+    part: null,
+    handlers: { progress: () => {} },
+    wanted: new Map(),
+    request: () => {},
+  };
+  BagPlot.prototype.answered.call(series, { id: 1, found: [], errors: {} });
+  assert.deepEqual(series.part, { start: 10, end: 20, isExact: false });
 });

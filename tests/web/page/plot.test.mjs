@@ -130,6 +130,14 @@ test("paths with wrong syntax are refused", () => {
   for (const path of PATHS.refused) assert.throws(() => parseSteps(path), /is not a field/, path);
 });
 
+test("long paths are refused", () => {
+  assert.throws(() => parseSteps("[" + "a".repeat(16_000)), /characters/);
+  assert.throws(() => parseSteps("/a".repeat(51)), /steps/);
+  assert.throws(() => parseSteps(`/a[${"9".repeat(10)}]`), /is not a field/);
+  assert.throws(() => parseSteps(`/a[:${"9".repeat(10)}]`), /is not a field/);
+  assert.equal(parseSteps("/a".repeat(50)).length, 50);
+});
+
 test("paths by joint name and by angle are compared with the type", () => {
   const definition = parseDefinition(
     "a/B",

@@ -138,7 +138,7 @@ export class BagPlot {
     const { start, end, keys } = this.asked;
     this.asked = null;
     this.handlers.progress(null);
-    if (start !== null) this.part = { start, end, isExact: found.every(({ exact }) => exact) };
+    if (start !== null) this.part = { start, end, isExact: found.length > 0 && found.every(({ exact }) => exact) };
     for (const key of keys) {
       const known = this.wanted.get(key);
       if (!known) continue;

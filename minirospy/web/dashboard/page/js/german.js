@@ -251,6 +251,8 @@ export const GERMAN = {
   "/topic/field, /topic/array[0:5]": "/topic/feld, /topic/array[0:5]",
   '"{rest}" is not a field, nor an index, nor a filter as {id==1}':
     "„{rest}“ ist kein Feld, kein Index und kein Filter wie {id==1}",
+  "a path behind its topic has at most {most} characters": "ein Pfad hat hinter seinem Topic höchstens {most} Zeichen",
+  "a path behind its topic has at most {most} steps": "ein Pfad hat hinter seinem Topic höchstens {most} Schritte",
   "no number there; there is {paths}": "dort ist keine Zahl; es gibt {paths}",
   "no number there; there is none in this topic": "dort ist keine Zahl; in diesem Topic gibt es keine",
   '{name}: "{text}" is not a whole number': "{name}: „{text}“ ist keine ganze Zahl",

@@ -7,6 +7,8 @@ import { TextError, isList, isNumeric } from "./ros1.js";
 
 const MAX_VALUES = 50; // of one path, as of a whole array
 const MAX_TESTED = 10_000; // elements
+const MAX_PATH = 1000; // characters; the search for a step's end is quadratic in them
+const MAX_STEPS = 50; // as messages inside messages
 
 /** @type {Record<string, (x: number, y: number, z: number, w: number) => number>} */
 const ANGLES = {
@@ -52,11 +54,15 @@ export class PathError extends TextError {}
  * string in the array "name" beside it, {test, text}: a function of a value. Throws PathError.
  */
 export function parseSteps(text) {
+  if (text.length > MAX_PATH)
+    throw new PathError("a path behind its topic has at most {most} characters", { most: MAX_PATH });
   const steps = [];
   let rest = text;
   while (rest) {
+    if (steps.length === MAX_STEPS)
+      throw new PathError("a path behind its topic has at most {most} steps", { most: MAX_STEPS });
     const match =
-      /^[/.](\w+)|^\[(-?\d+)\]|^\[(\d*):(\d*)\]|^\{([\w./]+)\s*(==|!=|<=?|>=?)\s*(?:"([^"]*)"|'([^']*)'|([^}"']+))\}/.exec(
+      /^[/.](\w+)|^\[(-?\d{1,9})\]|^\[(\d{0,9}):(\d{0,9})\]|^\{([\w./]+)\s*(==|!=|<=?|>=?)\s*(?:"([^"]*)"|'([^']*)'|([^}"']+))\}/.exec(
         rest,
       );
     const named = match ? null : NAMED.exec(rest);
