@@ -212,7 +212,7 @@ def _write_snapshot(name: str, environment: Environment) -> int:
 
     count, large = write_snapshot(Path(name), environment)
     for file in large:
-        warn(f"{file} is left out: it is too large")
+        warn(f"{file} is left out: it or the snapshot is too large")
     print(
         f"{name}: {count} files of the workspace, the output of minirospy doctor, your results. Read it before you send it."
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError
+from minirospy.course import snapshot
 from minirospy.course.snapshot import write_snapshot
 
 
@@ -61,3 +63,24 @@ def test_terminal_without_a_workspace_is_told_what_to_do(tmp_path: Path) -> None
     with pytest.raises(MinirospyError, match=r"source WORKSPACE/devel/setup.bash"):
         write_snapshot(tmp_path / "anna.zip", Environment.read())
     assert not (tmp_path / "anna.zip").exists()
+
+
+def test_snapshot_in_the_workspace_does_not_contain_itself(workspace: Path) -> None:
+    file = workspace / "zoe.zip"
+    (workspace / "rpi_test" / "noise.bin").write_bytes(os.urandom(5000))
+    count, _ = write_snapshot(file, Environment.read())
+    assert count == 3
+    with zipfile.ZipFile(file) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".zip")]
+
+
+def test_all_files_together_have_a_limit(
+    workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(snapshot, "_MAX_BYTES", 20)
+    count, left_out = write_snapshot(tmp_path / "anna.zip", Environment.read())
+    assert count == 1  # package.xml has 10 bytes, my_led.py has 13
+    assert left_out == [
+        str(workspace / "rpi_test" / "big.bag"),
+        str(workspace / "rpi_test" / "scripts" / "my_led.py"),
+    ]
