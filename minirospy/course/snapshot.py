@@ -35,19 +35,26 @@ _DOCTOR_SECONDS = 60.0
 
 
 def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]]:
-    """Write the snapshot; return the number of the workspace's files in it, and the files that are left out
-    because they, or all files together, are too large.
+    """Write the snapshot; return the number of the workspace's files in it, and the files that are left out.
 
-    The workspace is the folders of ROS_PACKAGE_PATH. Hidden files, which may be keys and passwords, and build folders are left
-    out. Raise MinirospyError if there is no workspace, or if the file exists or cannot be written.
+    A file is left out if it, or all files together, would be too large. The workspace is the folders of ROS_PACKAGE_PATH. Hidden
+    files, which may be keys and passwords, and build folders are left out. Raise MinirospyError if there is no workspace, or if
+    the file exists or cannot be written; an unfinished file is removed.
     """
     roots = [root for root in environment.package_path if root.is_dir() and os.access(root, os.W_OK)]
     if not roots:
         raise MinirospyError("no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`")
+    # Each list is complete before the snapshot exists, which may be in the workspace itself.
+    listed = [(root, _files(root)) for root in roots]
     try:
-        # Each list is complete before the snapshot exists, which may be in the workspace itself.
-        listed = [(root, _files(root)) for root in roots]
-        with zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED) as archive:
+        # A file dated before 1980, which a zip file cannot express, gets the date 1980-01-01.
+        archive = zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED, strict_timestamps=False)
+    except FileExistsError:
+        raise MinirospyError(f"{file} exists: name another file") from None
+    except OSError as error:
+        raise _not_written(file, error) from error
+    try:
+        with archive:
             count, large = _pack(archive, listed)
             archive.writestr("doctor.txt", _doctor())
             archive.writestr("results.json", json.dumps(Record.read(environment).to_parameter(), indent=1))
@@ -55,11 +62,17 @@ def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]
             archive.writestr(
                 "variables.txt", "".join(f"{name}={value}\n" for name, value in variables.items())
             )
-    except FileExistsError:
-        raise MinirospyError(f"{file} exists: name another file") from None
-    except OSError as error:
-        raise MinirospyError(f"{file} cannot be written: {error.strerror}") from error
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            file.unlink()
+        if isinstance(error, OSError | ValueError):
+            raise _not_written(file, error) from error
+        raise
     return count, large
+
+
+def _not_written(file: Path, error: OSError | ValueError) -> MinirospyError:
+    return MinirospyError(f"{file} cannot be written: {getattr(error, 'strerror', None) or error}")
 
 
 def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]]) -> tuple[int, list[str]]:

@@ -84,3 +84,25 @@ def test_all_files_together_have_a_limit(
         str(workspace / "rpi_test" / "big.bag"),
         str(workspace / "rpi_test" / "scripts" / "my_led.py"),
     ]
+
+
+def test_file_of_1970_is_packed(workspace: Path, tmp_path: Path) -> None:
+    os.utime(workspace / "rpi_test" / "package.xml", (0, 0))
+    file = tmp_path / "anna.zip"
+    write_snapshot(file, Environment.read())
+    with zipfile.ZipFile(file) as archive:
+        assert archive.getinfo("catkin_ws/rpi_test/package.xml").date_time[:3] == (1980, 1, 1)
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_unfinished_snapshot_is_removed(
+    error: BaseException, workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(zipfile.ZipFile, "write", fail)
+    file = tmp_path / "anna.zip"
+    with pytest.raises((MinirospyError, KeyboardInterrupt)):
+        write_snapshot(file, Environment.read())
+    assert not file.exists()
