@@ -283,8 +283,8 @@ def _show_class(uri: str) -> int:
     for student in students:
         for name, result in student.results.items():
             if not result.passed and result.failures:
-                when = time.strftime("%H:%M", time.localtime(result.time))
-                print(escaped(f"{student.name}, {name}, {when}: {result.failures[0]}"))
+                when = time.strftime(", %H:%M", time.localtime(result.time)) if result.time else ""
+                print(escaped(f"{student.name}, {name}{when}: {result.failures[0]}"))
     return 0
 
 
