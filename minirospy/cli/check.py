@@ -115,6 +115,8 @@ def _check(
     record = Record.read(environment)
     if one_master and join is None:
         raise Misuse("--one-master needs --join URI")
+    if join == "":
+        raise Misuse("--join takes the URI of a master, such as http://192.168.65.50:11311")
     if join is not None or name is not None:
         from minirospy.course.results import class_master
         from minirospy.course.results import join as join_class

@@ -70,6 +70,8 @@ def test_output_of_a_check(command: Command, question: str) -> None:
         (["count", "a.py", "b.py"], 2, "count takes one file"),
         (["count", "--patience", "0"], 2, "--patience takes a number from 0.1 to 100"),
         (["count", "--class"], 2, "--class takes no exercise"),
+        (["--join", ""], 2, "--join takes the URI of a master"),
+        (["--join", "", "--one-master"], 2, "--join takes the URI of a master"),
         (["--join", "http://"], 2, "is not the URI of a master"),
         (["--join", "http://localhost:1"], 1, "no ROS master answers at http://localhost:1"),
         (["--class"], 1, "no ROS master answers"),
