@@ -47,7 +47,10 @@ _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a co
 
 @dataclass(frozen=True)
 class Result:
-    """The last result of one exercise: when (seconds since 1970, 0 if unknown), and what did not hold. ``ever`` is true once it was passed."""
+    """The last result of one exercise: when (seconds since 1970, 0 if unknown), and what did not hold.
+
+    ``ever`` is true once it was passed.
+    """
 
     passed: bool
     time: float
