@@ -115,6 +115,8 @@ def _check(
     record = Record.read(environment)
     if one_master and join is None:
         raise Misuse("--one-master needs --join URI")
+    if join == "":
+        raise Misuse("--join takes the URI of a master, such as http://192.168.65.50:11311")
     if join is not None or name is not None:
         from minirospy.course.results import class_master
         from minirospy.course.results import join as join_class
@@ -212,7 +214,7 @@ def _write_snapshot(name: str, environment: Environment) -> int:
 
     count, large = write_snapshot(Path(name), environment)
     for file in large:
-        warn(f"{file} is left out: it is too large")
+        warn(f"{file} is left out: it or the snapshot is too large")
     print(
         f"{name}: {count} files of the workspace, the output of minirospy doctor, your results. Read it before you send it."
     )
@@ -283,8 +285,8 @@ def _show_class(uri: str) -> int:
     for student in students:
         for name, result in student.results.items():
             if not result.passed and result.failures:
-                when = time.strftime("%H:%M", time.localtime(result.time))
-                print(escaped(f"{student.name}, {name}, {when}: {result.failures[0]}"))
+                when = time.strftime(", %H:%M", time.localtime(result.time)) if result.time else ""
+                print(escaped(f"{student.name}, {name}{when}: {result.failures[0]}"))
     return 0
 
 

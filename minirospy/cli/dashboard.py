@@ -454,7 +454,7 @@ async def _is_reachable(uri: str) -> bool:
     from minirospy.base.environment import split_uri
 
     host, port, _ = split_uri(uri)
-    with contextlib.suppress(OSError, asyncio.TimeoutError):
+    with contextlib.suppress(OSError, UnicodeError, asyncio.TimeoutError):
         _, writer = await asyncio.wait_for(asyncio.open_connection(host, port), _MASTER_SECONDS)
         writer.close()
         return True

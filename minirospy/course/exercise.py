@@ -71,6 +71,8 @@ EXPECTATIONS: Mapping[str, frozenset[str]] = {
     "answer": frozenset({"equals", "rate", "host_of", "tolerance"}),
     "rostest": frozenset(),
 }
+_PARAMETER_RANGES = ("message", "runs_along")  # kinds that accept `between: {param: /name}`
+_NAMES = {"type": "std_msgs/Int32", "field": "data", "rate": "/scan", "host_of": "/scan"}  # as in errors
 _LEVELS = ("debug", "info", "warn", "error", "fatal")
 _OPTIONS = frozenset({"within", "hint", "says"})
 _TOP = frozenset({"name", "title", "page", "task", "work", "solution", "live", "ends", "steps"})
@@ -211,7 +213,7 @@ class _Reader:
                 raise self._error(f"{key} [{found[key]}]: true or false")
         steps = self._list(found["steps"], "steps")
         parsed = tuple(self._step(each, number) for number, each in enumerate(steps, 1))
-        return Exercise(
+        exercise = Exercise(
             name=name,
             title=self._text(found["title"], "title"),
             steps=parsed,
@@ -224,6 +226,11 @@ class _Reader:
             live=found.get("live", False),
             ends=found.get("ends", False) or any(step.kind == "exits" for step in parsed),
         )
+        if not any(step.is_expectation for step in parsed):
+            raise self._error(
+                "steps: none is an expectation such as {led: 7, is: on}, so any program would pass"
+            )
+        return exercise
 
     def _work(self, found: object) -> Work:
         if not isinstance(found, dict) or not found.get("about"):
@@ -301,6 +308,10 @@ class _Reader:
             raise self._error(f"{place}: tolerance [{words['tolerance']}] is not a number such as 0.2")
         if "between" in words:
             pair = words["between"]
+            if _is_parameter(pair) and kind not in _PARAMETER_RANGES:
+                raise self._error(
+                    f"{place}: between [{pair}]: only {' and '.join(_PARAMETER_RANGES)} take a range around a parameter"
+                )
             if not _is_parameter(pair) and not _is_range(pair):
                 raise self._error(f"{place}: between [{pair}] is not two numbers such as [8, 12]")
         if isinstance(words.get("between"), dict) and not words.get("says"):
@@ -313,6 +324,12 @@ class _Reader:
             raise self._error(
                 f"{place}: one of `equals`, `rate` (of a topic) and `host_of` (a topic's publisher)"
             )
+        names = ("rate", "host_of") if kind == "answer" else ("type", "field")
+        for option in names:
+            if option in words and not (isinstance(words[option], str) and words[option]):
+                raise self._error(
+                    f"{place}: {option} [{words[option]}] is not a name such as {_NAMES[option]}"
+                )
         if kind in (
             "topic",
             "subscribes",
@@ -326,6 +343,7 @@ class _Reader:
             "node",
             "param",
             "set_param",
+            "package",
         ) and not (isinstance(subject, str) and subject):
             raise self._error(f"{place}: [{subject}] is not a name such as /button_state")
 

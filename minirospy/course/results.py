@@ -41,6 +41,7 @@ CLASS_PARAMETER = "/minirospy_class"
 _MAX_FAILURES = 5  # sentences of a failed check that the teacher sees
 _MAX_LETTERS = 300  # characters of such a sentence
 _MAX_NAME = 60  # characters of a student's name
+_MAX_TIME = 4e9  # seconds since 1970, in the year 2096: time.localtime refuses far larger values
 _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a computer that has left
 
 
@@ -48,7 +49,7 @@ _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a co
 class Result:
     """The last result of one exercise.
 
-    ``time`` is in seconds since 1970, ``failures`` has the sentences that did not hold, ``ever`` is true once it was passed.
+    ``time`` is in seconds since 1970 (0: unknown), ``failures`` has the sentences that did not hold, ``ever`` is true once it was passed.
     """
 
     passed: bool
@@ -257,5 +258,10 @@ def _result_of(found: Mapping[str, Any]) -> Result:
         else ()
     )
     return Result(
-        bool(found["passed"]), float(found.get("time", 0.0)), bool(found.get("ever", found["passed"])), texts
+        bool(found["passed"]), _time_of(found.get("time")), bool(found.get("ever", found["passed"])), texts
     )
+
+
+def _time_of(found: object) -> float:
+    """Return a time, or 0 (unknown) for values that are none, which any node may have set."""
+    return float(found) if isinstance(found, int | float) and 0 <= found < _MAX_TIME else 0.0

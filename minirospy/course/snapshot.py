@@ -18,6 +18,7 @@ __all__ = ["write_snapshot"]
 
 _MAX_FILE_BYTES = 1_000_000  # bags, models and videos are left out
 _MAX_FILES = 2000
+_MAX_BYTES = 50_000_000  # of all files before compression: a snapshot is sent by e-mail
 _LEFT_OUT = frozenset(
     {".git", "__pycache__", "node_modules", ".venv", "venv", "build", "devel", "install", "logs"}
 )
@@ -34,36 +35,59 @@ _DOCTOR_SECONDS = 60.0
 
 
 def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]]:
-    """Write the snapshot; return the number of the workspace's files in it, and the files that are too large.
+    """Write the snapshot; return the number of the workspace's files in it, and the files that are left out.
 
-    The workspace is the folders of ROS_PACKAGE_PATH. Hidden files, which may be keys and passwords, and build folders are left
-    out. Raise MinirospyError if there is no workspace, or if the file exists or cannot be written.
+    A file is left out if it, or all files together, would be too large. The workspace is the folders of ROS_PACKAGE_PATH. Hidden
+    files, which may be keys and passwords, and build folders are left out. Raise MinirospyError if there is no workspace, or if
+    the file exists or cannot be written; an unfinished file is removed.
     """
     roots = [root for root in environment.package_path if root.is_dir() and os.access(root, os.W_OK)]
     if not roots:
         raise MinirospyError("no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`")
-    count, large = 0, []
+    # Each list is complete before the snapshot exists, which may be in the workspace itself.
+    listed = [(root, _files(root)) for root in roots]
     try:
-        with zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED) as archive:
-            for number, root in enumerate(roots, 1):
-                prefix = root.parent.name if len(roots) == 1 else f"{number}_{root.parent.name}"
-                for path in _files(root):
-                    if path.stat().st_size > _MAX_FILE_BYTES or count >= _MAX_FILES:
-                        large.append(str(path))
-                        continue
-                    archive.write(path, f"{prefix}/{path.relative_to(root).as_posix()}")
-                    count += 1
+        # A file dated before 1980, which a zip file cannot express, gets the date 1980-01-01.
+        archive = zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED, strict_timestamps=False)
+    except FileExistsError:
+        raise MinirospyError(f"{file} exists: name another file") from None
+    except OSError as error:
+        raise _not_written(file, error) from error
+    try:
+        with archive:
+            count, large = _pack(archive, listed)
             archive.writestr("doctor.txt", _doctor())
             archive.writestr("results.json", json.dumps(Record.read(environment).to_parameter(), indent=1))
             variables = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
             archive.writestr(
                 "variables.txt", "".join(f"{name}={value}\n" for name, value in variables.items())
             )
-    except FileExistsError:
-        raise MinirospyError(f"{file} exists: name another file") from None
-    except OSError as error:
-        raise MinirospyError(f"{file} cannot be written: {error.strerror}") from error
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            file.unlink()
+        if isinstance(error, OSError | ValueError):
+            raise _not_written(file, error) from error
+        raise
     return count, large
+
+
+def _not_written(file: Path, error: OSError | ValueError) -> MinirospyError:
+    return MinirospyError(f"{file} cannot be written: {getattr(error, 'strerror', None) or error}")
+
+
+def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]]) -> tuple[int, list[str]]:
+    """Add the files of the workspace's folders; return their number, and the files that are left out."""
+    count, total, left_out = 0, 0, []
+    for number, (root, files) in enumerate(listed, 1):
+        prefix = root.parent.name if len(listed) == 1 else f"{number}_{root.parent.name}"
+        for path in files:
+            size = path.stat().st_size
+            if size > _MAX_FILE_BYTES or total + size > _MAX_BYTES or count >= _MAX_FILES:
+                left_out.append(str(path))
+                continue
+            archive.write(path, f"{prefix}/{path.relative_to(root).as_posix()}")
+            count, total = count + 1, total + size
+    return count, left_out
 
 
 def _files(root: Path) -> list[Path]:

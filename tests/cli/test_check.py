@@ -70,6 +70,8 @@ def test_output_of_a_check(command: Command, question: str) -> None:
         (["count", "a.py", "b.py"], 2, "count takes one file"),
         (["count", "--patience", "0"], 2, "--patience takes a number from 0.1 to 100"),
         (["count", "--class"], 2, "--class takes no exercise"),
+        (["--join", ""], 2, "--join takes the URI of a master"),
+        (["--join", "", "--one-master"], 2, "--join takes the URI of a master"),
         (["--join", "http://"], 2, "is not the URI of a master"),
         (["--join", "http://localhost:1"], 1, "no ROS master answers at http://localhost:1"),
         (["--class"], 1, "no ROS master answers"),
@@ -189,6 +191,17 @@ def test_values_that_are_no_record_are_left_out(command: Command, master: str, q
     assert result.status == 0
     assert "red\\nblue" in result.out
     assert len(gather(master)) == 2
+
+
+@pytest.mark.parametrize("when", [1e300, float("inf"), float("nan"), -1e17, "noon", [1]])
+def test_impossible_time_counts_as_unknown(when: object, command: Command, master: str) -> None:
+    led = {"passed": False, "time": when, "failures": ["it stays dark"]}
+    proxy = MasterProxy(master, "/hostile")
+    proxy.set_param(f"{CLASS_PARAMETER}/eve", {"student": "Eve", "exercises": {"led": led}})
+    proxy.close()
+    result = command("check", "--class")
+    assert (result.status, result.err) == (0, "")
+    assert result.out.splitlines()[-1] == "Eve, led: it stays dark"
 
 
 def test_environment_of_the_command_is_left_alone(command: Command, question: str) -> None:

@@ -26,7 +26,7 @@ def parse(steps: str, head: str = HEAD) -> str:
 @pytest.mark.parametrize(
     ("steps", "error"),
     [
-        ("- press: 11\n", ""),
+        ("- press: 11\n- leds: [2]\n", ""),
         ("- {led: 7, is: on, within: 1}\n", ""),
         ("- led: 70\n  is: on\n", "lamp.yaml: step 1 (led): [70] is not a pin: BCM numbers are 0 to 53"),
         ("- led: 7\n", "lamp.yaml: step 1 (led): `is` is missing"),
@@ -50,6 +50,23 @@ def parse(steps: str, head: str = HEAD) -> str:
         ("- [\n", "lamp.yaml:5: this is not YAML"),
         ("- {log: x, level: loud}\n", "level [loud]: debug, info, warn, error or fatal"),
         ("- {runs_along: 3, between: {param: /x}}\n", "needs `says`"),
+        ("- {runs_along: 3, between: {param: /x}, says: y}\n", ""),
+        ("- {message: /x, field: data, between: {param: /y}, says: z}\n", ""),
+        (
+            "- {rate: /x, between: {param: /y}, says: z}\n",
+            "step 1 (rate): between [{'param': '/y'}]: only message",
+        ),
+        ("- {span: /x, field: x, between: {param: /y}, says: z}\n", "step 1 (span): between"),
+        ("- {topic: /x, type: [1]}\n", "step 1 (topic): type [[1]] is not a name such as std_msgs/Int32"),
+        ("- {publish: /x, type: 5}\n", "step 1 (publish): type [5] is not a name such as std_msgs/Int32"),
+        ("- {message: /x, field: 5, equals: 1}\n", "step 1 (message): field [5] is not a name such as data"),
+        ("- {message: /x, field: '', equals: 1}\n", "step 1 (message): field [] is not a name such as data"),
+        ("- {response: /x, field: on, equals: 1}\n", "step 1 (response): field [True] is not a name"),
+        ("- {answer: Why, rate: 5}\n", "step 1 (answer): rate [5] is not a name such as /scan"),
+        ("- {answer: Why, host_of: [/x]}\n", "step 1 (answer): host_of [['/x']] is not a name such as /scan"),
+        ("- {answer: Why, rate: /x}\n", ""),
+        ("- {package: [1], is: true}\n", "step 1 (package): [[1]] is not a name"),
+        ("- press: 11\n", "lamp.yaml: steps: none is an expectation such as {led: 7, is: on}"),
     ],
 )
 def test_mistake_in_a_step_is_named(steps: str, error: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError
+from minirospy.course import snapshot
 from minirospy.course.snapshot import write_snapshot
 
 
@@ -61,3 +63,46 @@ def test_terminal_without_a_workspace_is_told_what_to_do(tmp_path: Path) -> None
     with pytest.raises(MinirospyError, match=r"source WORKSPACE/devel/setup.bash"):
         write_snapshot(tmp_path / "anna.zip", Environment.read())
     assert not (tmp_path / "anna.zip").exists()
+
+
+def test_snapshot_in_the_workspace_does_not_contain_itself(workspace: Path) -> None:
+    file = workspace / "zoe.zip"
+    (workspace / "rpi_test" / "noise.bin").write_bytes(os.urandom(5000))
+    count, _ = write_snapshot(file, Environment.read())
+    assert count == 3
+    with zipfile.ZipFile(file) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".zip")]
+
+
+def test_all_files_together_have_a_limit(
+    workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(snapshot, "_MAX_BYTES", 20)
+    count, left_out = write_snapshot(tmp_path / "anna.zip", Environment.read())
+    assert count == 1  # package.xml has 10 bytes, my_led.py has 13
+    assert left_out == [
+        str(workspace / "rpi_test" / "big.bag"),
+        str(workspace / "rpi_test" / "scripts" / "my_led.py"),
+    ]
+
+
+def test_file_of_1970_is_packed(workspace: Path, tmp_path: Path) -> None:
+    os.utime(workspace / "rpi_test" / "package.xml", (0, 0))
+    file = tmp_path / "anna.zip"
+    write_snapshot(file, Environment.read())
+    with zipfile.ZipFile(file) as archive:
+        assert archive.getinfo("catkin_ws/rpi_test/package.xml").date_time[:3] == (1980, 1, 1)
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_unfinished_snapshot_is_removed(
+    error: BaseException, workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(zipfile.ZipFile, "write", fail)
+    file = tmp_path / "anna.zip"
+    with pytest.raises((MinirospyError, KeyboardInterrupt)):
+        write_snapshot(file, Environment.read())
+    assert not file.exists()

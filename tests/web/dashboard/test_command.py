@@ -104,10 +104,11 @@ def test_page_is_served_before_there_is_a_master(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another process")
+@pytest.mark.parametrize("host", ["localhost", "robot..local"])  # no encoder of names accepts an empty part
 def test_dashboard_without_a_master_ends_with_status_0(
-    started: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch
+    host: str, started: list[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{free_port()}")
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://{host}:{free_port()}")
     link_of(started, "-m", "minirospy", "dashboard", "--no-browser", "--port", "0")
     started[0].send_signal(signal.SIGINT)
     assert started[0].wait(60) == 0

@@ -2,6 +2,10 @@
 
 const ROOT = "/minirospy_class/";
 const MAX_STUDENTS = 200;
+const MAX_EXERCISES = 100; // columns: the course has 15
+const MAX_NODES = 10; // of a student
+const MAX_FAILURES = 5; // of an exercise
+const MAX_TEXT = 300; // characters, as `minirospy check` cuts them
 const NAME = /^[A-Za-z0-9_]{1,64}$/;
 
 /**
@@ -23,7 +27,7 @@ export function classTable(parameters) {
     const student = students.get(key);
     if (part === "student" && typeof value === "string") student.name = value.slice(0, 60);
     else if (part === "now") setNow(student, name, value);
-    else if (part === "exercises" && NAME.test(name)) setResult(student, numbers, name, field, value);
+    else if (part === "exercises" && name && NAME.test(name)) setResult(student, numbers, name, field, value);
   }
   const exercises = [...numbers.keys()].sort((a, b) => numbers.get(a) - numbers.get(b) || (a < b ? -1 : 1));
   const listed = [...students.values()].sort((a, b) => a.name.localeCompare(b.name) || (a.key < b.key ? -1 : 1));
@@ -31,16 +35,31 @@ export function classTable(parameters) {
 }
 
 function setNow(student, name, value) {
-  if (["leds", "buttons"].includes(name) && /^[01]{0,6}$/.test(String(value))) student[name] = String(value);
-  else if (name === "nodes" && Array.isArray(value)) student.nodes = value.map(String).slice(0, 10);
+  if (["leds", "buttons"].includes(name) && isLevels(value)) student[name] = String(value);
+  else if (name === "nodes" && Array.isArray(value)) student.nodes = texts(value, MAX_NODES);
   else if (name === "beat" && Number.isFinite(value)) student.beat = value;
 }
 
 function setResult(student, numbers, name, field, value) {
-  if (!numbers.has(name)) numbers.set(name, Number.MAX_SAFE_INTEGER);
+  if (!numbers.has(name)) {
+    if (numbers.size >= MAX_EXERCISES) return;
+    numbers.set(name, Number.MAX_SAFE_INTEGER);
+  }
   if (!student.results.has(name)) student.results.set(name, { passed: false, ever: false, failures: [] });
   const result = student.results.get(name);
   if (field === "number" && Number.isFinite(value)) numbers.set(name, Math.min(numbers.get(name), value));
   else if (["passed", "ever"].includes(field)) result[field] = value === true;
-  else if (field === "failures" && Array.isArray(value)) result.failures = value.map(String).slice(0, 5);
+  else if (field === "failures" && Array.isArray(value)) result.failures = texts(value, MAX_FAILURES);
+}
+
+function isLevels(value) {
+  return ["string", "number"].includes(typeof value) && /^[01]{0,6}$/.test(String(value));
+}
+
+/** Return the texts among the first values of a list, each cut. */
+function texts(values, most) {
+  return values
+    .slice(0, most)
+    .filter((each) => typeof each === "string")
+    .map((each) => each.slice(0, MAX_TEXT));
 }
