@@ -16,7 +16,6 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from minirospy.base.environment import Environment, split_uri
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcRefused, UsageError
@@ -49,7 +48,8 @@ _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a co
 class Result:
     """The last result of one exercise.
 
-    ``time`` is in seconds since 1970 (0: unknown), ``failures`` has the sentences that did not hold, ``ever`` is true once it was passed.
+    ``time`` is in seconds since 1970 (0: unknown), ``failures`` has the sentences that did not hold, ``ever`` is true once it
+    was passed.
     """
 
     passed: bool
@@ -113,7 +113,7 @@ class Record:
         except OSError as error:
             raise MinirospyError(f"{self.path} cannot be written: {error.strerror}") from error
 
-    def to_parameter(self) -> dict[str, Any]:
+    def to_parameter(self) -> dict[str, object]:
         """Return the record as the value of a parameter. ``number`` is an exercise's place in the course."""
         numbers = {name: number for number, name in enumerate(built_in_names())}
         return {
@@ -250,7 +250,7 @@ def _mark(result: Result | None) -> str:
     return "" if result is None else "yes" if result.ever else "no"
 
 
-def _result_of(found: Mapping[str, Any]) -> Result:
+def _result_of(found: Mapping[str, object]) -> Result:
     failures = found.get("failures", [])
     texts = (
         tuple(str(each)[:_MAX_LETTERS] for each in failures[:_MAX_FAILURES])

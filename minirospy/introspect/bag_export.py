@@ -13,7 +13,7 @@ import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 from minirospy.base import private_files
 from minirospy.base.errors import BagError, BagFormatError, MessageException, NotFoundError, UsageError
@@ -164,7 +164,7 @@ def _batches(
 ) -> Iterator[_Batch]:
     topic = connections[0].topic
     times: list[int] = []
-    messages: list[Any] = []
+    messages: list[object] = []
     size = 0
     largest = 0  # bytes of a message: each row of the batch may have as many cells
     for stored in reader.messages([each.id for each in connections]):
@@ -188,7 +188,7 @@ def _batches(
         add(size)
 
 
-def _batch(topic: str, times: list[int], messages: list[Any]) -> _Batch:
+def _batch(topic: str, times: list[int], messages: list[object]) -> _Batch:
     found: dict[str, Column] = {}
     for name, column in _flat(columns(messages)):
         found[_field_name(name)] = column
@@ -225,7 +225,7 @@ def _flat(found: Sequence[Column], prefix: str = "") -> Iterator[tuple[str, Colu
             yield name, Column(name, column.kind, column.values)
 
 
-def _elements(name: str, arrays: Sequence[Sequence[Any] | None]) -> Iterator[tuple[str, Column]]:
+def _elements(name: str, arrays: Sequence[Sequence[object] | None]) -> Iterator[tuple[str, Column]]:
     longest = min(max((len(each) for each in arrays if each is not None), default=0), _MAX_ELEMENTS)
     for index in range(longest):
         values = [each[index] if each is not None and index < len(each) else None for each in arrays]
@@ -293,7 +293,7 @@ def _writer(format_: str, path: str, schema: _Schema) -> Iterator[_Writer]:
 class _CsvWriter(_Writer):
     """Times are seconds with nine decimals, Booleans true and false; the cell of a missing value is empty."""
 
-    def __init__(self, stream: Any, schema: _Schema) -> None:
+    def __init__(self, stream: TextIO, schema: _Schema) -> None:
         self._names = list(schema.columns)
         self._table = csv.writer(stream)
         self._table.writerow(["time", *self._names])
@@ -335,7 +335,7 @@ class _ParquetWriter(_Writer):
         arrays = []
         for field in self._schema:
             column = batch.columns.get(field.name)
-            values: Sequence[Any] = nothing if column is None else column.values
+            values: Sequence[object] = nothing if column is None else column.values
             if field.name == "time":
                 values = batch.times
             arrays.append(self._pyarrow.array(values, type=field.type))

@@ -63,7 +63,7 @@ def _class_of(message_class: Any, name: str, type_: str) -> Any:
     return type(getattr(message_class(), name))
 
 
-def columns(messages: Sequence[Any]) -> list[Column]:
+def columns(messages: Sequence[object]) -> list[Column]:
     """Return the columns of messages, which must all be of the same type. No messages have no columns.
 
     Raise BagError if an array has values for more than MAX_COLUMNS names.
@@ -107,16 +107,16 @@ def _names_of(field: _Leaf) -> str:
     return f"{base}{dot}name"
 
 
-def _belong(names: Sequence[Any], values: Sequence[Any]) -> list[bool]:
+def _belong(names: Sequence[Sequence[object]], values: Sequence[Sequence[object]]) -> list[bool]:
     """Return for each array whether it has values, as many as there are names."""
     return [0 < len(array) == len(own) for own, array in zip(names, values, strict=True)]
 
 
-def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[Any]]) -> Iterator[Column]:
+def _named(path: str, names: Sequence[Sequence[str]], values: Sequence[Sequence[object]]) -> Iterator[Column]:
     known = list(dict.fromkeys(name for own in names for name in own))
     if len(known) > MAX_COLUMNS:
         raise BagError(f"{path} has values for more than {MAX_COLUMNS:,} names: too many columns for a table")
-    found: dict[str, list[Any]] = {name: [None] * len(values) for name in known}
+    found: dict[str, list[object]] = {name: [None] * len(values) for name in known}
     for row, (own, array) in enumerate(zip(names, values, strict=True)):
         for name, value in zip(own, array, strict=False):
             found[name][row] = value

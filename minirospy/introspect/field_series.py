@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from minirospy.base.errors import UsageError
@@ -58,7 +58,7 @@ class Filter(NamedTuple):
     wanted: float | str
     text: str
 
-    def accepts(self, value: Any) -> bool:
+    def accepts(self, value: object) -> bool:
         """Return whether an element has a field that passes the test."""
         for name in self.fields:
             if name not in _slots(value):
@@ -100,7 +100,7 @@ def parse_steps(text: str) -> list[Step]:
     return steps
 
 
-def _filter(found: dict[str, Any], text: str) -> Filter:
+def _filter(found: Mapping[str, str], text: str) -> Filter:
     wanted: float | str = next(
         each for name in ("double", "single", "bare") if (each := found[name]) is not None
     ).strip()
@@ -115,7 +115,9 @@ def _filter(found: dict[str, Any], text: str) -> Filter:
     return Filter(tuple(re.split(r"[./]", found["path"])), _TESTS[found["operator"]], wanted, text)
 
 
-def select(value: Any, steps: Sequence[Step], label: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:
+def select(
+    value: object, steps: Sequence[Step], label: str = "", depth: int = 0
+) -> Iterator[tuple[str, float]]:
     """Yield the label and the value of each number to which the steps lead in a message."""
     if depth == len(steps):
         yield from _leaves(value, label)
@@ -141,7 +143,7 @@ def select(value: Any, steps: Sequence[Step], label: str = "", depth: int = 0) -
 
 
 def _select_field(
-    value: Any, name: str, steps: Sequence[Step], label: str, depth: int
+    value: object, name: str, steps: Sequence[Step], label: str, depth: int
 ) -> Iterator[tuple[str, float]]:
     if name in _slots(value):
         inner = getattr(value, name)
@@ -161,7 +163,7 @@ def _select_field(
         yield f"{label}/{name}", angle
 
 
-def _leaves(value: Any, label: str) -> Iterator[tuple[str, float]]:
+def _leaves(value: object, label: str) -> Iterator[tuple[str, float]]:
     number = _number(value)
     if number is not None:
         yield label, number
