@@ -128,6 +128,11 @@ class Ear:
     def wait(self, count: int) -> None:
         wait_until(lambda: len(self.frames) >= count or self.fault, SECONDS)
 
+    def join(self) -> None:
+        """Wait until the connection has ended."""
+        self._thread.join(SECONDS)
+        assert not self._thread.is_alive()
+
     def close(self) -> None:
         self.may_read.set()
         sockets.hang_up(self._sock)
@@ -585,6 +590,41 @@ def test_an_announcement_that_lies_ends_the_connection() -> None:
         os.close(file)
     one.close()
     ear.close()
+
+
+@pytest.mark.parametrize("newest", [0, 1, 10])
+@pytest.mark.parametrize(
+    ("end", "fault"),
+    [
+        ([], None),
+        ([struct.pack("<I", 5000), b"cut off"], None),
+        ([struct.pack("<I", CHUNK + 1), b"cut off"], None),
+        ([struct.pack("<I", 0xC0000009)], "is over the limit"),
+        ([struct.pack("<III", ring.PLACE_WORD, 0, 9) + b"\0" * 4], "before any memory was offered"),
+    ],
+)
+def test_what_arrived_before_the_end_is_delivered(newest: int, end: list[bytes], fault: str | None) -> None:
+    publisher, subscriber = socket.socketpair()
+    ear = Ear(subscriber)
+    ear.newest = newest
+    ear.may_read.clear()
+    publisher.sendall(serialize_frame(b"first"))
+    ear.wait(1)
+    # While the callback runs, two frames arrive, and the publisher closes. It never reads the answer to PREPARE_WORD,
+    # so Linux resets the connection.
+    ear.may_read.set()
+    publisher.sendall(ring.prepare())
+    publisher.recv(1, socket.MSG_PEEK)
+    ear.may_read.clear()
+    publisher.sendall(serialize_frame(b"second"))
+    ear.wait(2)
+    publisher.sendall(b"".join([serialize_frame(b"x" * (CHUNK + 100)), serialize_frame(b"last"), *end]))
+    publisher.close()
+    ear.may_read.set()
+    ear.join()
+    kept = [b"x" * (CHUNK + 100), b"last"]
+    assert ear.frames[2:] == (kept[-newest:] if newest else kept)
+    assert (fault in str(ear.fault)) if fault else ear.fault is None
 
 
 def test_a_publisher_that_is_gone_has_sent_its_messages(loop: LoopThread) -> None:
