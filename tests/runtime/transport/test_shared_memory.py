@@ -355,6 +355,48 @@ def test_a_quiet_topic_gives_its_memory_back(loop: LoopThread, monkeypatch: pyte
     mouth.close()
 
 
+def resident_bytes() -> int:
+    """Return the bytes of rings that are in this process's memory."""
+    total = 0
+    is_ring = False
+    for line in Path("/proc/self/smaps").read_text(encoding="utf-8").splitlines():
+        if "-" in line.split(maxsplit=1)[0]:
+            is_ring = "minirospy-ring" in line
+        elif is_ring and line.startswith("Rss:"):
+            total += int(line.split()[1]) * 1024
+    return total
+
+
+def test_a_replaced_ring_gives_its_memory_back(loop: LoopThread, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
+    mouth = Mouth(loop)
+    slow, fast = Ear(mouth.connect(name="/slow")), Ear(mouth.connect(name="/fast"))
+    count = mouth.warm_up(slow, fast, size=200_000)
+    slow.may_read.clear()
+    frames = [image(number, 200_000) for number in range(4)]
+    mouth.publish(*frames)
+    fast.wait(count + 4)
+    # The fast subscriber gets a ring with larger places, while the slow one holds places of the old ring.
+    for number in range(4, 7):
+        frames.append(image(number, 400_000))
+        mouth.publish(frames[-1])
+        fast.wait(count + len(frames))
+        wait_until(lambda: mouth.steps()[1] not in (Step.ASKED, Step.OFFERED), SECONDS)
+    wait_until(lambda: mouth.publication.shared_bytes <= 4 * 200_000, SECONDS)
+    # The slow one holds at least three: the memory of these is kept, and counted.
+    assert mouth.publication.shared_bytes >= 3 * 200_000
+
+    slow.may_read.set()
+    slow.wait(count + len(frames))
+    assert list(map(bytes, slow.frames[count:])) == list(map(whole, frames))
+    # No large message follows, so the slow subscriber still maps the old ring.
+    wait_until(lambda: not mouth.publication.shared_bytes, SECONDS)
+    wait_until(lambda: not resident_bytes(), SECONDS)
+    slow.close()
+    fast.close()
+    mouth.close()
+
+
 def test_memory_ends_with_the_last_subscriber(mouth: Mouth) -> None:
     ear = Ear(mouth.connect())
     mouth.warm_up(ear)
