@@ -204,8 +204,12 @@ class Places:
         self._holders[place] += 1
 
     def take_back(self, connection: Hashable) -> None:
-        """Undo the last :meth:`hold` of a connection: the place was not announced."""
-        self.let_go(self._held[connection].pop()[0])
+        """Undo the last :meth:`hold` of a connection: the place was not announced.
+
+        Do nothing if the connection holds no place: a subscriber may have released more than was announced.
+        """
+        if held := self._held.get(connection):
+            self.let_go(held.pop()[0])
 
     def release(self, connection: Hashable, count: int) -> bool:
         """Release the oldest ``count`` places of a connection. Return False, and release none, if it holds fewer."""

@@ -31,7 +31,13 @@ from minirospy.core.wire.framing import (
     split_sizes,
 )
 from minirospy.runtime.transport.shared_memory import RingReceiver
-from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive, is_readable, may_busy_poll
+from minirospy.runtime.transport.sockets import (
+    BUSY_POLL_SECONDS,
+    FAMILIES,
+    busy_receive,
+    is_readable,
+    may_busy_poll,
+)
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
@@ -182,6 +188,9 @@ class _FrameSource:
         self._was_large = False
         self._may_busy_poll = may_busy_poll(sock)
         self._is_fast = False
+        # On a Unix socket, a reset is the end: Linux reports it after all data if the publisher closed before it had read an
+        # answer about shared memory.
+        self._is_unix = sock.family not in FAMILIES
         self._ring = RingReceiver() if shares_memory else None
 
     def close(self) -> None:
@@ -211,6 +220,14 @@ class _FrameSource:
 
     def _receive(self, space: memoryview) -> int:
         """Wait for bytes; busy-poll if the previous ones arrived faster than a thread wakes up."""
+        try:
+            return self._receive_some(space)
+        except ConnectionResetError:
+            if self._is_unix:
+                return 0
+            raise
+
+    def _receive_some(self, space: memoryview) -> int:
         if self._ring and self._ring.expects_files:
             data = self._ring.receive(self.sock, len(space))
             space[: len(data)] = data
@@ -300,36 +317,40 @@ class _FrameSource:
         return b"".join(parts)
 
     def _receive_bytes(self, count: int) -> bytes:
-        if self._ring and self._ring.expects_files:
-            return self._ring.receive(self.sock, min(count, _CLAIM), _WAIT_ALL)
-        return self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
+        try:
+            if self._ring and self._ring.expects_files:
+                return self._ring.receive(self.sock, min(count, _CLAIM), _WAIT_ALL)
+            return self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
+        except ConnectionResetError:
+            if self._is_unix:
+                return b""
+            raise
 
 
 def _deliver_newest(
     source: _FrameSource, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
 ) -> None:
-    """Read while frames are ready, then deliver the newest ones."""
+    """Read while frames are ready, then deliver the newest ones, even if the connection ends or fails meanwhile."""
     kept: deque[Frame] = deque(maxlen=newest)
     total = 0
-    ended = False
+    end: Exception | None = None
 
-    while True:
-        for frame in frames:
-            total += len(frame)
-            # Copy a small frame, because the next receive overwrites the reader's buffer.
-            kept.append(frame if isinstance(frame, bytes) else bytes(frame))
-        if total >= _DRAIN_BYTES or not is_readable(source.sock):
-            break
-        try:
+    try:
+        while True:
+            for frame in frames:
+                total += len(frame)
+                # Copy a small frame, because the next receive overwrites the reader's buffer.
+                kept.append(frame if isinstance(frame, bytes) else bytes(frame))
+            if total >= _DRAIN_BYTES or not is_readable(source.sock):
+                break
             frames = source.read()
-        except _Ended:
-            ended = True
-            break
+    except (_Ended, OSError, WireError) as error:
+        end = error
 
     for frame in kept:
         deliver(frame if isinstance(frame, SplitFrame) else memoryview(frame))
-    if ended:
-        raise _Ended
+    if end:
+        raise end
 
 
 class _Ended(Exception):

@@ -131,6 +131,9 @@ class SharedRing:
         self.memory: _Memory | None = None
         self._loop = loop
         self._senders: set[RingSender] = set()
+        self._retired: list[
+            _Memory
+        ] = []  # replaced memories that a connection still uses, and that still have memory
         self._is_off = False
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
@@ -140,7 +143,8 @@ class SharedRing:
     def memory_bytes(self) -> int:
         """Return the number of bytes that this process has allocated for the ring."""
         with self.lock:
-            return self.memory.backed_bytes if self.memory else 0
+            memories = [*self._retired, *([self.memory] if self.memory else [])]
+            return sum(memory.backed_bytes for memory in memories)
 
     def share(self, frame: LargeFrame) -> Sharing:
         """Return the object that writes ``frame`` into the ring when the first connection needs it."""
@@ -160,11 +164,23 @@ class SharedRing:
         self._senders.discard(sender)
         if not self._senders:
             self.retire()
+        self.give_back_retired()
 
     def collect(self) -> None:
         """Free the places that subscribers have released. Call this with the lock held."""
         for sender in self._senders:
             sender.collect()
+        if self._retired:
+            self.give_back_retired()
+
+    def give_back_retired(self) -> None:
+        """Give back the free places of replaced memories, because nobody writes them again. Call this with the lock held."""
+        used = {sender.memory for sender in self._senders}
+        for memory in self._retired:
+            # If the system cannot do this, the memory is freed when its last user unmaps it.
+            with contextlib.suppress(OSError):
+                memory.give_back()
+        self._retired = [memory for memory in self._retired if memory in used and memory.backed_bytes]
 
     def fitting(self, size: int) -> _Memory | None:
         """Return the memory if a message of ``size`` bytes fits into its places; replace it if not.
@@ -192,13 +208,16 @@ class SharedRing:
         """Stop using the current memory. Subscribers that have mapped it keep it. Call this with the lock held."""
         if self.memory:
             self.memory.close()
+            self._retired.append(self.memory)
             self.memory = None
+            self.give_back_retired()
 
     def close(self) -> None:
         """Use sockets only from now on, and stop the timer. Call this on the loop. Idempotent."""
         with self.lock:
             self._is_off = True
             self.retire()
+            self._retired = []
         if self._timer:
             self._timer.cancel()
 
@@ -211,21 +230,21 @@ class SharedRing:
                 self._loop.call_soon_threadsafe(self._watch)
 
     def _watch(self) -> None:
-        if not self._is_off:
+        if not self._is_off or self._retired:
             self._timer = self._loop.call_later(QUIET_SECONDS, self._look)
 
     def _look(self) -> None:
         """Give memory back if no place was used since the last look."""
         with self.lock:
+            self.collect()
             if self._was_used:
                 self._was_used = False
             elif self.memory:
-                self.collect()
                 try:
                     self.memory.give_back()
                 except OSError as error:
                     self.turn_off(error)
-            self._is_watched = bool(self.memory and self.memory.backed_bytes)
+            self._is_watched = bool(self._retired or (self.memory and self.memory.backed_bytes))
             if self._is_watched:
                 self._watch()
 
@@ -266,6 +285,8 @@ class Sharing:
         if memory:
             with self._ring.lock:
                 memory.places.let_go(self._place)
+                if memory is not self._ring.memory:
+                    self._ring.give_back_retired()
 
     def __enter__(self) -> Sharing:
         return self
@@ -284,7 +305,7 @@ class RingSender:
         self.announced = 0  # number of messages that went through the ring
         self._ring = shared
         self._sock = sock
-        self._memory: _Memory | None = None  # the memory that was offered last
+        self.memory: _Memory | None = None  # the memory that was offered last
         self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
         self._is_releasing = True  # whether the last wait for a release was successful
 
@@ -295,7 +316,7 @@ class RingSender:
         """
         step = self.step
         if step is Step.IN_USE:
-            memory = self._memory
+            memory = self.memory
             assert memory is not None
             if memory is self._ring.memory and sharing.frame.size <= memory.layout.place_size:
                 return self._announce(memory, sharing, may_wait=may_wait)
@@ -321,8 +342,8 @@ class RingSender:
 
     def collect(self) -> None:
         """Free the places that the subscriber has released. Call this with the ring's lock held."""
-        memory = self._memory
-        if memory is None or memory is not self._ring.memory or not memory.places.held_by(self):
+        memory = self.memory
+        if memory is None or not memory.places.held_by(self):
             return
         try:
             count = os.eventfd_read(self._counter)
@@ -336,7 +357,7 @@ class RingSender:
         """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced."""
         with self._ring.lock:
             self.collect()
-            memory, self._memory = self._memory, None
+            memory, self.memory = self.memory, None
             if memory and memory is self._ring.memory and memory.places.held_by(self):
                 self._ring.retire()
             self._ring.remove(self)
@@ -398,7 +419,7 @@ class RingSender:
             if memory is None:
                 self.step = Step.OFF
                 return
-            self._close_counter()
+            self._forget_memory()
             try:
                 self._counter = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
             except OSError as error:
@@ -406,11 +427,19 @@ class RingSender:
                 _log.debug("no shared memory for a connection: %s", error)
                 self.step = Step.OFF
                 return
-            self._memory = memory
+            self.memory = memory
             self._is_releasing = True
             self.step = Step.OFFERED
             files = array.array("i", [memory.read_only, self._counter])
             self._send(ring.offer(memory.layout.size), [(socket.SOL_SOCKET, socket.SCM_RIGHTS, files)])
+
+    def _forget_memory(self) -> None:
+        """Release all places of the previous ring: the subscriber had read them before it answered :data:`ring.READY`."""
+        memory, self.memory = self.memory, None
+        if memory:
+            memory.places.release(self, memory.places.held_by(self))
+            self._ring.give_back_retired()
+        self._close_counter()
 
     def _send(self, data: bytes, ancillary: list[tuple[int, int, array.array[int]]] | None = None) -> None:
         """Send a few bytes. Raise OSError if the connection has failed, BlockingIOError if its buffer is full."""

@@ -79,6 +79,19 @@ def test_the_place_that_became_free_last_is_used_first() -> None:
     assert places.take() == first
 
 
+def test_a_place_that_was_released_too_early_is_not_taken_back_twice() -> None:
+    places = Places(2)
+    place = places.take()
+    assert place is not None
+    places.hold("liar", place, 1)
+    assert places.release("liar", 1)
+    places.take_back("liar")
+    places.let_go(place)
+    assert sorted(places.free) == [0, 1]
+    places.take_back("stranger")
+    assert sorted(places.free) == [0, 1]
+
+
 def test_a_slow_connection_holds_a_few_places_and_a_few_bytes() -> None:
     places = Places(16)
 

@@ -128,6 +128,11 @@ class Ear:
     def wait(self, count: int) -> None:
         wait_until(lambda: len(self.frames) >= count or self.fault, SECONDS)
 
+    def join(self) -> None:
+        """Wait until the connection has ended."""
+        self._thread.join(SECONDS)
+        assert not self._thread.is_alive()
+
     def close(self) -> None:
         self.may_read.set()
         sockets.hang_up(self._sock)
@@ -347,6 +352,48 @@ def test_a_quiet_topic_gives_its_memory_back(loop: LoopThread, monkeypatch: pyte
     assert bytes(ear.frames[-1]) == whole(frame)
     assert mouth.sender(0).announced >= 2
     ear.close()
+    mouth.close()
+
+
+def resident_bytes() -> int:
+    """Return the bytes of rings that are in this process's memory."""
+    total = 0
+    is_ring = False
+    for line in Path("/proc/self/smaps").read_text(encoding="utf-8").splitlines():
+        if "-" in line.split(maxsplit=1)[0]:
+            is_ring = "minirospy-ring" in line
+        elif is_ring and line.startswith("Rss:"):
+            total += int(line.split()[1]) * 1024
+    return total
+
+
+def test_a_replaced_ring_gives_its_memory_back(loop: LoopThread, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
+    mouth = Mouth(loop)
+    slow, fast = Ear(mouth.connect(name="/slow")), Ear(mouth.connect(name="/fast"))
+    count = mouth.warm_up(slow, fast, size=200_000)
+    slow.may_read.clear()
+    frames = [image(number, 200_000) for number in range(4)]
+    mouth.publish(*frames)
+    fast.wait(count + 4)
+    # The fast subscriber gets a ring with larger places, while the slow one holds places of the old ring.
+    for number in range(4, 7):
+        frames.append(image(number, 400_000))
+        mouth.publish(frames[-1])
+        fast.wait(count + len(frames))
+        wait_until(lambda: mouth.steps()[1] not in (Step.ASKED, Step.OFFERED), SECONDS)
+    wait_until(lambda: mouth.publication.shared_bytes <= 4 * 200_000, SECONDS)
+    # The slow one holds at least three: the memory of these is kept, and counted.
+    assert mouth.publication.shared_bytes >= 3 * 200_000
+
+    slow.may_read.set()
+    slow.wait(count + len(frames))
+    assert list(map(bytes, slow.frames[count:])) == list(map(whole, frames))
+    # No large message follows, so the slow subscriber still maps the old ring.
+    wait_until(lambda: not mouth.publication.shared_bytes, SECONDS)
+    wait_until(lambda: not resident_bytes(), SECONDS)
+    slow.close()
+    fast.close()
     mouth.close()
 
 
@@ -585,6 +632,41 @@ def test_an_announcement_that_lies_ends_the_connection() -> None:
         os.close(file)
     one.close()
     ear.close()
+
+
+@pytest.mark.parametrize("newest", [0, 1, 10])
+@pytest.mark.parametrize(
+    ("end", "fault"),
+    [
+        ([], None),
+        ([struct.pack("<I", 5000), b"cut off"], None),
+        ([struct.pack("<I", CHUNK + 1), b"cut off"], None),
+        ([struct.pack("<I", 0xC0000009)], "is over the limit"),
+        ([struct.pack("<III", ring.PLACE_WORD, 0, 9) + b"\0" * 4], "before any memory was offered"),
+    ],
+)
+def test_what_arrived_before_the_end_is_delivered(newest: int, end: list[bytes], fault: str | None) -> None:
+    publisher, subscriber = socket.socketpair()
+    ear = Ear(subscriber)
+    ear.newest = newest
+    ear.may_read.clear()
+    publisher.sendall(serialize_frame(b"first"))
+    ear.wait(1)
+    # While the callback runs, two frames arrive, and the publisher closes. It never reads the answer to PREPARE_WORD,
+    # so Linux resets the connection.
+    ear.may_read.set()
+    publisher.sendall(ring.prepare())
+    publisher.recv(1, socket.MSG_PEEK)
+    ear.may_read.clear()
+    publisher.sendall(serialize_frame(b"second"))
+    ear.wait(2)
+    publisher.sendall(b"".join([serialize_frame(b"x" * (CHUNK + 100)), serialize_frame(b"last"), *end]))
+    publisher.close()
+    ear.may_read.set()
+    ear.join()
+    kept = [b"x" * (CHUNK + 100), b"last"]
+    assert ear.frames[2:] == (kept[-newest:] if newest else kept)
+    assert (fault in str(ear.fault)) if fault else ear.fault is None
 
 
 def test_a_publisher_that_is_gone_has_sent_its_messages(loop: LoopThread) -> None:
