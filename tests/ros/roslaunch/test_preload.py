@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import re
@@ -316,6 +317,64 @@ def test_forked_process_is_waited_for_like_a_started_one(runner: Runner) -> None
     process.terminate()
     assert process.wait() == process.poll() == process.returncode == -signal.SIGTERM
     process.kill()
+
+
+@pytest.mark.parametrize("_", range(5))
+def test_nodes_of_launches_in_two_threads_are_children(tmp_path: Path, _: int) -> None:
+    runners = [Runner(tmp_path, LAUNCH=str(number)) for number in range(2)]
+    program = runners[0].write("import time; time.sleep(60)")
+    barrier = threading.Barrier(len(runners))
+    nodes: list[ForkedProcess] = []
+
+    def launch(made: Runner) -> None:
+        barrier.wait()
+        for _ in range(6):
+            process = made.fork(made.start(program), 1, 2)
+            assert process
+            nodes.append(process)
+
+    threads = [threading.Thread(target=launch, args=(made,)) for made in runners]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for made in runners:
+        made.preload.close()
+    parents = [psutil.Process(each.pid).ppid() for each in nodes]
+    for each in nodes:
+        os.kill(each.pid, signal.SIGKILL)
+    assert parents == [os.getpid()] * 12
+    assert [each.wait(60) for each in nodes] == [-signal.SIGKILL] * 12
+
+
+def test_running_process_of_another_parent_has_no_exit_status() -> None:
+    # The shell exits first, so that the process is an orphan.
+    shell = ["sh", "-c", "sleep 60 >/dev/null & echo $!"]
+    pid = int(subprocess.run(shell, stdout=subprocess.PIPE, check=True).stdout)
+    process = ForkedProcess(("sleep", "60"), pid)
+    assert process.poll() is None
+    process.terminate()
+    assert process.wait(60) == 0
+
+
+def test_process_without_a_status_has_status_0(runner: Runner) -> None:
+    process = runner.fork(runner.start(runner.write("raise SystemExit(3)")), 1, 2)
+    assert process
+    os.waitpid(process.pid, 0)
+    assert process.poll() == process.wait(60) == 0
+
+
+@pytest.mark.parametrize("is_on", [0, 1])
+def test_fork_keeps_the_subreaper_setting_of_the_program(runner: Runner, is_on: int) -> None:
+    library = ctypes.CDLL(None)
+    value = ctypes.c_int()
+    library.prctl(36, is_on, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER
+    try:
+        assert runner.forked(runner.start(runner.write(""))).status == 0
+        library.prctl(37, ctypes.byref(value), 0, 0, 0)  # PR_GET_CHILD_SUBREAPER
+    finally:
+        library.prctl(36, 0, 0, 0, 0)
+    assert value.value == is_on
 
 
 NODES = """<env name="E" value="1"/>
