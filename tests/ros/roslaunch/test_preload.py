@@ -208,6 +208,61 @@ def test_forked_program_ends_like_a_started_one(tmp_path: Path, unbuffered: str)
         made.preload.close()
 
 
+CONFIGURE = {
+    "dictConfig": """logging.config.dictConfig({"version": 1, "handlers": {"h": {"class": "logging.StreamHandler"}},
+    "root": {"handlers": ["h"], "level": "INFO"}})""",
+    "fileConfig": """logging.config.fileConfig(io.StringIO('''[loggers]
+keys=root
+[handlers]
+keys=h
+[formatters]
+keys=
+[logger_root]
+level=INFO
+handlers=h
+[handler_h]
+class=StreamHandler
+args=()
+'''))""",
+}
+
+
+@pytest.mark.parametrize("configure", CONFIGURE.values(), ids=list(CONFIGURE))
+@pytest.mark.parametrize(
+    "imports", ["import rospy", "from rospy.core import logwarn", "import tf2_ros", "import rospy.names"]
+)
+def test_program_can_configure_logging_before_it_imports_rospy(
+    runner: Runner, configure: str, imports: str
+) -> None:
+    report = """
+import rospy
+rospy.logwarn("battery low")
+logging.getLogger("minirospy.runtime.node.topics").warning("topics")
+print(sorted(name for name in sys.modules if name.startswith("rospy")))
+print(rospy.__spec__.origin, rospy.__loader__ is rospy.__spec__.loader, rospy.core is sys.modules["rospy.core"])
+"""
+    text = f"import io, logging.config, sys\n{configure}\n{imports}\n{report}"
+    result = runner.both(runner.start(runner.write(text)))
+    assert "battery low" in result.stderr
+    assert "topics" in result.stderr
+
+
+def test_configuring_logging_after_the_import_of_rospy_disables_its_loggers(runner: Runner) -> None:
+    text = "import io, logging.config, rospy\n" + CONFIGURE["dictConfig"] + "\nrospy.logwarn('battery low')"
+    assert runner.both(runner.start(runner.write(text))) == Result(0, "", "")
+
+
+def test_program_sees_whether_it_has_imported_rospy(runner: Runner) -> None:
+    text = """import importlib.util, sys
+print([name for name in sys.modules if name.startswith("rospy")])
+print(importlib.util.find_spec("rospy").origin, "rospy" in sys.modules)
+print(importlib.util.find_spec("rospy.core").origin, "rospy" in sys.modules)
+import rospy
+print(importlib.util.find_spec("rospy") is rospy.__spec__, importlib.reload(rospy) is rospy)
+"""
+    assert runner.both(runner.start(runner.write(text))).status == 0
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP])
 def test_signal_ends_a_forked_program_like_a_started_one(runner: Runner, number: signal.Signals) -> None:
     # The traceback names one line, whenever the signal arrives.
