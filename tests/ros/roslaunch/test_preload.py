@@ -265,9 +265,15 @@ print(importlib.util.find_spec("rospy") is rospy.__spec__, importlib.reload(rosp
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP])
 def test_signal_ends_a_forked_program_like_a_started_one(runner: Runner, number: signal.Signals) -> None:
-    # The traceback names one line, whenever the signal arrives.
     start = runner.start(runner.write("import os, time\nos.write(1, b'ready\\n') and time.sleep(60)\n"))
-    result = runner.both(start, lambda pid: os.killpg(pid, number))
+
+    def interrupt(pid: int) -> None:
+        # The traceback marks the call that the signal interrupts.
+        while psutil.Process(pid).status() != psutil.STATUS_SLEEPING:
+            os.sched_yield()
+        os.killpg(pid, number)
+
+    result = runner.both(start, interrupt)
     assert result.status == -number
 
 
