@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import re
@@ -207,17 +208,72 @@ def test_forked_program_ends_like_a_started_one(tmp_path: Path, unbuffered: str)
         made.preload.close()
 
 
+CONFIGURE = {
+    "dictConfig": """logging.config.dictConfig({"version": 1, "handlers": {"h": {"class": "logging.StreamHandler"}},
+    "root": {"handlers": ["h"], "level": "INFO"}})""",
+    "fileConfig": """logging.config.fileConfig(io.StringIO('''[loggers]
+keys=root
+[handlers]
+keys=h
+[formatters]
+keys=
+[logger_root]
+level=INFO
+handlers=h
+[handler_h]
+class=StreamHandler
+args=()
+'''))""",
+}
+
+
+@pytest.mark.parametrize("configure", CONFIGURE.values(), ids=list(CONFIGURE))
+@pytest.mark.parametrize(
+    "imports", ["import rospy", "from rospy.core import logwarn", "import tf2_ros", "import rospy.names"]
+)
+def test_program_can_configure_logging_before_it_imports_rospy(
+    runner: Runner, configure: str, imports: str
+) -> None:
+    report = """
+import rospy
+rospy.logwarn("battery low")
+logging.getLogger("minirospy.runtime.node.topics").warning("topics")
+print(sorted(name for name in sys.modules if name.startswith("rospy")))
+print(rospy.__spec__.origin, rospy.__loader__ is rospy.__spec__.loader, rospy.core is sys.modules["rospy.core"])
+"""
+    text = f"import io, logging.config, sys\n{configure}\n{imports}\n{report}"
+    result = runner.both(runner.start(runner.write(text)))
+    assert "battery low" in result.stderr
+    assert "topics" in result.stderr
+
+
+def test_configuring_logging_after_the_import_of_rospy_disables_its_loggers(runner: Runner) -> None:
+    text = "import io, logging.config, rospy\n" + CONFIGURE["dictConfig"] + "\nrospy.logwarn('battery low')"
+    assert runner.both(runner.start(runner.write(text))) == Result(0, "", "")
+
+
+def test_program_sees_whether_it_has_imported_rospy(runner: Runner) -> None:
+    text = """import importlib.util, sys
+print([name for name in sys.modules if name.startswith("rospy")])
+print(importlib.util.find_spec("rospy").origin, "rospy" in sys.modules)
+print(importlib.util.find_spec("rospy.core").origin, "rospy" in sys.modules)
+import rospy
+print(importlib.util.find_spec("rospy") is rospy.__spec__, importlib.reload(rospy) is rospy)
+"""
+    assert runner.both(runner.start(runner.write(text))).status == 0
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP])
 def test_signal_ends_a_forked_program_like_a_started_one(runner: Runner, number: signal.Signals) -> None:
     start = runner.start(runner.write("import os, time\nos.write(1, b'ready\\n') and time.sleep(60)\n"))
 
-    def end(pid: int) -> None:
+    def interrupt(pid: int) -> None:
         # The traceback marks the call that the signal interrupts.
         while psutil.Process(pid).status() != psutil.STATUS_SLEEPING:
-            pass
+            os.sched_yield()
         os.killpg(pid, number)
 
-    result = runner.both(start, end)
+    result = runner.both(start, interrupt)
     assert result.status == -number
 
 
@@ -322,6 +378,64 @@ def test_forked_process_is_waited_for_like_a_started_one(runner: Runner) -> None
     process.terminate()
     assert process.wait() == process.poll() == process.returncode == -signal.SIGTERM
     process.kill()
+
+
+@pytest.mark.parametrize("_", range(5))
+def test_nodes_of_launches_in_two_threads_are_children(tmp_path: Path, _: int) -> None:
+    runners = [Runner(tmp_path, LAUNCH=str(number)) for number in range(2)]
+    program = runners[0].write("import time; time.sleep(60)")
+    barrier = threading.Barrier(len(runners))
+    nodes: list[ForkedProcess] = []
+
+    def launch(made: Runner) -> None:
+        barrier.wait()
+        for _ in range(6):
+            process = made.fork(made.start(program), 1, 2)
+            assert process
+            nodes.append(process)
+
+    threads = [threading.Thread(target=launch, args=(made,)) for made in runners]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for made in runners:
+        made.preload.close()
+    parents = [psutil.Process(each.pid).ppid() for each in nodes]
+    for each in nodes:
+        os.kill(each.pid, signal.SIGKILL)
+    assert parents == [os.getpid()] * 12
+    assert [each.wait(60) for each in nodes] == [-signal.SIGKILL] * 12
+
+
+def test_running_process_of_another_parent_has_no_exit_status() -> None:
+    # The shell exits first, so that the process is an orphan.
+    shell = ["sh", "-c", "sleep 60 >/dev/null & echo $!"]
+    pid = int(subprocess.run(shell, stdout=subprocess.PIPE, check=True).stdout)
+    process = ForkedProcess(("sleep", "60"), pid)
+    assert process.poll() is None
+    process.terminate()
+    assert process.wait(60) == 0
+
+
+def test_process_without_a_status_has_status_0(runner: Runner) -> None:
+    process = runner.fork(runner.start(runner.write("raise SystemExit(3)")), 1, 2)
+    assert process
+    os.waitpid(process.pid, 0)
+    assert process.poll() == process.wait(60) == 0
+
+
+@pytest.mark.parametrize("is_on", [0, 1])
+def test_fork_keeps_the_subreaper_setting_of_the_program(runner: Runner, is_on: int) -> None:
+    library = ctypes.CDLL(None)
+    value = ctypes.c_int()
+    library.prctl(36, is_on, 0, 0, 0)  # PR_SET_CHILD_SUBREAPER
+    try:
+        assert runner.forked(runner.start(runner.write(""))).status == 0
+        library.prctl(37, ctypes.byref(value), 0, 0, 0)  # PR_GET_CHILD_SUBREAPER
+    finally:
+        library.prctl(36, 0, 0, 0, 0)
+    assert value.value == is_on
 
 
 NODES = """<env name="E" value="1"/>

@@ -16,7 +16,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -27,7 +27,9 @@ MIN_NODES = 3  # similar nodes for which a preloaded process pays off
 REPLY_SECONDS = 30.0  # for a preloaded process to answer, on a busy machine
 POLL_SECONDS = 0.01  # between two checks whether a process has exited
 
-_PR_SET_CHILD_SUBREAPER = 36
+_PR_SET_CHILD_SUBREAPER, _PR_GET_CHILD_SUBREAPER = 36, 37
+_FORKING = threading.Lock()
+"""Held while this process is a subreaper for a fork, because that is a setting of the process, not of a thread."""
 
 _MIRRORED = frozenset(
     ("PYTHONPATH", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING", "PYTHONUTF8")
@@ -85,6 +87,7 @@ class ForkedProcess:
         self.args = args
         self.pid = pid
         self.returncode: int | None = None
+        self._start_time = _start_time(pid)
         self._lock = threading.Lock()
 
     def poll(self) -> int | None:
@@ -94,8 +97,10 @@ class ForkedProcess:
                 try:
                     pid, status = os.waitpid(self.pid, os.WNOHANG)
                 except ChildProcessError:
-                    # SIGCHLD is ignored, so the system has discarded the status. subprocess returns 0 then, too.
-                    self.returncode = 0
+                    # SIGCHLD is ignored, or another part of the program has taken the status: subprocess returns 0 then,
+                    # too. Or the process has another parent.
+                    if self._start_time is None or _start_time(self.pid) != self._start_time:
+                        self.returncode = 0
                 else:
                     if pid:
                         self.returncode = os.waitstatus_to_exitcode(status)
@@ -127,6 +132,16 @@ class ForkedProcess:
     def kill(self) -> None:
         """Send SIGKILL."""
         self.send_signal(signal.SIGKILL)
+
+
+def _start_time(pid: int) -> bytes | None:
+    """Return when a process started, which tells it from a later one with the same id; None if it has exited."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    # proc(5): the state is field 3 and the start time field 22. A zombie has exited.
+    return None if fields[0] in b"ZX" else fields[19]
 
 
 class Preload:
@@ -211,21 +226,21 @@ class _Parent:
         gate, opener = os.pipe()
         with open(opener, "wb", buffering=0) as starter:
             try:
-                _set_subreaper(True)
-                head = len(body).to_bytes(self._protocol.LENGTH_SIZE, "little")
-                socket.send_fds(self._socket, [head], [*fds, gate])
-                self._socket.sendall(body)
-                answer = self._socket.recv(64)
+                with _subreaper():
+                    head = len(body).to_bytes(self._protocol.LENGTH_SIZE, "little")
+                    socket.send_fds(self._socket, [head], [*fds, gate])
+                    self._socket.sendall(body)
+                    answer = self._socket.recv(64)
             finally:
-                _set_subreaper(False)
                 os.close(gate)
             if answer == self._protocol.REFUSED:
                 return None
             if not answer:
                 raise ConnectionError("the process exited")
+            process = ForkedProcess(start.command, int(answer))
             # If this process ends before it writes, the node exits without running its program.
             starter.write(b"1")
-        return ForkedProcess(start.command, int(answer))
+        return process
 
     def close(self) -> None:
         """End the process."""
@@ -237,11 +252,24 @@ class _Parent:
             self._popen.wait()
 
 
-def _set_subreaper(is_on: bool) -> None:
-    """Let this process become the parent of orphaned descendants, or not. Raise OSError if the system refuses."""
+@contextlib.contextmanager
+def _subreaper() -> Iterator[None]:
+    """Let this process become the parent of orphaned descendants. Raise OSError if the system refuses."""
     import ctypes
 
     library = ctypes.CDLL(None, use_errno=True)
     library.prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
-    if library.prctl(_PR_SET_CHILD_SUBREAPER, int(is_on), 0, 0, 0):
-        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
+
+    def call(option: int, value: int) -> None:
+        if library.prctl(option, value, 0, 0, 0):
+            raise OSError(ctypes.get_errno(), "prctl")
+
+    with _FORKING:
+        # The program may need the setting for its own processes.
+        before = ctypes.c_int()
+        call(_PR_GET_CHILD_SUBREAPER, ctypes.addressof(before))
+        call(_PR_SET_CHILD_SUBREAPER, 1)
+        try:
+            yield
+        finally:
+            call(_PR_SET_CHILD_SUBREAPER, before.value)

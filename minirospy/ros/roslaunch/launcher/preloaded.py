@@ -22,12 +22,15 @@ import contextlib
 import ctypes
 import gc
 import io
+import logging
 import marshal
 import mmap
 import os
 import socket
 import threading
+from collections.abc import Sequence
 from importlib import import_module
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any, NamedTuple, TextIO
 
@@ -225,6 +228,53 @@ def become(order: Order, main: dict[str, Any]) -> None:
     module.__file__ = order.program
     find_packages_named_like_scripts()
     del module.__file__
+    sys.meta_path.insert(0, _FirstImport())
+
+
+class _FirstImport:
+    """Hides the imported rospy until the program imports it, and then enables the loggers of the imported modules.
+
+    If a program configures logging before that, it disables all loggers that exist. In a started node, these loggers do not
+    exist yet. The class is a finder and a loader without their base classes, because importlib.abc imports large modules.
+    """
+
+    def __init__(self) -> None:
+        self._modules = {
+            name: module
+            for name, module in sys.modules.items()
+            if name == "rospy" or name.startswith("rospy.")
+        }
+        spec = self._modules["rospy"].__spec__
+        assert spec is not None
+        self._spec = spec
+        self._loggers = [
+            each for each in logging.root.manager.loggerDict.values() if isinstance(each, logging.Logger)
+        ]
+        for name in self._modules:
+            del sys.modules[name]
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return a spec of rospy with this loader."""
+        if fullname != "rospy":
+            return None
+        loader: Any = self
+        spec = ModuleSpec(fullname, loader, origin=self._spec.origin)
+        spec.submodule_search_locations = self._spec.submodule_search_locations
+        return spec
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return the module that is already imported."""
+        return self._modules["rospy"]
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Show the modules again, as after an import, and enable their loggers."""
+        module.__spec__ = self._spec
+        sys.modules.update(self._modules)
+        sys.meta_path.remove(self)
+        for logger in self._loggers:
+            logger.disabled = False
 
 
 def _stream(fd: int, name: str, mode: str, like: TextIO) -> io.TextIOWrapper:
