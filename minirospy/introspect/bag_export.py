@@ -27,7 +27,7 @@ __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
 MAX_BATCH = 2_000  # messages
-_MAX_CELLS = 8_000_000  # of a batch; a cell of a message is at least one byte of it
+MAX_CELLS = 8_000_000  # of a batch; a cell of a message is at least one byte of it
 _MAX_ELEMENTS = 10_000  # of an array that have columns
 _SECOND = 10**9
 _MAX_INT64 = (1 << 63) - 1
@@ -143,7 +143,7 @@ def _export_topic(
     rows = 0
     try:
         with naming_full_disk(target), _writer(format_, partial, schema) as writer:
-            most = min(MAX_BATCH, _MAX_CELLS // (len(schema.columns) + 1))
+            most = min(MAX_BATCH, MAX_CELLS // (len(schema.columns) + 1))
             for batch in _batches(reader, connections, message_class, add, most):
                 writer.write(batch)
                 rows += len(batch.times)
@@ -169,7 +169,7 @@ def _batches(
     largest = 0  # bytes of a message: each row of the batch may have as many cells
     for stored in reader.messages([each.id for each in connections]):
         largest = max(largest, len(stored.body))
-        if times and (len(times) == most or (len(times) + 1) * largest > _MAX_CELLS):
+        if times and (len(times) == most or (len(times) + 1) * largest > MAX_CELLS):
             yield _batch(topic, times, messages)
             add(size)
             times, messages, size, largest = [], [], 0, len(stored.body)

@@ -118,7 +118,7 @@ def test_table_with_too_many_columns_is_refused(tmp_path: Path) -> None:
 
 
 def test_batches_have_a_limited_number_of_cells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bag_export, "_MAX_CELLS", 800)
+    monkeypatch.setattr(bag_export, "MAX_CELLS", 800)
     rows: list[int] = []
     monkeypatch.setattr(
         bag_export, "columns", lambda messages: rows.append(len(messages)) or columns(messages)
