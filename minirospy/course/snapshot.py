@@ -18,7 +18,7 @@ __all__ = ["write_snapshot"]
 
 _MAX_FILE_BYTES = 1_000_000  # bags, models and videos are left out
 _MAX_FILES = 2000
-_MAX_BYTES = 50_000_000  # of all files before compression: a snapshot is sent by e-mail
+MAX_BYTES = 50_000_000  # of all files before compression: a snapshot is sent by e-mail
 _LEFT_OUT = frozenset(
     {".git", "__pycache__", "node_modules", ".venv", "venv", "build", "devel", "install", "logs"}
 )
@@ -82,7 +82,7 @@ def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]]) -> tu
         prefix = root.parent.name if len(listed) == 1 else f"{number}_{root.parent.name}"
         for path in files:
             size = path.stat().st_size
-            if size > _MAX_FILE_BYTES or total + size > _MAX_BYTES or count >= _MAX_FILES:
+            if size > _MAX_FILE_BYTES or total + size > MAX_BYTES or count >= _MAX_FILES:
                 left_out.append(str(path))
                 continue
             archive.write(path, f"{prefix}/{path.relative_to(root).as_posix()}")

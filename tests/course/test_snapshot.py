@@ -77,7 +77,7 @@ def test_snapshot_in_the_workspace_does_not_contain_itself(workspace: Path) -> N
 def test_all_files_together_have_a_limit(
     workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(snapshot, "_MAX_BYTES", 20)
+    monkeypatch.setattr(snapshot, "MAX_BYTES", 20)
     count, left_out = write_snapshot(tmp_path / "anna.zip", Environment.read())
     assert count == 1  # package.xml has 10 bytes, my_led.py has 13
     assert left_out == [
