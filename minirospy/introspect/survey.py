@@ -128,7 +128,7 @@ def _described(answer: NodeAnswer, place: MasterLocation) -> dict[str, object]:
         "trouble": text,
         "advice": advice,
         "links": [
-            [link.topic, link.direction, link.destination, link.transport, bool(link.connected)]
+            [link.topic, link.direction, link.destination, link.true_transport, bool(link.connected)]
             for link in answer.links
         ],
     }

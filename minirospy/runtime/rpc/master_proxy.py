@@ -28,8 +28,7 @@ class SystemState(NamedTuple):
 class BusConnection(NamedTuple):
     """One connection, as a node reports it.
 
-    ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them. ``transport`` is UNIXROS if
-    ``info`` begins with that name: a node reports TCPROS for it (docs/transports.md).
+    ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them.
     """
 
     id: object
@@ -39,6 +38,11 @@ class BusConnection(NamedTuple):
     topic: str
     connected: bool = True
     info: str = ""
+
+    @property
+    def true_transport(self) -> str:
+        """Return the transport; UNIXROS for a Unix socket, which nodes report as TCPROS (docs/transports.md)."""
+        return "UNIXROS" if str(self.info).startswith("UNIXROS ") else self.transport
 
 
 def unwrap(method: str, answer: object) -> Any:
@@ -210,11 +214,7 @@ class SlaveProxy:
 
     def get_bus_info(self) -> list[BusConnection]:
         """Return the node's connections."""
-        connections = [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
-        return [
-            each._replace(transport="UNIXROS") if str(each.info).startswith("UNIXROS ") else each
-            for each in connections
-        ]
+        return [BusConnection(*row[:7]) for row in self.call("getBusInfo")]
 
     def get_bus_stats(self) -> list[object]:
         """Return the statistics that the node reports."""

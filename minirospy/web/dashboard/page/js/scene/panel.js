@@ -330,6 +330,6 @@ export class Panel {
 
   mark(dot, level) {
     dot.className = `dot ${LEVELS[level]}`;
-    dot.title = WORDS[LEVELS[level]];
+    dot.title = t(WORDS[LEVELS[level]]);
   }
 }
