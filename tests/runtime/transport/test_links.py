@@ -254,7 +254,7 @@ def test_reader_blocks_after_busy_polling_without_success(
     monkeypatch.setattr(readers, "busy_receive", busy_receive)
     monkeypatch.setattr(readers, "time", SimpleNamespace(perf_counter=lambda: clock.now))
     with one, other:
-        sock: Any = SimpleNamespace(recv_into=recv_into)
+        sock: Any = SimpleNamespace(recv_into=recv_into, family=socket.AF_INET)
         source = readers._FrameSource(sock, readers.ReaderSet())
         space = memoryview(bytearray(8))
         for expected in (0, 1, 1, 2, 2):  # blocked, no data, blocked, late, blocked
