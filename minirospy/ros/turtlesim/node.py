@@ -100,14 +100,14 @@ class Simulator:
 
     def start(self) -> None:
         """Advertise the services and add the first turtle."""
-        self._services = [
-            rospy.Service("clear", Empty, self._clear),
-            rospy.Service("reset", Empty, self._reset),
-            rospy.Service("spawn", Spawn, self._spawn),
-            rospy.Service("kill", Kill, self._kill),
-        ]
-        rospy.loginfo("Starting turtlesim with node name %s", rospy.get_name())
-        with self._changing:
+        with self._changing:  # a program that calls /spawn immediately gets the second turtle
+            self._services = [
+                rospy.Service("clear", Empty, self._clear),
+                rospy.Service("reset", Empty, self._reset),
+                rospy.Service("spawn", Spawn, self._spawn),
+                rospy.Service("kill", Kill, self._kill),
+            ]
+            rospy.loginfo("Starting turtlesim with node name %s", rospy.get_name())
             self._add(self.world.spawn_first)
 
     def run(self) -> None:

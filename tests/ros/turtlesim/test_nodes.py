@@ -99,6 +99,35 @@ def test_turtle_is_driven_and_drawn(start: Start) -> None:
     assert process.returncode == 0
 
 
+CALLED_AT_ONCE = """
+import threading
+import rospy
+from minirospy.ros.turtlesim import node
+from turtlesim.srv import SpawnRequest
+
+service = rospy.Service
+
+def called_at_once(name, kind, handler):
+    made = service(name, kind, handler)
+    if name == "spawn":
+        caller = threading.Thread(target=lambda: print(handler(SpawnRequest(2, 2, 0, "")).name, flush=True))
+        caller.start()
+        caller.join(0.5)
+    return made
+
+node.rospy.Service = called_at_once
+rospy.init_node("turtlesim")
+node.Simulator().start()
+"""
+
+
+def test_turtle_spawned_while_the_node_starts_is_the_second(master: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CALLED_AT_ONCE], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "turtle2", done
+
+
 def test_turtles_come_and_go(start: Start) -> None:
     process = start("turtlesim", "turtlesim_node")
 
