@@ -107,6 +107,11 @@ def connected(topic, latch=True, cls=String):
     return publisher
 
 
+def publish_until_heard(publisher, words, heard):
+    """Publish a text until a message arrives: a relay may not know its subscriber yet, although that is connected."""
+    wait_for(lambda: publisher.publish(words) or not heard.messages.empty())
+
+
 for latch in (True, False):
     with Program("relay", f"/in_{latch}"):
         publisher = connected(f"/in_{latch}", latch)
@@ -114,7 +119,7 @@ for latch in (True, False):
         heard = Heard(f"/in_{latch}_relay")
         if latch:
             say("relay", heard.next())
-        publisher.publish("second")
+        publish_until_heard(publisher, "second", heard)
         say("relay", heard.next("first"), rostopic.get_topic_type(f"/in_{latch}_relay")[0])
 
 master = rosgraph.Master("/drive")
