@@ -11,7 +11,7 @@ from typing import NamedTuple
 from minirospy.base.errors import BoardError, MessageException, MinirospyError, ServiceException, UsageError
 from minirospy.base.log_levels import LEVEL_NAMES
 from minirospy.course import expectations
-from minirospy.course.exercise import Exercise, ExerciseError, Step
+from minirospy.course.exercise import GRAPH_KINDS, Exercise, ExerciseError, Step
 from minirospy.course.expectations import Trial, expect
 from minirospy.course.programs import Program
 from minirospy.course.wording import action_phrase, sentence
@@ -24,24 +24,6 @@ OWN_START_SECONDS = 60.0  # for a program of the exercise itself, without which 
 _LAST_LINES = 8  # lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # time for which `click` holds a button: longer than two polls of a node with 10 Hz
 _REPEAT_HERTZ = 10.0  # of published messages, unless an exercise says otherwise
-
-_NEEDS_GRAPH = frozenset(
-    {
-        "node",
-        "topic",
-        "subscribes",
-        "message",
-        "rate",
-        "span",
-        "service",
-        "response",
-        "param",
-        "set_param",
-        "publish",
-        "call",
-        "log",
-    }
-)
 
 
 class Finding(NamedTuple):
@@ -122,7 +104,7 @@ def check(
     """
     report = Report(exercise)
     kinds = {step.kind for step in exercise.steps}
-    needs_graph = bool(kinds & _NEEDS_GRAPH) or any(
+    needs_graph = bool(kinds & GRAPH_KINDS) or any(
         key in step.options for step in exercise.steps for key in ("rate", "host_of") if step.kind == "answer"
     )
     with World(

@@ -18,6 +18,7 @@ from minirospy.base.suggestions import did_you_mean
 __all__ = [
     "ACTIONS",
     "EXPECTATIONS",
+    "GRAPH_KINDS",
     "Exercise",
     "ExerciseError",
     "Step",
@@ -29,6 +30,26 @@ __all__ = [
 ]
 
 FOLDER = Path(__file__).parent / "exercises"
+
+# Kinds of steps that need a master.
+GRAPH_KINDS = frozenset(
+    {
+        "node",
+        "topic",
+        "subscribes",
+        "message",
+        "rate",
+        "span",
+        "service",
+        "response",
+        "param",
+        "set_param",
+        "publish",
+        "call",
+        "log",
+    }
+)
+_NAMED_KINDS = GRAPH_KINDS - {"log"} | {"package"}  # kinds whose subject is a name
 
 # Time limit of an expectation without `within`: a program starts within this time on a slow laptop.
 DEFAULT_SECONDS = 10.0
@@ -330,21 +351,7 @@ class _Reader:
                 raise self._error(
                     f"{place}: {option} [{words[option]}] is not a name such as {_NAMES[option]}"
                 )
-        if kind in (
-            "topic",
-            "subscribes",
-            "message",
-            "rate",
-            "span",
-            "service",
-            "response",
-            "publish",
-            "call",
-            "node",
-            "param",
-            "set_param",
-            "package",
-        ) and not (isinstance(subject, str) and subject):
+        if kind in _NAMED_KINDS and not (isinstance(subject, str) and subject):
             raise self._error(f"{place}: [{subject}] is not a name such as /button_state")
 
     def _only(self, found: Mapping[Any, object], known: Iterable[str], place: str) -> None:
