@@ -42,7 +42,7 @@ SECONDS = 30.0  # time limit for anything to happen
 
 
 class Report(NamedTuple):
-    """What one run has shown."""
+    """The result of one run."""
 
     kills: int
     checked: int  # messages that the surviving listener has compared

@@ -64,7 +64,7 @@ LOOKS = re.compile(
     r"(rosnode|rostopic|rosservice|rosparam) (list|info|type|find|get)\b"
     r"|rostopic echo -n\b|minirospy board (get|list)\b"
 )
-"""What only looks: it is typed again until it prints what the page shows, because other programs may need time."""
+"""Commands that change nothing: each is typed again until it prints what the page shows, because other programs may need time."""
 TIME = re.compile(r"\b1\d{9}\.\d+")
 REDRAWN = re.compile(r"\r\x1b\[2K(?:\x1b\[1A\x1b\[2K)+")
 """How a program goes back to redraw its picture: in the record, the new one follows the old one."""

@@ -36,7 +36,7 @@ _RATE_SECONDS = 3.0  # time over which a rate is measured, if an exercise does n
 
 
 class Outcome(NamedTuple):
-    """Whether an expectation holds; if not, ``observed`` describes the observation instead."""
+    """The result of an expectation. If it does not hold, ``observed`` describes the observation instead."""
 
     holds: bool
     observed: str = ""

@@ -41,7 +41,7 @@ __all__ = [
     "prepare",
 ]
 
-# Words in place of a frame's length: no frame is so long, split or not
+# Words in place of a frame's length: they are greater than any frame's length, split or not
 PREPARE_WORD = 0xC0000001  # the publisher wants to offer a ring
 OFFER_WORD = 0xC0000002  # the ring's size follows; its file descriptors come with these bytes
 PLACE_WORD = 0xC0000003  # a message is in the ring: its offset, its size and its trailing array's size follow

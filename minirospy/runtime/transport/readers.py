@@ -78,7 +78,7 @@ def read_frames(
     """Read frames in the calling thread until the peer closes, then close the socket.
 
     If several frames are ready when the thread reads, only the newest ``size.newest`` of them are delivered (0: all), so
-    that a slow receiver gets recent data. ``shares_memory``: the publisher was told that this side can map its memory.
+    that a slow receiver gets recent data. ``shares_memory``: the header said that this side can map the publisher's memory.
     Raise OSError if the connection fails, WireError if the data is invalid.
     """
     source = _FrameSource(sock, readers, shares_memory=shares_memory)

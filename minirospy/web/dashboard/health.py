@@ -1,4 +1,4 @@
-"""What the first view shows besides the graph: the findings of `minirospy doctor`, running boards, and the last log lines.
+"""The data of the first view besides the graph: the findings of `minirospy doctor`, running boards, and the last log lines.
 
 The doctor runs as a child process, so that its checks, which block, do not delay the page's data.
 """
