@@ -36,7 +36,7 @@ from minirospy.core.wire.header import serialize_header
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.transport.loop import LoopThread
 
 CPP = Path("/usr/lib/rosbag")

@@ -6,13 +6,13 @@ first used, so that a command which needs none of them starts quickly.
 The path of a message, file by file::
 
     Bool.msg -> core/idl/parse -> spec -> core/idl/emit -> class
-    publish  -> client/publisher (serialize, caller's thread) -> runtime/node/topics.Publication
+    publish  -> client/publisher (serialize, caller's thread) -> runtime/node/publication.Publication
              -> runtime/transport/links.OutLink ==> TCP ==>
-    runtime/transport/readers.read_frames (worker) -> core/wire/framing -> runtime/node/topics.Subscription
+    runtime/transport/readers.read_frames (worker) -> core/wire/framing -> runtime/node/subscription.Subscription
              -> client/subscriber (deserialize, user's function)
 
 and how the two ends find each other: client/publisher -> runtime/node/node -> runtime/master/master -> core/graph/registry ->
-publisherUpdate -> runtime/node/slave -> runtime/node/topics -> core/graph/subscription (whom to connect) -> requestTopic
+publisherUpdate -> runtime/node/slave -> runtime/node/subscription -> core/graph/subscription (whom to connect) -> requestTopic
 -> core/wire/tcpros (headers).
 """
 

@@ -40,8 +40,8 @@ from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.node import Node as RuntimeNode
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.services import AsyncServiceClient, LoopServiceServer
-from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 __all__ = ["Node"]

@@ -17,8 +17,8 @@ from minirospy.core.idl.protocols import Message, is_stamped
 from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, serialize_frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
-from minirospy.runtime.node.topics import Publication
-from minirospy.runtime.node.topics import Subscription as RuntimeSubscription
+from minirospy.runtime.node.publication import Publication
+from minirospy.runtime.node.subscription import Subscription as RuntimeSubscription
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from minirospy.runtime.node.slave import connection_text
 
 if TYPE_CHECKING:
-    from minirospy.runtime.node.topics import InLink
+    from minirospy.runtime.node.subscription import InLink
     from minirospy.runtime.transport.links import OutLink
 
 __all__ = ["Connection", "connection_to_publisher", "connection_to_subscriber"]

@@ -137,7 +137,7 @@ class PublishedTopic(SharedTopic):
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         # Imported here, because the module imports asyncio.
-        from minirospy.runtime.node.topics import Publication
+        from minirospy.runtime.node.publication import Publication
 
         super().__init__(session, topic, data_class)
         self._deferral = session.lifecycle.deferral

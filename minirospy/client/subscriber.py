@@ -25,7 +25,7 @@ from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.client.statistics import StatisticsPublisher
-    from minirospy.runtime.node.topics import InLink, Subscription
+    from minirospy.runtime.node.subscription import InLink, Subscription
 
 __all__ = ["SubscribedTopic", "Subscriber", "wait_for_message"]
 

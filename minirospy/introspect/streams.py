@@ -22,7 +22,7 @@ from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.introspect.messages import MessageClasses, Received, serialize
 from minirospy.introspect.topics import TopicField, find_topic
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
 

@@ -21,7 +21,7 @@ from minirospy.cli.registry import find_script, find_verb
 from minirospy.core.wire.framing import serialize_frame
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.transport.loop import LoopThread
 
 BIN = Path(sys.executable).parent

@@ -26,7 +26,7 @@ from std_msgs.msg import String
 
 from minirospy.cli.registry import console_scripts
 from minirospy.core.wire.tcpros import InterfaceType
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.rpc import master_proxy
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.rpc.master_proxy import MasterProxy

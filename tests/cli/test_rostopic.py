@@ -20,7 +20,7 @@ from std_msgs.msg import Bool, String
 
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.streams import ToolNode
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.waiting import wait_until
 

@@ -20,7 +20,7 @@ from minirospy.core.wire.xmlrpc import serialize_call
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.rpc.turns import Turns
 from tests.manual_loop import ManualLoop, run_manually, until

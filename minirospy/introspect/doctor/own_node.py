@@ -27,8 +27,8 @@ from minirospy.introspect.doctor.reach import (
     trouble_of,
 )
 from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.services import Handler
-from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.master_proxy import SlaveProxy
 from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.loop import LoopThread

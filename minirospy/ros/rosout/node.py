@@ -26,8 +26,9 @@ from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.master.log_file import LogFile
 from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.services import AsyncHandler, LoopServiceServer
-from minirospy.runtime.node.topics import InTurns, Publication
+from minirospy.runtime.node.subscription import InTurns
 from minirospy.runtime.rpc.turns import Turns
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 

@@ -16,10 +16,12 @@ from minirospy.base.closing import close_all, close_each
 from minirospy.base.environment import Environment
 from minirospy.base.errors import WireError
 from minirospy.core.wire.tcpros import InterfaceType
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.registration import Registrations
 from minirospy.runtime.node.services import Handler, ServiceServer
 from minirospy.runtime.node.slave import SlaveApi
-from minirospy.runtime.node.topics import Deliver, InTurns, Publication, Subscription, Unreachable
+from minirospy.runtime.node.subscription import Deliver, InTurns, Subscription
+from minirospy.runtime.node.unreachable import Unreachable
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport import local, tcp

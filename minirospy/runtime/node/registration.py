@@ -23,8 +23,9 @@ from minirospy.base.errors import (
     RpcUnreachable,
 )
 from minirospy.base.names import is_legal_name
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.services import ServiceServer
-from minirospy.runtime.node.topics import Publication, Subscription
+from minirospy.runtime.node.subscription import Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.master_proxy import master_unreachable, unwrap
 from minirospy.runtime.transport.workers import InOrder, Workers

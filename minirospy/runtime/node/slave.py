@@ -29,7 +29,8 @@ from minirospy.runtime.transport.local import PROTOCOL
 
 if TYPE_CHECKING:
     from minirospy.base.environment import Environment
-    from minirospy.runtime.node.topics import InLink, Publication, Subscription
+    from minirospy.runtime.node.publication import Publication
+    from minirospy.runtime.node.subscription import InLink, Subscription
     from minirospy.runtime.transport.links import OutLink
 
 __all__ = ["SlaveApi", "connection_text"]

@@ -15,7 +15,7 @@ from rosbags.rosbag1 import Reader
 from minirospy.base.environment import Environment
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.transport.loop import LoopThread
 from tests.waiting import wait_until
 

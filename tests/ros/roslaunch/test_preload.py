@@ -237,7 +237,7 @@ def test_program_can_configure_logging_before_it_imports_rospy(
     report = """
 import rospy
 rospy.logwarn("battery low")
-logging.getLogger("minirospy.runtime.node.topics").warning("topics")
+logging.getLogger("minirospy.runtime.node.subscription").warning("topics")
 print(sorted(name for name in sys.modules if name.startswith("rospy")))
 print(rospy.__spec__.origin, rospy.__loader__ is rospy.__spec__.loader, rospy.core is sys.modules["rospy.core"])
 """

@@ -1,4 +1,4 @@
-"""runtime/node/topics: a latched message and a subscriber that joins at the same moment."""
+"""runtime/node/publication: a latched message and a subscriber that joins at the same moment."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from minirospy.core.wire.framing import serialize_frame
 from minirospy.core.wire.tcpros import InterfaceType
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.transport.loop import LoopThread
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")

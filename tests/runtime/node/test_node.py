@@ -17,8 +17,8 @@ from minirospy.base.steps import finish
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node import node as node_module
 from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.slave import SlaveApi
-from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.loop import new_event_loop

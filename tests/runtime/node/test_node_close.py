@@ -13,7 +13,7 @@ from minirospy.base.errors import RpcFault, RpcUnreachable
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node import registration
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.loop import new_event_loop

@@ -1,4 +1,4 @@
-"""runtime/node/topics and runtime/node/node: links between nodes on one loop, with real sockets, and how links are closed."""
+"""Publications, subscriptions and nodes: links between nodes on one loop, with real sockets, and how links are closed."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ from minirospy.core.wire.framing import serialize_frame
 from minirospy.core.wire.header import Header, serialize_header
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.master.master import Master
-from minirospy.runtime.node import topics
+from minirospy.runtime.node import subscription as subscription_module
 from minirospy.runtime.node.node import Node
-from minirospy.runtime.node.topics import Publication, Subscription
+from minirospy.runtime.node.publication import Publication
+from minirospy.runtime.node.subscription import Subscription
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.links import OutLink
@@ -300,7 +301,7 @@ def test_a_publisher_of_many_topics_that_cannot_be_reached_is_one_line(
 
     async def scene() -> None:
         # The delay lasts until the node closes.
-        monkeypatch.setattr("minirospy.runtime.node.topics.TOGETHER_SECONDS", 1e6)
+        monkeypatch.setattr("minirospy.runtime.node.unreachable.TOGETHER_SECONDS", 1e6)
         async with graph("/b") as (_, (b,)):
             for number in range(count):
                 subscription = b.make_subscription(f"/t{number}", STRING, Box())
@@ -854,7 +855,7 @@ def test_node_at_the_limit_of_threads_registers_with_restarted_masters(
 
 
 def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topics, "SETTLE_SECONDS", 0.01)
+    monkeypatch.setattr(subscription_module, "SETTLE_SECONDS", 0.01)
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -946,7 +947,7 @@ def test_many_publishers_that_answer_nonsense_are_summed_up(
             subscription.close()
 
     run(scene)
-    lines = [r.getMessage() for r in caplog.records if r.name == "minirospy.runtime.node.topics"]
+    lines = [r.getMessage() for r in caplog.records if r.name == "minirospy.runtime.node.subscription"]
     assert len(lines) == 11
     assert lines[0].startswith(
         "no connection for /t: http://127.0.0.1:1/ answered requestTopic for /t with [1, "

@@ -18,8 +18,8 @@ from minirospy.base.errors import CallFailed, MasterUnreachableError, ROSExcepti
 from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.node.node import Node
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.node.service_client import ServiceClient
-from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport import tcp
 from minirospy.runtime.transport.limits import explain, naming_thread_limit
 from minirospy.runtime.transport.loop import LoopThread, new_event_loop

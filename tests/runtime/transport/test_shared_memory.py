@@ -23,7 +23,7 @@ from minirospy.core.wire import ring
 from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, SplitFrame, serialize_frame
 from minirospy.core.wire.ring import Step
 from minirospy.core.wire.tcpros import InterfaceType, subscriber_header
-from minirospy.runtime.node.topics import Publication
+from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.transport import readers, shared_memory, sockets
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.shared_memory import RingReceiver

@@ -40,9 +40,10 @@ PRELOADED = (
     "std_msgs.msg",
     "minirospy.runtime.master.log_file",
     "minirospy.runtime.node.node",
+    "minirospy.runtime.node.publication",
     "minirospy.runtime.node.service_client",
     "minirospy.runtime.node.services",
-    "minirospy.runtime.node.topics",
+    "minirospy.runtime.node.subscription",
     "minirospy.runtime.transport.loop",
     "minirospy.runtime.transport.readers",
 )

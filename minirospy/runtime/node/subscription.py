@@ -1,6 +1,6 @@
-"""The transport of topics: a Publication sends frames on its links, a Subscription receives frames from its links.
+"""The subscribing end of a topic: a Subscription receives frames from its links, one to each publisher.
 
-Both work on bytes; ``minirospy.client`` and ``minirospy.aio`` handle the message classes.
+It works on bytes; ``minirospy.client`` and ``minirospy.aio`` handle the message classes.
 """
 
 from __future__ import annotations
@@ -9,45 +9,27 @@ import asyncio
 import contextlib
 import logging
 import socket
-import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 
-from minirospy.base.closing import close_each
-from minirospy.base.environment import split_uri
-from minirospy.base.errors import (
-    SUSPENDED,
-    HandshakeRefused,
-    RpcError,
-    RpcTimeout,
-    RpcUnreachable,
-    ThreadLimitError,
-    WireError,
-)
+from minirospy.base.errors import HandshakeRefused, RpcError, ThreadLimitError, WireError
 from minirospy.base.steps import Steps
 from minirospy.core.graph.subscription import MAX_PUBLISHERS, Connect, Disconnect, SubscriptionPlan
-from minirospy.core.wire import ring
-from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame
+from minirospy.core.wire.framing import CHUNK, Frame
 from minirospy.core.wire.header import Header, serialize_header
-from minirospy.core.wire.tcpros import (
-    InterfaceType,
-    check_publisher,
-    check_subscriber,
-    publisher_header,
-    subscriber_header,
-)
+from minirospy.core.wire.tcpros import InterfaceType, check_publisher, subscriber_header
+from minirospy.runtime.node.unreachable import Unreachable, advice
 from minirospy.runtime.rpc.async_client import AsyncRpcClient
 from minirospy.runtime.transport import local, shared_memory, sockets, tcp
 from minirospy.runtime.transport.limits import explain, is_file_limit
-from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.runtime.transport.readers import ReaderSet, read_frames, watch_frames, watch_frames_in_turns
 from minirospy.runtime.transport.workers import Workers
 
-__all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unreachable"]
+__all__ = ["Deliver", "InLink", "InTurns", "Subscription"]
 
 _log = logging.getLogger(__name__)
 
@@ -59,9 +41,6 @@ _WARN_AFTER = 3
 # maximum number of log lines about publishers that send invalid responses; further ones are only counted
 _REFUSALS_LOGGED = 10
 
-# seconds within which a publisher's unreachable topics are combined in one log line
-TOGETHER_SECONDS = 0.25
-MAX_TOPICS_SHOWN = 5  # maximum number of topics named in one log line about an unreachable publisher
 _LEAVE_SECONDS = 10.0
 # a link counts as working once it has received a message, or has been open for this many seconds
 _WORKED_SECONDS = 5.0
@@ -81,152 +60,6 @@ class InTurns:
     start: Callable[[Steps[None]], None]
     most: int
     on_left_out: Callable[[Header], None]
-
-
-class Publication:
-    """A topic that this node publishes. ``publish`` is thread-safe."""
-
-    def __init__(
-        self,
-        topic: str,
-        type_: InterfaceType,
-        *,
-        queue_size: int | None = 0,
-        latch: bool = False,
-        headers: Mapping[str, str] | None = None,
-        tcp_nodelay: bool = False,
-        on_link: Callable[[OutLink, bool], None] | None = None,
-    ) -> None:
-        """Create the publication. Queues up to ``queue_size`` frames for a slow subscriber (0: no limit; None: publish blocks).
-
-        ``on_link(link, is_up)`` is called on the loop when a subscriber has connected or disconnected.
-        """
-        self.topic = topic
-        self.type = type_
-        self.queue_size = queue_size
-        self.latch = latch
-        self.headers = dict(headers or {})
-        self.tcp_nodelay = tcp_nodelay
-        self.links: tuple[OutLink, ...] = ()
-        # Total bytes of the messages that had any subscriber, including length prefixes; each message counts once
-        self.sent_bytes = 0
-        # number of subscribers that the master listed when the publication was registered
-        self.expected = 0
-        self._on_link = on_link
-        self._latched: bytes | LargeFrame | None = None
-        self._latch_lock = threading.Lock()
-        # the shared memory for large messages, from the first subscriber that can read it
-        self._ring: shared_memory.SharedRing | None = None
-
-    @property
-    def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and therefore holds a lock."""
-        return (
-            self._latch_lock.locked()
-            or any(link.is_sending for link in self.links)
-            or (self._ring is not None and self._ring.lock.locked())
-        )
-
-    @property
-    def shared_bytes(self) -> int:
-        """Return the number of bytes of shared memory that this topic uses."""
-        return self._ring.memory_bytes if self._ring else 0
-
-    def publish(self, frame: bytes | LargeFrame) -> None:
-        """Send one frame to every subscriber."""
-        if self.latch:
-            # A subscriber that connects now must receive the frame exactly once, either here or in accept().
-            with self._latch_lock:
-                self._latched = frame
-                links = self.links
-        else:
-            links = self.links
-        if links:
-            if isinstance(frame, bytes):
-                self.sent_bytes += len(frame)
-                for link in links:
-                    link.send(frame)
-            else:
-                self.sent_bytes += 4 + frame.size
-                self._send_large(frame, links)
-        if self.queue_size is None:
-            for link in links:
-                link.wait()
-
-    def accept(
-        self, sock: socket.socket, fields: Header, caller_id: str, peer: str, *, shares_memory: bool = False
-    ) -> str | None:
-        """Reply as node ``caller_id`` to a subscriber's header and start sending to it. If refused, return the reason.
-
-        ``shares_memory``: large messages may go through shared memory if the subscriber can read it. Call this on the loop.
-        """
-        why = check_subscriber(fields, self.topic, self.type)
-        if why:
-            return why
-
-        sockets.tune(sock, nodelay=self.tcp_nodelay or fields.get("tcp_nodelay") == "1")
-        sockets.enlarge_send_buffer(sock)
-        answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
-        loop = asyncio.get_running_loop()
-        if shares_memory and fields.get("shared_memory") == "1" and shared_memory.may_share(sock):
-            self._ring = self._ring or shared_memory.SharedRing(loop)
-            sender = self._ring.add(sock)
-        else:
-            sender = None
-        link = OutLink(
-            sock,
-            loop,
-            fields.get("callerid", peer),
-            self.queue_size or 0,
-            self._link_closed,
-            header=serialize_header(answer),
-            split=fields.get("split_frames") == "1",
-            ring=sender,
-        )
-
-        for other in self.links:
-            if other.peer == link.peer and other.waiting:
-                # A node has only one connection per topic, so it has lost the old link and no longer receives frames on it.
-                other.close()
-        # A subscriber that has received the header expects all messages published from then on.
-        # The link must therefore accept frames before the header is sent.
-        with self._latch_lock:
-            self.links += (link,)
-            latched = self._latched if self.latch else None
-            if latched is not None:
-                link.send(latched)
-        try:
-            link.open()
-            if self._on_link:
-                self._on_link(link, True)
-        except BaseException:
-            # The caller closes the socket, and a link without a socket must not be counted or closed later.
-            link.close()
-            raise
-        return None
-
-    def forget_latched(self) -> None:
-        """Stop sending the last frame to new subscribers."""
-        with self._latch_lock:
-            self._latched = None
-
-    def close(self) -> None:
-        """Close all links. Call this on the loop."""
-        close_each([*(link.close for link in self.links), *([self._ring.close] if self._ring else [])])
-
-    def _send_large(self, frame: LargeFrame, links: tuple[OutLink, ...]) -> None:
-        if self._ring is None or not ring.MIN_MESSAGE <= frame.size <= ring.MAX_MESSAGE:
-            for link in links:
-                link.send(frame)
-            return
-        with self._ring.share(frame) as sharing:
-            for link in links:
-                link.send(frame, sharing)
-
-    def _link_closed(self, link: OutLink) -> None:
-        self.links = tuple(other for other in self.links if other is not link)
-        if self._on_link:
-            self._on_link(link, False)
 
 
 @dataclass(eq=False)
@@ -269,47 +102,6 @@ class InLink:
         """Shut the connection down, so that the reader stops and closes the socket."""
         self.closed = True
         sockets.hang_up(self.sock)
-
-
-class Unreachable:
-    """Logs unreachable publishers. One line covers all topics of a node, such as those of a killed bridge.
-
-    Use it on the loop only.
-    """
-
-    def __init__(self) -> None:
-        # A list may contain a thousand publishers that refuse; logging them all would block the loop for 0.2 s.
-        self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
-        self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """For each publisher, by URI: its topics, and the error and the advice for the first topic."""
-        self._timer: asyncio.TimerHandle | None = None
-
-    def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher after a short delay, in one line with its other unreachable topics."""
-        self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
-        if self._timer is None:
-            self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
-
-    def close(self) -> None:
-        """Log the pending lines and the number of omitted lines. Idempotent."""
-        if self._timer:
-            self._timer.cancel()
-        self._report()
-        self._limited_log.close()
-
-    def _report(self) -> None:
-        self._timer = None
-        waiting, self._waiting = self._waiting, {}
-        for uri, (topics, error, advice) in waiting.items():
-            shown = ", ".join(topics[:MAX_TOPICS_SHOWN])
-            rest = len(topics) - MAX_TOPICS_SHOWN
-            self._limited_log.warning(
-                "cannot connect to the publisher of %s at %s: %s. %s. Will keep trying.",
-                f"{shown} and {rest} more topic{'s' if rest > 1 else ''}" if rest > 0 else shown,
-                uri,
-                error,
-                advice,
-            )
 
 
 class Subscription:
@@ -655,40 +447,8 @@ class Subscription:
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self.plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
-            self._unreachable.add(uri, self.topic, error, _advice(uri, error, nameless=nameless))
+            self._unreachable.add(uri, self.topic, error, advice(uri, error, nameless=nameless))
         self.start_connecting(action)
-
-
-def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return advice that names the host with the wrong address, and the variable that sets the address."""
-    if not isinstance(error, OSError | RpcUnreachable):
-        return "Its address is right, since it answered"
-    if isinstance(error, RpcTimeout):
-        return SUSPENDED[0].upper() + SUSPENDED[1:]
-    try:
-        host = split_uri(uri)[0]
-    except ValueError:
-        return "That is not the address of a node: it must be registered as http://host:port/"
-
-    if nameless:
-        return (
-            f"This machine does not know the name '{host}': on the publisher's machine set ROS_IP to its address, "
-            "or add the name to the hosts file of this one"
-        )
-    if host == "localhost" or host.startswith("127."):
-        return (
-            f"'{host}' is this machine: if the publisher runs on another one, set ROS_IP to its address there; "
-            "if it was killed, `rosnode cleanup` makes the master forget it"
-        )
-    if isinstance(error, ConnectionRefusedError) or isinstance(error.__cause__, ConnectionRefusedError):
-        return (
-            "Nothing listens there: if the publisher was killed, `rosnode cleanup` makes the master forget it; "
-            "if it runs, set ROS_IP to its address on its machine"
-        )
-    return (
-        f"If this machine cannot `ping {host}`, set ROS_IP on the publisher's machine to the address by which "
-        "this one reaches it; if it can, a firewall is in the way"
-    )
 
 
 class _NoPublisher(WireError):
