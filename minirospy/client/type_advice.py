@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -18,6 +17,8 @@ def advice_for_callback(
     Return an empty string if the error has another cause.
     """
     if isinstance(error, TypeError):
+        import inspect  # 4 ms, needed only for a faulty callback
+
         given = "the message and callback_args" if has_args else "the message"
         try:
             inspect.signature(function).bind(*((message, None) if has_args else (message,)))
