@@ -167,6 +167,15 @@ def test_robot_in_its_room_is_shown_without_a_click(serve: Serve, browse: Browse
     )
     assert {"map", "odom", "base_link", "laser", "dock"} <= set(labels)
     assert "map: OK" in page.wait_text(".scene-side", "OK")
+    # A display that is turned off is not marked as faulty.
+    page.click("[data-name='Grid'] input[type=checkbox]")
+    page.wait(
+        "const e = document.querySelector(\"[data-name='Grid'] .dot\"); const line = document.createElement('i');"
+        "line.style.background = 'var(--line)'; document.body.append(line);"
+        "const wanted = getComputedStyle(line).backgroundColor; line.remove();"
+        "return getComputedStyle(e).backgroundColor === wanted"
+    )
+    page.click("[data-name='Grid'] input[type=checkbox]")
     # The colors of the background, of the map's free cells below the grid, and of the cloud and the path.
     for wanted in ((48, 48, 48), (197, 197, 197), (25, 255, 0)):
         wait_color(page, wanted, 16)
