@@ -105,8 +105,10 @@ def collada(materials: tuple[str, str] = ("red", "")) -> str:
         '</library_lights><library_cameras><camera id="eye"><optics><technique_common><perspective><xfov>50</xfov>'
         "<znear>0.1</znear><zfar>10</zfar></perspective></technique_common></optics></camera></library_cameras>"
         + (
-            '<library_effects><effect id="e"><profile_COMMON><technique sid="t"><lambert><diffuse><color>0.8 0.1 0.1 1</color>'
-            "</diffuse></lambert></technique></profile_COMMON></effect></library_effects>"
+            '<library_effects><effect id="e"><profile_COMMON><technique sid="t"><phong>'
+            "<emission><color>0.05 0.3 0.1 1</color></emission><ambient><color>0.4 0.4 0.4 1</color></ambient>"
+            "<diffuse><color>0.7 0.1 0.1 1</color></diffuse><specular><color>0.6 0.6 0.6 1</color></specular>"
+            "<shininess><float>50</float></shininess></phong></technique></profile_COMMON></effect></library_effects>"
             if any(materials)
             else ""
         )
@@ -126,7 +128,7 @@ OBJ = "mtllib part.mtl\nusemtl leaf\n" + "".join(
     f"v {' '.join(map(str, corner))}\nvn {' '.join(map(str, normal))}\n" for corner, normal in _box(0, 0.15)
 )
 OBJ += "".join(f"f {at}//{at} {at + 1}//{at + 1} {at + 2}//{at + 2}\n" for at in range(1, 37, 3))
-MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.7 0.2\nKs 0 0 0\nd 1\n"
+MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.5 0.2\nKe 0.2 0 0.3\nKs 0.4 0.4 0.4\nd 1\n"
 
 
 def display(cls: str, topic: str = "", **settings: object) -> Settings:
