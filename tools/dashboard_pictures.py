@@ -283,13 +283,16 @@ class Studio:
         page.click(".launch-nodes tr button", "log")
         page.wait_text(".launch-log", "no transform")
 
-    def zoom_out(self, page: Page) -> None:
+    def show_room(self, page: Page) -> None:
+        self.zoom_out(page, 2)
+
+    def zoom_out(self, page: Page, steps: int = 4) -> None:
         page.wait("return Number(document.querySelector('canvas.stage')?.dataset.drawn) > 0")
         x, y = page.evaluate(
             "(() => { const r = document.querySelector('canvas.stage').getBoundingClientRect();"
             "return [r.x + r.width / 2, r.y + r.height / 2] })()"
         )
-        for _ in range(4):
+        for _ in range(steps):
             page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=120)
 
     def open_menu(self, page: Page) -> None:
@@ -367,7 +370,7 @@ PICTURES = {
     "diagnostics": Picture("diagnostics", (".report", "Battery"), (1200, 560)),
     "bags": Picture("bag?file=walk.bag", (".bag-label", "/chatter")),
     "workshop": Picture("layout?preset=workshop", (".pane .line .text", "no motor answers"), (1400, 860), seconds=8),
-    "3d": Picture("3d", (".labels .name", "base_link"), act=Studio.zoom_out),
+    "3d": Picture("3d", (".labels .name", "base_link"), act=Studio.show_room),
     "markers": Picture("3d", prepare=Studio.start_markers, act=Studio.open_menu, size=(1280, 800)),
     "actions": Picture("actions", prepare=Studio.start_counter, act=Studio.send_goal, size=(1200, 450)),
     "controllers": Picture("controllers", act=Studio.load_controller, size=(1200, 260)),
