@@ -1256,6 +1256,8 @@ export const GERMAN = {
   "Student": "Name",
   "passed": "geschafft",
   "not yet": "noch nicht",
+  "pressed: {buttons}": "gedrückt: {buttons}",
+  "no button is pressed": "kein Taster ist gedrückt",
   "no LED is lit": "keine LED leuchtet",
   "{count} students, {passed} exercises passed": "{count} Teilnehmende, {passed} Aufgaben geschafft",
   "No results yet. Each student types `minirospy check --join {uri} --name NAME` once.":
