@@ -6,9 +6,10 @@ the topics with the scan open; measures frames per second with requestAnimationF
 clients: ten programs use the page's protocol on 50 topics at a raised rate; measures the memory of the server and of a client
 over the run, and the server's CPU time for each MB that it sends.
 
-soak: ten such clients and two pages in chromium receive 50 topics, a scan and moving frames, all at a raised rate of 100 Hz,
-until each client has received as many messages as in an hour at 10 Hz; measures the memory of the server, the clients and
-the pages over the run. With --pages 10, eight more pages have the 50 topics open.
+soak: ten such clients and two pages in chromium receive 50 topics, a scan, moving frames, images and log lines, all at a raised
+rate of 100 Hz, until each client has received as many messages as in an hour at 10 Hz; measures the memory of the server, the
+clients and the pages over the run (the pages' after a forced garbage collection), and says of each if it is flat. With
+--pages 10, eight more pages have the 50 topics open.
 
 CPU use is that of a process, in percent of one core.
 """
@@ -74,9 +75,11 @@ MOVING = """
 import math, sys
 import rospy
 from geometry_msgs.msg import TransformStamped
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import Image, LaserScan
 from tf2_msgs.msg import TFMessage
 rospy.init_node("moving")
+images = rospy.Publisher("/camera/image_raw", Image, queue_size=2)
+pixels = [bytes((number * 16 + x) % 256 for x in range(320 * 240 * 3)) for number in range(4)]
 scans = rospy.Publisher("/scan", LaserScan, queue_size=10)
 frames = rospy.Publisher("/tf", TFMessage, queue_size=10)
 rate = rospy.Rate(float(sys.argv[1]))
@@ -93,9 +96,15 @@ while not rospy.is_shutdown():
     scan.header = moved.header
     scan.header.frame_id = "laser"
     scans.publish(scan)
+    images.publish(Image(height=240, width=320, encoding="rgb8", step=960, data=pixels[count % 4]))
+    if count % 10 == 0:
+        rospy.loginfo("step %d", count)
     rate.sleep()
 """
 
+MAX_GROWTH = 0.05  # of the size between two thirds of a soak: more is no noise of the garbage collector
+MIN_GROWTH_MB = 2.0  # a smaller growth is flat, whatever the size
+GC_FLAGS = ("--js-flags=--expose-gc", "--enable-precise-memory-info")
 HEAP = "(() => { gc(); return performance.memory.usedJSHeapSize })()"
 
 FRAMES = """
@@ -262,15 +271,12 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
     opened = "&".join(f"open=%2Fmany%2Ft{index}" for index in range(50))
     plots = "&".join(f"path=%2Fmany%2Ft{index}%2Fdata[0]" for index in range(4))
     topics = f"topics?{opened}"
-    trees = [f"row({topics},console)", f"row(3d,column(plot?{plots},graph))", *[topics] * 8]
+    image = "image?topic=%2Fcamera%2Fimage_raw"
+    trees = [f"row({topics},console)", f"row(3d,column(plot?{plots},graph,{image}))", *[topics] * 8]
     with graph() as (server, port), contextlib.ExitStack() as stack:
         pages = []
         for tree in trees[:count_of_pages]:
-            pages.append(
-                Page(
-                    f"http://localhost:{port}/#/layout?tree={quote(tree)}", flags=("--js-flags=--expose-gc",)
-                )
-            )
+            pages.append(Page(f"http://localhost:{port}/#/layout?tree={quote(tree)}", flags=GC_FLAGS))
             stack.callback(pages[-1].close)
         start(stack, sys.executable, "-c", MANY, str(rate))
         start(stack, sys.executable, "-c", MOVING, str(rate))
@@ -286,6 +292,7 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
         spent, started = cpu(server), time.monotonic()
         counts = [(each.messages, each.bytes) for each in clients]
         wanted = hours * 50 * 10 * 3600
+        rows = []
         print("soak: seconds  server  clients  of each page: heap, processes  (MB)")
         for step in range(13):
             while (
@@ -296,6 +303,7 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
             row = [memory_of(server), memory_of(psutil.Process())]
             for page in pages:
                 row += [page.evaluate(HEAP) / 1e6, sum(memory_of(each) for each in page.processes())]
+            rows.append(row)
             print(
                 f"soak: {time.monotonic() - started:7.0f}  " + "  ".join(f"{each:7.1f}" for each in row),
                 flush=True,
@@ -307,6 +315,26 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
         f"soak: {elapsed:.0f} s; each client had {min(messages)} to {max(messages)} messages of 50 topics, "
         f"as in {min(messages) / (50 * 10 * 3600):.2f} hours at 10 Hz; server {used / elapsed * 100:.0f} % CPU; "
         f"{drawn} pictures of the 3D view; errors of the pages: {[page.errors for page in pages]}"
+    )
+    names = ["server", "clients"]
+    for number in range(1, count_of_pages + 1):
+        names += [f"heap of page {number}", f"processes of page {number}"]
+    for name, *sizes in zip(names, *rows, strict=True):
+        print(f"soak: {name}: {verdict_of(sizes)}")
+
+
+def verdict_of(sizes: list[float]) -> str:
+    """Return whether memory sizes in MB, taken at equal intervals, are flat.
+
+    The first third is the start, in which caches fill. Compares the smallest sizes of the two other thirds: messages under way
+    come and go, and what is never released is in the smallest size, too.
+    """
+    third = len(sizes) // 3
+    middle, last = (min(part) for part in (sizes[third:-third], sizes[-third:]))
+    growth = last - middle
+    is_flat = growth <= max(MAX_GROWTH * middle, MIN_GROWTH_MB)
+    return (
+        f"{'flat' if is_flat else 'GROWS'}: {middle:.1f} MB in the middle third, {growth:+.1f} MB in the last"
     )
 
 

@@ -75,6 +75,63 @@ async def main():
 asyncio.run(main())
 """
 
+# What the views Trajectory, State machines and Diagnostics show.
+CONTENTS = """
+import asyncio
+from control_msgs.msg import JointTrajectoryControllerState
+from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
+from controller_manager_msgs.srv import ListControllers
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from minirospy import Node
+from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+JOINT = '<joint name="{0}" type="revolute"><parent link="base"/><child link="{0}_link"/><axis xyz="0 0 1"/>' \
+    '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint><link name="{0}_link"/>'
+NAMES = ["lift", "shoulder"]
+ROBOT = '<robot name="arm"><link name="base"/>' + "".join(map(JOINT.format, NAMES)) + "</robot>"
+
+async def main():
+    node = Node("contents")
+    await node.start()
+    await node.set_param("/robot_description", ROBOT)
+    type_ = "position_controllers/JointTrajectoryController"
+    claims = [HardwareInterfaceResources("hardware_interface::PositionJointInterface", NAMES)]
+    controllers = [ControllerState("arm", "running", type_, claims)]
+    await node.set_param("/arm", {"type": type_, "joints": NAMES})
+    await node.serve("/controller_manager/list_controllers", ListControllers, lambda request: [controllers])
+    for topic, message in {
+        "/arm/state": JointTrajectoryControllerState(
+            joint_names=NAMES, actual=JointTrajectoryPoint(positions=[0.2, 0.5])
+        ),
+        "/machine/smach/container_structure": SmachContainerStructure(
+            path="/ROOT", children=["DRIVE", "DOCK"], internal_outcomes=["arrived"], outcomes_from=["DRIVE"],
+            outcomes_to=["DOCK"], container_outcomes=["done"],
+        ),
+        "/machine/smach/container_status": SmachContainerStatus(path="/ROOT", active_states=["DOCK"]),
+        "/diagnostics_agg": DiagnosticArray(status=[
+            DiagnosticStatus(1, "/Robot", "low", "", []),
+            DiagnosticStatus(1, "/Robot/Battery", "low", "", [KeyValue("voltage", "21.3")]),
+        ]),
+    }.items():
+        publisher = await node.advertise(topic, type(message), latch=True)
+        await publisher.publish(message)
+    print("ready", flush=True)
+    await asyncio.Event().wait()
+
+asyncio.run(main())
+"""
+
+_LAMP = "kind%3Dlamp%26path%3D%252Fled_command%252Fdata%26label%3DLED"
+_GAUGE = "kind%3Dgauge%26path%3D%252Fjoint_states%252Fposition%255B0%255D%26max%3D100"
+SETTINGS = {
+    "layout": "preset=workshop",
+    "panels": f"edit=1&p={_LAMP}&p={_GAUGE}",
+    "plot": "path=/joint_states/position[0]",
+    "topics": "open=/joint_states",
+}
+"""Settings of views that would show little without."""
+
 
 @contextlib.contextmanager
 def robot(*, is_large: bool = True) -> Iterator[str]:
@@ -290,13 +347,19 @@ def measure_access(folder: Path, views: list[str]) -> None:
     """Print Lighthouse's accessibility score of each view, and the audits that fail."""
     assert CHROMIUM
     command = folder / "node_modules" / ".bin" / "lighthouse"
-    with robot() as link, tempfile.TemporaryDirectory() as results:
-        address, _, token = link.partition("#/overview")
+    with contextlib.ExitStack() as stack:
+        link = stack.enter_context(robot())
+        results = stack.enter_context(tempfile.TemporaryDirectory())
+        contents = start(stack, sys.executable, "-c", CONTENTS)
+        assert contents.stdout
+        assert contents.stdout.readline() == b"ready\n"
+        address, _, token = link.partition("#/overview?")
         for view in views:
             file = Path(results, f"{view}.json")
+            words = "&".join(filter(None, (SETTINGS.get(view), token)))
             subprocess.run(
                 [
-                    str(command), f"{address}#/{view}{token}", "--only-categories=accessibility", "--quiet", "--output=json",
+                    str(command), f"{address}#/{view}?{words}", "--only-categories=accessibility", "--quiet", "--output=json",
                     f"--output-path={file}", "--chrome-flags=--headless=new --no-sandbox --disable-gpu",
                 ],
                 env={**os.environ, "CHROME_PATH": CHROMIUM},

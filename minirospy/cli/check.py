@@ -212,9 +212,9 @@ def _write_snapshot(name: str, environment: Environment) -> int:
 
     from minirospy.course.snapshot import write_snapshot
 
-    count, large = write_snapshot(Path(name), environment)
-    for file in large:
-        warn(f"{file} is left out: it or the snapshot is too large")
+    count, left_out = write_snapshot(Path(name), environment)
+    for file, reason in left_out.items():
+        warn(f"{file} is left out: {reason}")
     print(
         f"{name}: {count} files of the workspace, the output of minirospy doctor, your results. Read it before you send it."
     )

@@ -26,6 +26,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = [
     "CLASS_PARAMETER",
+    "MAX_KEY",
     "Record",
     "Result",
     "Student",
@@ -40,6 +41,7 @@ CLASS_PARAMETER = "/minirospy_class"
 _MAX_FAILURES = 5  # sentences of a failed check that the teacher sees
 _MAX_LETTERS = 300  # characters of such a sentence
 _MAX_NAME = 60  # characters of a student's name
+MAX_KEY = 64  # characters of the parameter's last part; the page's classroom.js ignores longer ones
 _MAX_TIME = 4e9  # seconds since 1970, in the year 2096: time.localtime refuses far larger values
 _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a computer that has left
 
@@ -208,12 +210,16 @@ def send(record: Record, uri: str) -> None:
 def parameter_key(name: str) -> str:
     """Return a name as the last part of a parameter's name: letters, digits and underscores, and a letter first.
 
-    A checksum keeps names apart that differ only in other characters, such as Jörg and Jürg.
+    It has at most ``MAX_KEY`` characters. A checksum keeps names apart that differ only in other characters, such as Jörg
+    and Jürg, or after the cut.
     """
-    text = re.sub(r"\W", "_", name, flags=re.ASCII)[:_MAX_NAME]
-    if text != name:
-        text = f"{text}_{zlib.crc32(name.encode()):08x}"
-    return text if text[:1].isalpha() else f"c_{text}"
+    text = re.sub(r"\W", "_", name, flags=re.ASCII)
+    prefix = "" if text[:1].isalpha() else "c_"
+    room = MAX_KEY - len(prefix)
+    if text != name or len(text) > room:
+        checksum = f"_{zlib.crc32(name.encode()):08x}"
+        text = text[: room - len(checksum)] + checksum
+    return prefix + text
 
 
 def gather(uri: str) -> list[Student]:

@@ -34,18 +34,19 @@ _VARIABLES = (
 _DOCTOR_SECONDS = 60.0
 
 
-def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]]:
-    """Write the snapshot; return the number of the workspace's files in it, and the files that are left out.
+def write_snapshot(file: Path, environment: Environment) -> tuple[int, dict[str, str]]:
+    """Write the snapshot; return the number of the workspace's files in it, and the reasons by file that is left out.
 
-    A file is left out if it, or all files together, would be too large. The workspace is the folders of ROS_PACKAGE_PATH. Hidden
-    files, which may be keys and passwords, and build folders are left out. Raise MinirospyError if there is no workspace, or if
-    the file exists or cannot be written; an unfinished file is removed.
+    A file is left out if it cannot be read, or if it, or all files together, would be too large. The workspace is the folders
+    of ROS_PACKAGE_PATH. Hidden files, which may be keys and passwords, and build folders are left out. Raise MinirospyError if
+    there is no workspace, or if the file exists or cannot be written; an unfinished file is removed.
     """
     roots = [root for root in environment.package_path if root.is_dir() and os.access(root, os.W_OK)]
     if not roots:
         raise MinirospyError("no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`")
     # Each list is complete before the snapshot exists, which may be in the workspace itself.
-    listed = [(root, _files(root)) for root in roots]
+    left_out: dict[str, str] = {}
+    listed = [(root, _files(root, left_out)) for root in roots]
     try:
         # A file dated before 1980, which a zip file cannot express, gets the date 1980-01-01.
         archive = zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED, strict_timestamps=False)
@@ -55,7 +56,7 @@ def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]
         raise _not_written(file, error) from error
     try:
         with archive:
-            count, large = _pack(archive, listed)
+            count = _pack(archive, listed, left_out)
             archive.writestr("doctor.txt", _doctor())
             archive.writestr("results.json", json.dumps(Record.read(environment).to_parameter(), indent=1))
             variables = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
@@ -68,32 +69,48 @@ def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]
         if isinstance(error, OSError | ValueError):
             raise _not_written(file, error) from error
         raise
-    return count, large
+    return count, left_out
 
 
 def _not_written(file: Path, error: OSError | ValueError) -> MinirospyError:
     return MinirospyError(f"{file} cannot be written: {getattr(error, 'strerror', None) or error}")
 
 
-def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]]) -> tuple[int, list[str]]:
-    """Add the files of the workspace's folders; return their number, and the files that are left out."""
-    count, total, left_out = 0, 0, []
+def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]], left_out: dict[str, str]) -> int:
+    """Add the files of the workspace's folders; return their number. Add the others to ``left_out``, with the reason."""
+    count, total = 0, 0
     for number, (root, files) in enumerate(listed, 1):
         prefix = root.parent.name if len(listed) == 1 else f"{number}_{root.parent.name}"
         for path in files:
-            size = path.stat().st_size
-            if size > _MAX_FILE_BYTES or total + size > MAX_BYTES or count >= _MAX_FILES:
-                left_out.append(str(path))
+            # Read the whole file first: one that vanishes, or is written to, must not leave half an entry.
+            try:
+                name = f"{prefix}/{path.relative_to(root).as_posix()}"
+                name.encode()
+                info = zipfile.ZipInfo.from_file(path, name, strict_timestamps=False)
+                with path.open("rb") as stream:
+                    data = stream.read(_MAX_FILE_BYTES + 1)
+            except OSError as error:
+                left_out[str(path)] = _unreadable(error)
                 continue
-            archive.write(path, f"{prefix}/{path.relative_to(root).as_posix()}")
-            count, total = count + 1, total + size
-    return count, left_out
+            except UnicodeEncodeError:
+                left_out[str(path)] = "its name is not UTF-8"
+                continue
+            if len(data) > _MAX_FILE_BYTES or total + len(data) > MAX_BYTES or count >= _MAX_FILES:
+                left_out[str(path)] = "it or the snapshot is too large"
+                continue
+            archive.writestr(info, data, zipfile.ZIP_DEFLATED)
+            count, total = count + 1, total + len(data)
+    return count
 
 
-def _files(root: Path) -> list[Path]:
-    """Return the files below a folder, sorted, without links out of it."""
+def _files(root: Path, left_out: dict[str, str]) -> list[Path]:
+    """Return the files below a folder, sorted, without links out of it. Add unreadable folders to ``left_out``."""
+
+    def note(error: OSError) -> None:
+        left_out[str(error.filename)] = _unreadable(error)
+
     found = []
-    for folder, inner, names in os.walk(root):
+    for folder, inner, names in os.walk(root, onerror=note):
         inner[:] = sorted(each for each in inner if each not in _LEFT_OUT and not each.startswith("."))
         for name in sorted(names):
             path = Path(folder, name)
@@ -101,6 +118,10 @@ def _files(root: Path) -> list[Path]:
                 if not name.startswith(".") and path.is_file() and not path.is_symlink():
                     found.append(path)
     return found
+
+
+def _unreadable(error: OSError) -> str:
+    return f"it cannot be read: {error.strerror or error}"
 
 
 def _doctor() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -12,9 +13,10 @@ import pytest
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcRefused
 from minirospy.board.board import Board
-from minirospy.course.results import Record, parameter_key, send
+from minirospy.course.results import MAX_KEY, Record, parameter_key, send
 from minirospy.course.share import share
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.web.dashboard.files import FOLDER
 
 
 def wait_for(holds: Callable[[], bool]) -> None:
@@ -74,3 +76,17 @@ def test_names_become_different_parameters() -> None:
     assert len(set(keys)) == len(names)
     assert keys[0] == "Anna"
     assert all(key.isascii() and key[0].isalpha() and key.replace("_", "a").isalnum() for key in keys)
+
+
+def test_key_of_a_long_name_fits_the_page() -> None:
+    script = (FOLDER / "js" / "classroom.js").read_text(encoding="utf-8")
+    found = re.search(r"const NAME = /(\^.*\$)/;", script)
+    assert found
+    pattern = re.compile(found[1])
+    long = ["x" * count for count in range(MAX_KEY - 4, MAX_KEY + 20)]
+    names = [*long, "ö" * 100, "7" * 100, "ö" * 99, f"{'x' * 200}a", f"{'x' * 200}b"]
+    keys = [parameter_key(name) for name in names]
+    assert len(set(keys)) == len(names)
+    assert keys[:5] == long[:5]
+    assert max(map(len, keys)) == MAX_KEY
+    assert all(pattern.match(key) for key in keys)

@@ -6,6 +6,7 @@ import json
 import os
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -37,7 +38,7 @@ def test_snapshot_has_the_sources_the_doctor_and_the_results(workspace: Path, tm
     file = tmp_path / "anna.zip"
     count, large = write_snapshot(file, Environment.read())
     assert count == 2
-    assert large == [str(workspace / "rpi_test" / "big.bag")]
+    assert [*large] == [str(workspace / "rpi_test" / "big.bag")]
     with zipfile.ZipFile(file) as archive:
         assert sorted(archive.namelist()) == [
             "catkin_ws/rpi_test/package.xml",
@@ -80,7 +81,7 @@ def test_all_files_together_have_a_limit(
     monkeypatch.setattr(snapshot, "MAX_BYTES", 20)
     count, left_out = write_snapshot(tmp_path / "anna.zip", Environment.read())
     assert count == 1  # package.xml has 10 bytes, my_led.py has 13
-    assert left_out == [
+    assert [*left_out] == [
         str(workspace / "rpi_test" / "big.bag"),
         str(workspace / "rpi_test" / "scripts" / "my_led.py"),
     ]
@@ -94,6 +95,46 @@ def test_file_of_1970_is_packed(workspace: Path, tmp_path: Path) -> None:
         assert archive.getinfo("catkin_ws/rpi_test/package.xml").date_time[:3] == (1980, 1, 1)
 
 
+def test_files_that_cannot_be_read_any_more_are_left_out(
+    workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone, folder = workspace / "rpi_test" / "gone.py", workspace / "rpi_test" / "folder.py"
+    for each in (gone, folder):
+        each.write_text("1")
+    opened = zipfile.ZipFile.__init__
+
+    def change_after_the_listing(archive: zipfile.ZipFile, *args: Any, **kwargs: Any) -> None:
+        if gone.exists():
+            gone.unlink()
+            folder.unlink()
+            folder.mkdir()
+        opened(archive, *args, **kwargs)
+
+    monkeypatch.setattr(zipfile.ZipFile, "__init__", change_after_the_listing)
+    file = tmp_path / "anna.zip"
+    count, left_out = write_snapshot(file, Environment.read())
+    assert count == 2
+    assert sorted(left_out) == [str(workspace / "rpi_test" / "big.bag"), str(folder), str(gone)]
+    assert left_out[str(gone)].startswith("it cannot be read: ")
+    with zipfile.ZipFile(file) as archive:
+        assert archive.testzip() is None
+        assert "catkin_ws/rpi_test/scripts/my_led.py" in archive.namelist()
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root and Windows read every folder"
+)
+def test_folder_that_cannot_be_read_is_left_out(workspace: Path, tmp_path: Path) -> None:
+    folder = workspace / "rpi_test" / "scripts"
+    folder.chmod(0)
+    try:
+        count, left_out = write_snapshot(tmp_path / "anna.zip", Environment.read())
+    finally:
+        folder.chmod(0o755)
+    assert count == 1
+    assert left_out[str(folder)] == "it cannot be read: Permission denied"
+
+
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_unfinished_snapshot_is_removed(
     error: BaseException, workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -101,7 +142,7 @@ def test_unfinished_snapshot_is_removed(
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(zipfile.ZipFile, "write", fail)
+    monkeypatch.setattr(zipfile.ZipFile, "writestr", fail)
     file = tmp_path / "anna.zip"
     with pytest.raises((MinirospyError, KeyboardInterrupt)):
         write_snapshot(file, Environment.read())

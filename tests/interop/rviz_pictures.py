@@ -28,8 +28,11 @@ from nav_msgs.msg import Path as PathMessage
 from PIL import Image
 from sensor_msgs.msg import CameraInfo, ChannelFloat32, PointCloud
 from sensor_msgs.msg import Image as ImageMessage
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
+from minirospy.core.urdf.poses import quaternion_from_rpy
+from minirospy.core.urdf.read import parse_robot
 from minirospy.web.access import Access
 from minirospy.web.bridge import BridgeOptions
 from tests.interop import robot_scene
@@ -37,8 +40,20 @@ from tests.interop.browser import PATIENCE, Page
 from tests.interop.conftest import running_master
 from tests.web.dashboard.conftest import TOKEN, Served
 
-__all__ = ["HEIGHT", "SCENES", "WIDTH", "Rviz", "has_rviz", "our_picture", "prepare", "publish", "write_file"]
+__all__ = [
+    "HEIGHT",
+    "SCENES",
+    "WIDTH",
+    "Rviz",
+    "has_rviz",
+    "our_picture",
+    "prepare",
+    "publish",
+    "publish_robots",
+    "write_file",
+]
 
+ROOT = Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT = 640, 480
 _DEPTH = 24
 
@@ -105,8 +120,10 @@ def collada(materials: tuple[str, str] = ("red", "")) -> str:
         '</library_lights><library_cameras><camera id="eye"><optics><technique_common><perspective><xfov>50</xfov>'
         "<znear>0.1</znear><zfar>10</zfar></perspective></technique_common></optics></camera></library_cameras>"
         + (
-            '<library_effects><effect id="e"><profile_COMMON><technique sid="t"><lambert><diffuse><color>0.8 0.1 0.1 1</color>'
-            "</diffuse></lambert></technique></profile_COMMON></effect></library_effects>"
+            '<library_effects><effect id="e"><profile_COMMON><technique sid="t"><phong>'
+            "<emission><color>0.05 0.3 0.1 1</color></emission><ambient><color>0.4 0.4 0.4 1</color></ambient>"
+            "<diffuse><color>0.7 0.1 0.1 1</color></diffuse><specular><color>0.6 0.6 0.6 1</color></specular>"
+            "<shininess><float>50</float></shininess></phong></technique></profile_COMMON></effect></library_effects>"
             if any(materials)
             else ""
         )
@@ -126,7 +143,7 @@ OBJ = "mtllib part.mtl\nusemtl leaf\n" + "".join(
     f"v {' '.join(map(str, corner))}\nvn {' '.join(map(str, normal))}\n" for corner, normal in _box(0, 0.15)
 )
 OBJ += "".join(f"f {at}//{at} {at + 1}//{at + 1} {at + 2}//{at + 2}\n" for at in range(1, 37, 3))
-MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.7 0.2\nKs 0 0 0\nd 1\n"
+MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.5 0.2\nKe 0.2 0 0.3\nKs 0.4 0.4 0.4\nd 1\n"
 
 
 def display(cls: str, topic: str = "", **settings: object) -> Settings:
@@ -307,6 +324,37 @@ def mesh_robot() -> str:
     return f'<robot name="meshes">{"".join(links + joints)}</robot>'
 
 
+ROBOTS = {
+    "wheels": (ROOT / "minirospy/ros/diff_drive_robot/urdf/robot.xacro", 0.0, -0.7),
+    "arm": (ROOT / "minirospy/ros/six_joint_arm/urdf/arm.xacro", -0.3, 0.1),
+    "links": (ROOT / "minirospy/ros/two_link_arm/urdf/arm.xacro", -0.6, -0.9),
+    "rover": (ROOT / "tests/ros/simulation/rover.urdf", 0.5, -0.1),
+}
+"""Description, and position (x, y in metres) of each robot of the scene "robots", by the prefix of its frames."""
+
+
+def robots() -> dict[str, str]:
+    """Return the descriptions of ROBOTS, expanded."""
+    import xacro  # type: ignore[import-untyped]
+
+    return {name: xacro.process_file(str(path)).toxml() for name, (path, _, _) in ROBOTS.items()}
+
+
+def robot_frames(descriptions: Mapping[str, str]) -> TFMessage:
+    """Return the frames of the robots with all joints at zero, as robot_state_publisher has them."""
+    found = []
+    for name, text in descriptions.items():
+        robot = parse_robot(text, name)
+        _, x, y = ROBOTS[name]
+        found.append(robot_scene.transform("map", f"{name}/{robot.root}", x, y))
+        for joint in robot.joints.values():
+            found.append(
+                robot_scene.transform(f"{name}/{joint.parent}", f"{name}/{joint.child}", *joint.origin.xyz)
+            )
+            found[-1].transform.rotation = Quaternion(*quaternion_from_rpy(*joint.origin.rpy))
+    return TFMessage(found)
+
+
 def description() -> str:
     """Return the robot's description, with a mesh."""
     part = '<visual><origin xyz="0 0 0.08"/><geometry><mesh filename="package://rviz_meshes/part.stl"/></geometry>'
@@ -377,6 +425,13 @@ SCENES: dict[str, tuple[list[Settings], Settings]] = {
             },
         ],
         orbit(2.6, x=1.5, z=1, yaw=-2.6, pitch=0.3),
+    ),
+    "robots": (
+        [
+            {**display("RobotModel", Robot_Description=f"{name}_robot", TF_Prefix=name), "Name": name}
+            for name in ROBOTS
+        ],
+        orbit(3.0, z=0.5, yaw=-1.0, pitch=0.5),
     ),
 }
 """Displays and view of each scene, by name."""
@@ -548,6 +603,19 @@ def publish(served: Served, all_messages: Mapping[str, Any]) -> None:
     served.run(run())
 
 
+def publish_robots(served: Served) -> None:
+    """Set the descriptions of the scene "robots", and publish their frames, which other scenes do not show."""
+    node, descriptions = served.node("robots"), robots()
+
+    async def run() -> None:
+        for name, text in descriptions.items():
+            await node.set_param(f"/{name}_robot", text)
+        publisher = await node.advertise("/tf_static", TFMessage, latch=True)
+        await publisher.publish(robot_frames(descriptions))
+
+    served.run(run())
+
+
 @contextlib.contextmanager
 def robot() -> Iterator[Served]:
     """Run a master, a dashboard and a node that publishes the messages."""
@@ -568,6 +636,8 @@ def robot() -> Iterator[Served]:
 def compare(served: Served, scene: str) -> tuple[Image.Image, Image.Image]:
     """Return the pictures of a scene: RViz's and minirospy's."""
     assert served.dashboard
+    if scene == "robots":
+        publish_robots(served)
     with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
         file = Path(name, "scene.rviz")
         write_file(file, scene)

@@ -167,6 +167,15 @@ def test_robot_in_its_room_is_shown_without_a_click(serve: Serve, browse: Browse
     )
     assert {"map", "odom", "base_link", "laser", "dock"} <= set(labels)
     assert "map: OK" in page.wait_text(".scene-side", "OK")
+    # A display that is turned off is not marked as faulty.
+    page.click("[data-name='Grid'] input[type=checkbox]")
+    page.wait(
+        "const e = document.querySelector(\"[data-name='Grid'] .dot\"); const line = document.createElement('i');"
+        "line.style.background = 'var(--line)'; document.body.append(line);"
+        "const wanted = getComputedStyle(line).backgroundColor; line.remove();"
+        "return getComputedStyle(e).backgroundColor === wanted"
+    )
+    page.click("[data-name='Grid'] input[type=checkbox]")
     # The colors of the background, of the map's free cells below the grid, and of the cloud and the path.
     for wanted in ((48, 48, 48), (197, 197, 197), (25, 255, 0)):
         wait_color(page, wanted, 16)
@@ -433,9 +442,10 @@ def test_meshes_keep_their_materials_without_lamps_and_a_bad_shape_is_named(
     status(page, "RobotModel", "a shape is left out: the shape <capsule> is not known")
     status(page, "RobotModel", "'--' is not allowed inside a comment")
     look_down(page)
-    # The color of the file is 0.8 0.1 0.1, seen from above: neither that of the description, nor that in the lamp's light.
+    # The file's diffuse and emitted colors are 0.75 0.4 0.2 together, seen from above: neither that of the description, nor
+    # that in the lamp's light.
     end = time.monotonic() + PATIENCE
-    while not is_near(colors(page), (204, 26, 26), 3):
+    while not is_near(colors(page), (191, 102, 51), 3):
         assert time.monotonic() < end
 
 

@@ -512,6 +512,11 @@ def test_classroom_shows_the_exercises_of_each_student(
         page.wait_text(".class-table .class-no", "not yet")
         page.wait_text(".class-failures li", "The LED lights: it stays dark")
         page.wait("return document.querySelectorAll('.class-led.red').length === 1")
+        # The buttons of a shared board are live.
+        page.wait("return document.querySelectorAll('.class-button').length === 2")
+        assert page.evaluate("document.querySelectorAll('.class-button.pressed').length") == 0
+        master.set_param("/minirospy_class/anna/now/buttons", "01")
+        page.wait("return document.querySelector('[aria-label=\"pressed: GPIO 12\"] .class-button.pressed')")
         # The next result is shown at once, and nothing on this page acts on a student's computer.
         master.set_param("/minirospy_class/ben/exercises/move_light/ever", True)
         page.wait("return document.querySelectorAll('.class-yes').length >= 2")

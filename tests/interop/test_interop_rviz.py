@@ -50,7 +50,7 @@ def share_of_others(one: Image.Image, other: Image.Image) -> float:
     return sum(any(abs(a - b) > ALIKE for a, b in zip(*pair, strict=True)) for pair in pairs) / len(pairs)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("scene", ["markers", "meshes"])
+@pytest.mark.parametrize("scene", ["markers", "meshes", "robots"])
 def test_bodies_have_the_places_sizes_and_colors_of_rviz(
     scene: str,
     serve: Callable[..., Served],
@@ -65,6 +65,8 @@ def test_bodies_have_the_places_sizes_and_colors_of_rviz(
     served = serve()
     assert served.dashboard
     rviz_pictures.publish(served, rviz_pictures.messages())
+    if scene == "robots":
+        rviz_pictures.publish_robots(served)
     file = tmp_path / "scene.rviz"
     rviz_pictures.write_file(file, scene)
     rviz = Rviz(file, tmp_path)

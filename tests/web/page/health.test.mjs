@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { TEXTS, translated } from "../../../minirospy/web/dashboard/page/js/findings.js";
+import { PARTS, TEXTS, translated } from "../../../minirospy/web/dashboard/page/js/findings.js";
 import { GERMAN } from "../../../minirospy/web/dashboard/page/js/german.js";
 import {
   TopicHealth,
@@ -125,12 +125,28 @@ test("a finding leads to the view that shows more", () => {
 
 test("all texts of the doctor in the list are German, what is in them stays", () => {
   assert.deepEqual(
-    TEXTS.filter((text) => !Object.hasOwn(GERMAN, text)),
+    [...TEXTS, ...PARTS].filter((text) => !Object.hasOwn(GERMAN, text)),
     [],
   );
   chooseLanguage("de");
   assert.equal(translated("nobody publishes /a (b.c), /d"), "niemand sendet /a (b.c), /d");
   assert.equal(translated("a text that is new"), "a text that is new");
+  assert.equal(
+    translated("nobody publishes /led_comand (/node; /led_command is published), /b (/c)"),
+    "niemand sendet /led_comand (/node; /led_command wird gesendet), /b (/c)",
+  );
+  assert.equal(
+    translated("/a, /b und 3 weitere: another program answers at their port on 'pi': timed out after 1.5 s"),
+    "/a, /b und 3 weitere: an ihrem Port auf 'pi' antwortet ein anderes Programm: nach 1.5 s keine Antwort",
+  );
+  assert.equal(
+    translated(
+      "2 trees that are not connected, with the roots [map], [odom] ([odom] is nearly [odm]: was one of them meant?)",
+    ),
+    "2 Bäume ohne Verbindung, mit den Wurzeln [map], [odom] ([odom] ist fast [odm]: war eines davon gemeint?)",
+  );
+  const long = `nobody publishes ${"/a is in /b and in /c; ".repeat(1000)}`;
+  assert.equal(translated(long), long);
   chooseLanguage("en");
   assert.equal(translated("nobody publishes /a"), "nobody publishes /a");
 });

@@ -76,17 +76,192 @@ export const GERMAN = {
   "{topic} has nodes of different types, which never connect: {types}":
     "{topic} hat Nodes mit verschiedenen Typen, die sich nie verbinden: {types}",
   "use one type, or two names": "einen Typ verwenden, oder zwei Namen",
-  "{nodes}: nothing listens at their port on '{host}'": "{nodes}: an ihrem Port auf '{host}' hört nichts",
   "nothing listens at their port on '{host}'": "an ihrem Port auf '{host}' hört nichts",
   "if they were killed, `rosnode cleanup` makes the master forget them; if they run, they registered a wrong address: set ROS_IP on their machine":
     "wurden sie beendet, lässt `rosnode cleanup` den Master sie vergessen; laufen sie, haben sie eine falsche Adresse angemeldet: auf ihrem Rechner ROS_IP setzen",
-  "{nodes}: nothing comes back from '{host}'": "{nodes}: von '{host}' kommt nichts zurück",
   "nothing comes back from '{host}'": "von '{host}' kommt nichts zurück",
   "{subscriber} does not get {topics} of {publisher}": "{subscriber} bekommt {topics} von {publisher} nicht",
   "{service} of {node} does not answer: {why}": "{service} von {node} antwortet nicht: {why}",
   "start its node again; if that one runs elsewhere, its port for services is blocked: see MINIROSPY_PORTS":
     "die Node neu starten; läuft sie auf einem anderen Rechner, ist ihr Port für Services gesperrt: siehe MINIROSPY_PORTS",
   "not installed: {packages}": "nicht installiert: {packages}",
+  "look at its terminal": "in sein Terminal sehen",
+  "this machine does not know the name '{host}' of ROS_MASTER_URI={uri}":
+    "dieser Rechner kennt den Namen '{host}' aus ROS_MASTER_URI={uri} nicht",
+  "use the address of that machine, or add '{host}' to the hosts file of this one":
+    "die Adresse jenes Rechners verwenden, oder '{host}' in die hosts-Datei von diesem eintragen",
+  "{host} is there, but nothing listens at {uri}": "{host} ist da, aber an {uri} hört nichts",
+  "start `roscore` on {host}; if it runs, it listens on loopback alone, since ROS_IP or ROS_HOSTNAME is that there, or on another port":
+    "auf {host} `roscore` starten; läuft er, hört er nur auf Loopback, weil ROS_IP oder ROS_HOSTNAME dort so gesetzt ist, oder auf einem anderen Port",
+  "see that {host} is on and has that address (`ping {again}`); if it answers, its firewall drops what comes to TCP port {port}":
+    "prüfen, ob {host} an ist und diese Adresse hat (`ping {again}`); antwortet er, verwirft seine Firewall, was an TCP-Port {port} kommt",
+  "no way leads to {uri}: {why}": "zu {uri} führt kein Weg: {why}",
+  "see that both machines are in one network, and that no firewall refuses":
+    "prüfen, ob beide Rechner in einem Netz sind und keine Firewall ablehnt",
+  "{uri} accepts connections, but does not answer ({why})": "{uri} nimmt Verbindungen an, antwortet aber nicht ({why})",
+  "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it":
+    "er ist beschäftigt oder angehalten: nach Strg-Z lässt `fg` in seinem Terminal ihn weiterlaufen",
+  "what answers at {uri} is not a ROS master: {why}": "was an {uri} antwortet, ist kein ROS-Master: {why}",
+  "correct the port in ROS_MASTER_URI, or end that program":
+    "den Port in ROS_MASTER_URI berichtigen, oder jenes Programm beenden",
+  "see docs/network.md": "siehe docs/network.md",
+  "that of {machine} is {seconds} s ahead of this one": "die von {machine} geht gegenüber dieser {seconds} s vor",
+  "that of {machine} is {seconds} s behind this one": "die von {machine} geht gegenüber dieser {seconds} s nach",
+  "the master's machine ({host})": "dem Rechner des Masters ({host})",
+  "let both follow one time server (chrony, ntp): stamps and transforms of one are wrong for the other":
+    "beide nach einem Zeitserver stellen (chrony, ntp): Zeitstempel und Transformationen des einen sind für den anderen falsch",
+  "{node} has another definition of {type} than this machine: build all sides from the same one":
+    "{node} hat eine andere Definition von {type} als dieser Rechner: alle Seiten aus derselben bauen",
+  "run `minirospy doctor` on the machine of {node}: it does not reach '{host}', or has another definition of the type":
+    "auf dem Rechner von {node} `minirospy doctor` ausführen: er erreicht '{host}' nicht, oder hat eine andere Definition des Typs",
+  "its node has another definition of {type} than this machine":
+    "seine Node hat eine andere Definition von {type} als dieser Rechner",
+  "build both machines from the same definition": "beide Rechner aus derselben Definition bauen",
+  "are registered as being at '{host}', a name that this machine does not know":
+    "sind an '{host}' angemeldet, einem Namen, den dieser Rechner nicht kennt",
+  "on '{host}' set ROS_IP to its address and start them again, or add '{again}' to the hosts file here":
+    "auf '{host}' ROS_IP auf seine Adresse setzen und sie neu starten, oder '{again}' hier in die hosts-Datei eintragen",
+  "are registered as being at '{host}', by which each machine reaches itself alone":
+    "sind an '{host}' angemeldet, womit jeder Rechner nur sich selbst erreicht",
+  "on their machine set ROS_IP to its address and start them again":
+    "auf ihrem Rechner ROS_IP auf seine Adresse setzen und sie neu starten",
+  "connections to it on '{host}' are accepted, but nothing is answered ({why})":
+    "Verbindungen auf '{host}' werden angenommen, aber nichts wird beantwortet ({why})",
+  "another program answers at their port on '{host}': {why}":
+    "an ihrem Port auf '{host}' antwortet ein anderes Programm: {why}",
+  "`rosnode cleanup` makes the master forget them": "`rosnode cleanup` lässt den Master sie vergessen",
+  "nothing comes back from {uri}": "von {uri} kommt nichts zurück",
+  "no way leads to '{host}'": "zu '{host}' führt kein Weg",
+  "if `ping {host}` fails too: on their machine set ROS_IP to an address that this one reaches (`rosnode cleanup` if it is off); if not, a firewall is in the way: see MINIROSPY_PORTS":
+    "schlägt auch `ping {host}` fehl: auf ihrem Rechner ROS_IP auf eine Adresse setzen, die dieser erreicht (`rosnode cleanup`, wenn er aus ist); sonst ist eine Firewall im Weg: siehe MINIROSPY_PORTS",
+  "the name is not known": "der Name ist nicht bekannt",
+  "the name '{host}' is not known": "der Name '{host}' ist nicht bekannt",
+  "connection refused": "Verbindung abgelehnt",
+  "timed out": "keine Antwort in der Zeit",
+  "timed out after {seconds} s": "nach {seconds} s keine Antwort",
+  "it is the node {node}": "es ist die Node {node}",
+  "the master does not know its address": "der Master kennt ihre Adresse nicht",
+  "no server can be opened here: {why}": "hier lässt sich kein Server öffnen: {why}",
+  "correct ROS_IP, or MINIROSPY_PORTS": "ROS_IP oder MINIROSPY_PORTS berichtigen",
+  "this machine does not reach its own node at '{host}': {why}":
+    "dieser Rechner erreicht seine eigene Node an '{host}' nicht: {why}",
+  "set ROS_IP to an address of this machine, or unset ROS_IP and ROS_HOSTNAME":
+    "ROS_IP auf eine Adresse dieses Rechners setzen, oder ROS_IP und ROS_HOSTNAME löschen",
+  "the master reaches this machine, but {nodes} gets no topic from it":
+    "der Master erreicht diesen Rechner, aber {nodes} bekommt kein Topic von ihm",
+  "a firewall lets only some ports through: open TCP port {port} too (see MINIROSPY_PORTS)":
+    "eine Firewall lässt nur manche Ports durch: auch TCP-Port {port} öffnen (siehe MINIROSPY_PORTS)",
+  "{machine} does not reach this one at {address}: {why}":
+    "diesen Rechner an {address} erreicht nicht {machine}: {why}",
+  "{machine} does not reach this one at {address}": "diesen Rechner an {address} erreicht nicht {machine}",
+  "a firewall keeps it from TCP ports {one} and {other} of this machine: open them, or set MINIROSPY_PORTS to ports that are open":
+    "eine Firewall sperrt die TCP-Ports {one} und {other} dieses Rechners: sie öffnen, oder MINIROSPY_PORTS auf offene Ports setzen",
+  "{advice}; or it takes '{host}' for another machine: {command}":
+    "{advice}; oder '{host}' ist dort ein anderer Rechner: {command}",
+  "{command}; if that does not do, {advice}": "{command}; hilft das nicht: {advice}",
+  "export ROS_IP=<the address by which it reaches this machine>":
+    "export ROS_IP=<die Adresse, über die er diesen Rechner erreicht>",
+  "the doctor that listens at '{host}' is not reached: {why}":
+    "der Doktor, der auf '{host}' wartet, ist nicht erreichbar: {why}",
+  "{service} did not answer as a doctor: {answer}": "{service} hat nicht wie ein Doktor geantwortet: {answer}",
+  "end that node": "jene Node beenden",
+  "it reaches this machine, and this one does not reach it at {address}: {why}":
+    "er erreicht diesen Rechner, und dieser erreicht ihn an {address} nicht: {why}",
+  "see there what to do": "dort steht, was zu tun ist",
+  "no transforms, but other bytes: {nodes}": "keine Transformationen, sondern andere Bytes: {nodes}",
+  "publish tf2_msgs/TFMessage there": "dort tf2_msgs/TFMessage senden",
+  "nothing came on /tf while listening": "auf /tf kam beim Zuhören nichts",
+  "`rosrun tf tf_monitor` shows when something does": "`rosrun tf tf_monitor` zeigt, wann etwas kommt",
+  "listeners ignore it: correct what that node publishes":
+    "Empfänger lassen sie aus: berichtigen, was jene Node sendet",
+  "[{frame}] has {count} parents ({parents}), published by {nodes}: lookups jump from one to the other":
+    "[{frame}] hat {count} übergeordnete Koordinatensysteme ({parents}), gesendet von {nodes}: Abfragen springen zwischen ihnen",
+  "let one node publish it, with one parent": "nur eine Node soll es senden, mit einem übergeordneten",
+  "[{frame}] is published by {count} nodes ({nodes}): it may jump":
+    "[{frame}] senden {count} Nodes ({nodes}): es kann springen",
+  "stop all but one of them (two drivers, two robot_state_publishers, a bag that is played besides?)":
+    "alle bis auf eine beenden (zwei Treiber, zwei robot_state_publisher, ein Bag, das nebenher läuft?)",
+  "a loop, which makes every lookup there fail: {frames}": "eine Schleife, in der jede Abfrage fehlschlägt: {frames}",
+  "take one of them out": "eines davon herausnehmen",
+  "{count} trees that are not connected, with the roots {roots} ({hint}: was one of them meant?)":
+    "{count} Bäume ohne Verbindung, mit den Wurzeln {roots} ({hint}: war eines davon gemeint?)",
+  "{count} trees that are not connected, with the roots {roots}":
+    "{count} Bäume ohne Verbindung, mit den Wurzeln {roots}",
+  "publish a transform between them (`rosrun tf2_ros static_transform_publisher`), or correct the name":
+    "eine Transformation zwischen ihnen senden (`rosrun tf2_ros static_transform_publisher`), oder den Namen berichtigen",
+  "{node} stamps its transforms ({frame}) {seconds} s ahead: lookups of now fail, or take old ones":
+    "{node} stempelt ihre Transformationen ({frame}) {seconds} s voraus: Abfragen für jetzt schlagen fehl oder nehmen alte",
+  "set the clocks of both machines by the same server (chrony, ntp); `minirospy doctor` says whose is off":
+    "die Uhren beider Rechner nach demselben Server stellen (chrony, ntp); `minirospy doctor` sagt, welche falsch geht",
+  "{node} stamps its transforms ({frame}) {seconds} s behind: lookups of now fail (extrapolation into the future)":
+    "{node} stempelt ihre Transformationen ({frame}) {seconds} s zurück: Abfragen für jetzt schlagen fehl (Extrapolation in die Zukunft)",
+  "if its machine's clock is right, the node is late or a bag is played without --clock and /use_sim_time":
+    "geht die Uhr ihres Rechners richtig, ist die Node zu spät, oder ein Bag läuft ohne --clock und /use_sim_time",
+  "{version}; `import rospy` finds nothing": "{version}; `import rospy` findet nichts",
+  "run without -I and -S, or install minirospy again: its .pth file puts rospy on the path":
+    "ohne -I und -S starten, oder minirospy neu installieren: seine .pth-Datei bringt rospy in den Pfad",
+  "Python 3.12.0 to 3.12.2 start no more threads once the main thread has ended, which nodes need until their end: use 3.12.3 or later":
+    "Python 3.12.0 bis 3.12.2 starten nach dem Ende des Hauptthreads keine Threads mehr, die Nodes bis zu ihrem Ende brauchen: 3.12.3 oder neuer verwenden",
+  "install a newer Python, and make the environment again":
+    "ein neueres Python installieren, und die Umgebung neu anlegen",
+  "{file} hides the module {module} from programs in this folder":
+    "{file} verdeckt das Modul {module} vor Programmen in diesem Ordner",
+  "give it another name": "ihr einen anderen Namen geben",
+  "correct it, or unset it": "sie berichtigen, oder löschen",
+  "ROS_HOSTNAME={host} and ROS_IP={address} are both set, and say different things: ROS_HOSTNAME counts":
+    "ROS_HOSTNAME={host} und ROS_IP={address} sind beide gesetzt und sagen Verschiedenes: ROS_HOSTNAME zählt",
+  "ROS_HOSTNAME={host} and ROS_IP={address} are both set: ROS_HOSTNAME counts":
+    "ROS_HOSTNAME={host} und ROS_IP={address} sind beide gesetzt: ROS_HOSTNAME zählt",
+  "ROS_IP={address} is a name, not an IP address": "ROS_IP={address} ist ein Name, keine IP-Adresse",
+  "ROS_IP={address} is not a whole IP address": "ROS_IP={address} ist keine vollständige IP-Adresse",
+  "export ROS_IP=<an address of this machine>": "export ROS_IP=<eine Adresse dieses Rechners>",
+  "unset ROS_HOSTNAME; export ROS_IP=<an address of this machine>":
+    "unset ROS_HOSTNAME; export ROS_IP=<eine Adresse dieses Rechners>",
+  "this machine's name '{host}'": "der Name dieses Rechners, '{host}',",
+  "{variable} is neither an IP address nor a name that this machine knows":
+    "{variable} ist weder eine IP-Adresse noch ein Name, den dieser Rechner kennt",
+  "{variable} is not a name that this machine knows": "{variable} ist kein Name, den dieser Rechner kennt",
+  "{variable} is every address and none: nobody can connect to a node there":
+    "{variable} ist jede Adresse und keine: dort kann sich niemand mit einer Node verbinden",
+  "{variable} is an IPv6 address, and nodes listen on IPv4 alone":
+    "{variable} ist eine IPv6-Adresse, und Nodes hören nur auf IPv4",
+  "{variable} is this machine alone, but the master is on another one ({host})":
+    "{variable} ist nur dieser Rechner, aber der Master ist auf einem anderen ({host})",
+  "{variable} is {address} here, which other machines cannot use unless they know that name":
+    "{variable} ist hier {address}, was andere Rechner nur verwenden können, wenn sie den Namen kennen",
+  "{variable} is not an address of this machine: right only behind NAT or in a container":
+    "{variable} ist keine Adresse dieses Rechners: richtig nur hinter NAT oder in einem Container",
+  "{variable} is {addresses}, not an address of this machine: right only behind NAT or in a container":
+    "{variable} ist {addresses}, keine Adresse dieses Rechners: richtig nur hinter NAT oder in einem Container",
+  "ROS_IPV6={value} has no effect": "ROS_IPV6={value} hat keine Wirkung",
+  "export ROS_IPV6=on, or unset it": "export ROS_IPV6=on, oder sie löschen",
+  "ROS_NAMESPACE={name} is not a legal name": "ROS_NAMESPACE={name} ist kein gültiger Name",
+  "letters, digits, _ and /, a letter first": "Buchstaben, Ziffern, _ und /, zuerst ein Buchstabe",
+  "ROS_PACKAGE_PATH names {folder}, which is not a folder": "ROS_PACKAGE_PATH nennt {folder}, das kein Ordner ist",
+  "take it out of the variable": "ihn aus der Variablen nehmen",
+  "ROS_PYTHON_LOG_CONFIG_FILE={file} is not a file": "ROS_PYTHON_LOG_CONFIG_FILE={file} ist keine Datei",
+  "unset it": "sie löschen",
+  "logs cannot be written to {folder}: {file} may not be written by this user":
+    "in {folder} lassen sich keine Logs schreiben: dieser Benutzer darf {file} nicht schreiben",
+  "logs cannot be written to {folder}: {file} is a file, no folder":
+    "in {folder} lassen sich keine Logs schreiben: {file} ist eine Datei, kein Ordner",
+  "export {variable}=<a folder of your own>, or `sudo chown -R $USER {folder}`":
+    "export {variable}=<ein eigener Ordner>, oder `sudo chown -R $USER {folder}`",
+  "export {variable}=<a folder of your own>": "export {variable}=<ein eigener Ordner>",
+  "the workspace {folder} is not in this terminal's environment":
+    "der Workspace {folder} ist nicht in der Umgebung dieses Terminals",
+  "{package} is in {folders}: the first counts": "{package} ist in {folders}: das erste zählt",
+  "remove or rename one of them": "eines entfernen oder umbenennen",
+  "{files} and others: changed since the last catkin_make; run it in {folder}":
+    "{files} und andere: seit dem letzten catkin_make geändert; in {folder} ausführen",
+  "{files}: changed since the last catkin_make; run it in {folder}":
+    "{files}: seit dem letzten catkin_make geändert; in {folder} ausführen",
+  "correct its package.xml": "seine package.xml berichtigen",
+  "{package} needs {packages}, which is not a package here": "{package} braucht {packages}, das hier kein Paket ist",
+  "put it into a folder of ROS_PACKAGE_PATH; if it is not a ROS package, nothing need be done":
+    "es in einen Ordner von ROS_PACKAGE_PATH legen; ist es kein ROS-Paket, ist nichts zu tun",
+  "; {topic} is published": "; {topic} wird gesendet",
+  "[{frame}] is nearly [{other}]": "[{frame}] ist fast [{other}]",
   // names of views
   "Layouts": "Anordnungen",
   "Topics": "Topics",
@@ -1081,6 +1256,8 @@ export const GERMAN = {
   "Student": "Name",
   "passed": "geschafft",
   "not yet": "noch nicht",
+  "pressed: {buttons}": "gedrückt: {buttons}",
+  "no button is pressed": "kein Taster ist gedrückt",
   "no LED is lit": "keine LED leuchtet",
   "{count} students, {passed} exercises passed": "{count} Teilnehmende, {passed} Aufgaben geschafft",
   "No results yet. Each student types `minirospy check --join {uri} --name NAME` once.":

@@ -225,7 +225,7 @@ export class Grips {
 
   light(control, level) {
     control?.group.traverse(({ material }) => {
-      for (const each of [material ?? []].flat()) each.emissive?.setScalar(level);
+      for (const each of [material ?? []].flat()) each.emissive?.setHex(each.userData.emission ?? 0).addScalar(level);
     });
     this.view.stage.invalidate();
   }

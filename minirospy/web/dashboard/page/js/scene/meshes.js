@@ -72,7 +72,10 @@ function cached(link, uri, load) {
   return known.get(uri);
 }
 
-/** Return a mesh's own material, mixed with a tint. */
+/**
+ * Return a mesh's own material, mixed with a tint. As in RViz, it has the file's diffuse and emitted colors; specular
+ * and ambient ones are not shown.
+ */
 function own(material, paint) {
   const copy = new MeshLambertMaterial({
     map: material.map ?? null,
@@ -80,13 +83,17 @@ function own(material, paint) {
     vertexColors: material.vertexColors,
   });
   if (material.color) copy.color.copy(material.color);
+  if (material.emissive) copy.emissive.copy(material.emissive);
   let alpha = paint?.alpha ?? 1;
   if (paint?.tint) {
     // RViz draws the tint over the mesh: at most half of it.
     const over = Math.min(alpha, 0.5);
     alpha = 1 - (1 - over) * (1 - alpha);
-    mix(copy, paint.tint, alpha ? over / alpha : 0);
+    const part = alpha ? over / alpha : 0;
+    mix(copy, paint.tint, part);
+    copy.emissive.multiplyScalar(1 - part);
   }
+  copy.userData.emission = copy.emissive.getHex();
   copy.opacity = (material.opacity ?? 1) * alpha;
   copy.transparent = copy.opacity < 0.9998;
   copy.depthWrite = !copy.transparent;
@@ -161,8 +168,10 @@ async function objectOf(link, uri, bytes) {
     geometry.setAttribute("position", new BufferAttribute(positions, 3));
     if (normals) geometry.setAttribute("normal", new BufferAttribute(normals, 3));
     else geometry.computeVertexNormals();
-    const { rgb = GRAY, alpha = 1 } = colors.get(material) ?? {};
-    group.add(new Mesh(geometry, bodyMaterial(rgb, alpha)));
+    const { rgb = GRAY, alpha = 1, emission = [0, 0, 0] } = colors.get(material) ?? {};
+    const body = bodyMaterial(rgb, alpha);
+    body.emissive.fromArray(emission);
+    group.add(new Mesh(geometry, body));
   }
   return group;
 }

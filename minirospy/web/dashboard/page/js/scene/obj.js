@@ -48,7 +48,7 @@ function addFace({ positions, normals }, words, vertices, directions) {
   }
 }
 
-/** Return the colors of materials by name: {rgb (0 to 255), alpha}. */
+/** Return the colors of materials by name: {rgb (0 to 255), alpha, emission (if it has one; 0 to 1)}. */
 export function readMaterials(text) {
   const found = new Map();
   let color = null;
@@ -59,6 +59,7 @@ export function readMaterials(text) {
       found.set(rest.join(" "), color);
     } else if (!color) continue;
     else if (word === "Kd" && rest.length >= 3) color.rgb = rest.slice(0, 3).map((part) => Number(part) * 255);
+    else if (word === "Ke" && rest.length >= 3) color.emission = rest.slice(0, 3).map(Number);
     else if (word === "d") color.alpha = Number(rest.at(-1));
     else if (word === "Tr") color.alpha = 1 - Number(rest.at(-1));
   }

@@ -44,7 +44,7 @@ export class Bag {
     this.recordButton = h(
       "button",
       { type: "button", "aria-expanded": "false", onclick: () => this.recorder.toggle(this.recordButton) },
-      h("span", { class: "dot" }),
+      h("span", { class: "dot record" }),
       "Record …",
     );
     main.append(

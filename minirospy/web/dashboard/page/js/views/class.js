@@ -5,6 +5,7 @@ import { h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
 const COLORS = ["green", "green", "yellow", "yellow", "red", "red"]; // of the board's LEDs
+const BUTTONS = [11, 12]; // GPIO of the board's buttons
 const GONE_MS = 10000; // without a beat of `minirospy check --share`, which come every three seconds
 
 export class Class {
@@ -104,9 +105,18 @@ function board(student) {
     }),
   );
   const on = [...student.leds].flatMap((level, index) => (level === "1" ? [`GPIO ${index + 2}`] : []));
+  const pressed = BUTTONS.filter((_, index) => student.buttons[index] === "1").map((pin) => `GPIO ${pin}`);
+  const buttons = BUTTONS.map((_, index) =>
+    h("span", {
+      class: student.buttons[index] === "1" ? "class-button pressed" : "class-button",
+      "aria-hidden": "true",
+    }),
+  );
+  const hint = pressed.length ? t("pressed: {buttons}", { buttons: pressed.join(", ") }) : t("no button is pressed");
   const nodes = t("{count} nodes", { count: student.nodes.length });
   return [
     h("span", { role: "img", "aria-label": on.join(", ") || t("no LED is lit") }, lit),
+    h("span", { role: "img", "aria-label": hint, title: hint }, buttons),
     h("span", { class: "muted" }, nodes),
   ];
 }

@@ -121,8 +121,9 @@ export class World extends Markers {
       item.isSelected = isSelected;
       item.object.traverse((each) => {
         for (const material of [each.material ?? []].flat()) {
-          if (!material.emissive || material.emissive.getHex() === (isSelected ? GLOW : 0)) continue;
-          material.emissive.setHex(isSelected ? GLOW : 0);
+          const wanted = isSelected ? GLOW : (material.userData.emission ?? 0);
+          if (!material.emissive || material.emissive.getHex() === wanted) continue;
+          material.emissive.setHex(wanted);
           this.context.stage.invalidate();
         }
       });
