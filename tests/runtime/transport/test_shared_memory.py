@@ -518,6 +518,135 @@ def test_a_subscriber_that_does_not_know_rings_is_sent_plain_frames(mouth: Mouth
     sock.close()
 
 
+# --- what a connection says about it
+
+
+def test_a_connection_says_how_large_messages_are_sent(mouth: Mouth, monkeypatch: pytest.MonkeyPatch) -> None:
+    ear = Ear(mouth.connect())
+    (link,) = mouth.links
+    mouth.publish(serialize_frame(b"small"))
+    assert (link.large, link.shared, link.obstacle) == (0, 0, "")
+    mouth.publish(image(0, CHUNK))
+    assert (link.large, link.shared, link.obstacle) == (1, 0, "the first messages use the socket")
+    ear.wait(2)
+    count = 1 + mouth.warm_up(ear)
+    for number in range(10):
+        mouth.publish(image(number, CHUNK))
+        ear.wait(1 + count + number + 1)
+    assert (link.large, link.obstacle) == (count + 10, "")
+    assert link.shared == mouth.sender(0).announced >= 10
+
+    monkeypatch.setattr(ring, "MAX_MESSAGE", 2**21)
+    mouth.publish(image(1, 2**21 + 1))
+    assert (link.large, link.obstacle) == (count + 11, "messages over 2 MB are too large for it")
+    ear.close()
+
+
+def test_a_connection_says_that_its_subscriber_is_slow(mouth: Mouth) -> None:
+    ear = Ear(mouth.connect())
+    count = mouth.warm_up(ear, size=3_000_000)
+    ear.may_read.clear()
+    mouth.publish(*(image(number, 3_000_000) for number in range(2 * count + 20)))
+    assert mouth.links[0].obstacle == "the subscriber reads more slowly than it is sent to"
+    ear.close()
+
+
+def test_a_connection_says_why_its_subscriber_does_not_map(
+    mouth: Mouth, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(RingReceiver, "take_offer", refuse)
+    ear = Ear(mouth.connect())
+    mouth.warm_up(ear)
+    assert mouth.links[0].obstacle == "the subscriber cannot map the publisher's memory"
+    ear.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "broken", "why"),
+    [
+        ("memfd_create", no_memfd, "the publisher has no memory for it: no memfd here"),
+        ("posix_fallocate", no_memory, "the publisher has no memory for it: no space left"),
+        ("eventfd", no_memfd, "the publisher cannot open another file: no memfd here"),
+    ],
+)
+def test_a_connection_says_why_its_publisher_has_no_memory(
+    mouth: Mouth, name: str, broken: Any, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, name, broken)
+    ear = Ear(mouth.connect())
+    for number in range(10):
+        mouth.publish(image(number, CHUNK))
+        ear.wait(number + 1)
+        wait_until(lambda: Step.ASKED not in mouth.steps() and Step.OFFERED not in mouth.steps(), SECONDS)
+    assert mouth.links[0].obstacle == why
+    ear.close()
+
+
+def test_a_connection_without_a_ring_says_why(mouth: Mouth, monkeypatch: pytest.MonkeyPatch) -> None:
+    ear = Ear(mouth.connect(shared=False), shares_memory=False)
+    (link,) = mouth.links
+    mouth.publish(image(0, CHUNK))
+    ear.wait(1)
+    assert link.obstacle == (
+        "the subscriber does not use it (MINIROSPY_TRANSPORT=unix, a bridge or a dashboard)"
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "geteuid", lambda: 12345)
+        assert link.obstacle == "the subscriber belongs to another user"
+    with monkeypatch.context() as patch:
+        patch.delattr(os, "eventfd")
+        assert link.obstacle == "this Python has no os.memfd_create or os.eventfd"
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "platform", "darwin")
+        assert link.obstacle == "it needs Linux"
+    ear.close()
+
+
+@pytest.mark.parametrize(
+    ("is_same_host", "why"),
+    [
+        (False, "the subscriber is on another machine or in another container"),
+        (
+            True,
+            "the subscriber is not a minirospy node, or cannot use Unix sockets (MINIROSPY_TRANSPORT=tcp)",
+        ),
+    ],
+)
+def test_a_tcp_connection_says_why_it_has_no_ring(is_same_host: bool, why: str) -> None:
+    with socket.socket() as sock:
+        assert shared_memory.obstacle(sock, is_same_host=is_same_host) == why
+
+
+def test_shared_memory_is_tried_out() -> None:
+    files = len(os.listdir("/proc/self/fd"))
+    assert shared_memory.try_out() == ""
+    assert len(os.listdir("/proc/self/fd")) == files
+
+
+def forbidden(*_: Any) -> Any:
+    raise PermissionError(1, "Operation not permitted")
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "broken", "why"),
+    [
+        (os, "memfd_create", forbidden, "Operation not permitted"),
+        (os, "eventfd", forbidden, "Operation not permitted"),
+        (os, "posix_fallocate", no_memory, "no space left"),
+        (mmap, "mmap", no_map, "no mapping here"),
+        (RingReceiver, "take_offer", refuse, "a file that another process passes cannot be mapped"),
+        (RingReceiver, "read", lambda *_: b"other bytes", "a message did not arrive as it was sent"),
+    ],
+)
+def test_a_machine_without_shared_memory_is_found_out(
+    owner: Any, name: str, broken: Any, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = len(os.listdir("/proc/self/fd"))
+    monkeypatch.setattr(owner, name, broken)
+    assert shared_memory.try_out() == why
+    assert len(os.listdir("/proc/self/fd")) == files
+
+
 # --- peers that lie
 
 
