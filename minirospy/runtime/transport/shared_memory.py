@@ -207,6 +207,8 @@ class SharedRing:
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
         self._is_watched = False  # whether the timer runs, or is about to
+        # for each subscriber's process that closed its connection and held places: its pidfd, the memory, the connection
+        self._closed: dict[int, tuple[_Memory, RingSender]] = {}
 
     @property
     def memory_bytes(self) -> int:
@@ -234,6 +236,33 @@ class SharedRing:
         if not self._senders:
             self.retire()
         self.give_back_retired()
+
+    def release_at_exit(self, memory: _Memory, sender: RingSender, process: int) -> None:
+        """Release a closed connection's places when its subscriber exits, because until then it may read them.
+
+        Call this on the loop, with the lock held.
+        """
+        if memory not in self._retired:
+            return  # no other connection uses it, so it is freed when its subscriber unmaps it
+        try:
+            file = os.pidfd_open(process)
+        except (OSError, AttributeError):
+            # The memory stays until the other subscribers have a new ring, that is until the next large messages.
+            return
+        self._closed[file] = memory, sender
+        self._loop.add_reader(file, self._exited, file)
+
+    def _exited(self, file: int) -> None:
+        memory, sender = self._closed[file]
+        self._stop_waiting(file)
+        with self.lock:
+            memory.places.release(sender, memory.places.held_by(sender))
+            self.give_back_retired()
+
+    def _stop_waiting(self, file: int) -> None:
+        del self._closed[file]
+        self._loop.remove_reader(file)
+        os.close(file)
 
     def collect(self) -> None:
         """Free the places that subscribers have released. Call this with the lock held."""
@@ -288,6 +317,8 @@ class SharedRing:
             self._is_off = True
             self.retire()
             self._retired = []
+        for file in list(self._closed):
+            self._stop_waiting(file)
         if self._timer:
             self._timer.cancel()
 
@@ -314,6 +345,9 @@ class SharedRing:
                     self.memory.give_back()
                 except OSError as error:
                     self.turn_off(error)
+            for file, (memory, _) in list(self._closed.items()):
+                if memory not in self._retired:
+                    self._stop_waiting(file)
             self._is_watched = bool(self._retired or (self.memory and self.memory.backed_bytes))
             if self._is_watched:
                 self._watch()
@@ -376,6 +410,7 @@ class RingSender:
         self._trouble = ""  # why the ring is not used, set with Step.OFF
         self._ring = shared
         self._sock = sock
+        self._process = peer(sock).process
         self.memory: _Memory | None = None  # the memory that was offered last
         self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
         self._is_releasing = True  # whether the last wait for a release was successful
@@ -441,13 +476,19 @@ class RingSender:
             self._turn_off("the subscriber has released more than it held")
 
     def close(self) -> None:
-        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced."""
+        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced.
+
+        Call this on the loop.
+        """
         with self._ring.lock:
             self.collect()
             memory, self.memory = self.memory, None
-            if memory and memory is self._ring.memory and memory.places.held_by(self):
+            holds = memory is not None and memory.places.held_by(self)
+            if holds and memory is self._ring.memory:
                 self._ring.retire()
             self._ring.remove(self)
+            if holds and memory:
+                self._ring.release_at_exit(memory, self, self._process)
             self.step = Step.OFF
             self._close_counter()
 

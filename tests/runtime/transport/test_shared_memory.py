@@ -149,16 +149,20 @@ class Mouth:
     def connect(self, *, shared: bool = True, name: str = "/ear") -> socket.socket:
         """Return the subscriber's end of a new connection, after the headers."""
         one, other = socket.socketpair()
-        one.setblocking(False)
-        fields = subscriber_header("/t", IMAGE, name, split_frames=True, shared_memory=shared)
-
-        async def accept() -> str | None:
-            return self.publication.accept(one, fields, "/mouth", "", shares_memory=True)
-
-        assert self._loop.run(accept()) is None
+        self.accept(one, shared=shared, name=name)
         (length,) = struct.unpack("<I", other.recv(4, socket.MSG_WAITALL))
         other.recv(length, socket.MSG_WAITALL)
         return other
+
+    def accept(self, sock: socket.socket, *, shared: bool = True, name: str = "/ear") -> None:
+        """Connect a subscriber whose other end of ``sock`` receives the header."""
+        sock.setblocking(False)
+        fields = subscriber_header("/t", IMAGE, name, split_frames=True, shared_memory=shared)
+
+        async def accept() -> str | None:
+            return self.publication.accept(sock, fields, "/mouth", "", shares_memory=True)
+
+        assert self._loop.run(accept()) is None
 
     def publish(self, *frames: bytes | LargeFrame) -> None:
         for frame in frames:
@@ -395,6 +399,82 @@ def test_a_replaced_ring_gives_its_memory_back(loop: LoopThread, monkeypatch: py
     slow.close()
     fast.close()
     mouth.close()
+
+
+STUCK = 99  # the number of the image whose callback never returns
+STUCK_SUBSCRIBER = f"""
+import socket, struct, sys, threading
+from types import SimpleNamespace
+from minirospy.runtime.transport import readers
+
+sock = socket.socket(socket.AF_UNIX)
+sock.connect(sys.argv[1])
+sock.recv(*struct.unpack("<I", sock.recv(4, socket.MSG_WAITALL)), socket.MSG_WAITALL)
+
+def deliver(frame):
+    if struct.unpack_from("<Q", frame)[0] == {STUCK}:
+        print("stuck", flush=True)
+        threading.Event().wait()
+
+readers.read_frames(sock, deliver, SimpleNamespace(newest=0), readers.ReaderSet(), shares_memory=True)
+"""
+
+
+@pytest.fixture
+def stuck_subscriber(mouth: Mouth, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """Connect a subscriber in another process. It never returns from the callback of the image number STUCK."""
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(tmp_path / "socket"))
+        server.listen()
+        server.settimeout(60)
+        command = [sys.executable, "-c", STUCK_SUBSCRIBER, str(tmp_path / "socket")]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            try:
+                mouth.accept(server.accept()[0], name="/stuck")
+                yield process
+            finally:
+                process.kill()
+
+
+@pytest.mark.parametrize("has_pidfd", [True, False])
+def test_a_killed_subscriber_gives_its_unread_messages_back(
+    mouth: Mouth,
+    stuck_subscriber: subprocess.Popen[str],
+    has_pidfd: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    size = 200_000
+    ear = Ear(mouth.connect(name="/fast"))
+    count = mouth.warm_up(ear, size=size)
+    frames = [image(STUCK, size), image(1, size), image(2, size)]
+    mouth.publish(*frames)
+    ear.wait(count + 3)
+    assert stuck_subscriber.stdout
+    assert stuck_subscriber.stdout.readline() == "stuck\n"
+    assert mouth.steps() == [Step.IN_USE, Step.IN_USE]
+
+    files = len(os.listdir("/proc/self/fd"))
+    if not has_pidfd:
+        monkeypatch.delattr(os, "pidfd_open", raising=False)
+    stuck_subscriber.kill()
+    wait_until(lambda: len(mouth.links) == 1, SECONDS)
+    if has_pidfd:
+        # No large message follows, so the other subscriber still maps the ring.
+        wait_until(lambda: not mouth.publication.shared_bytes, SECONDS)
+        wait_until(lambda: not resident_bytes(), SECONDS)
+    else:
+        assert mouth.publication.shared_bytes == 2 * size
+    # The connection's socket and its counter, and the two files of the ring are closed, and a pidfd, too.
+    wait_until(lambda: len(os.listdir("/proc/self/fd")) <= files - 4, SECONDS)
+
+    for number in range(3, 13):
+        frames.append(image(number, size))
+        mouth.publish(frames[-1])
+        ear.wait(count + len(frames))
+        wait_until(lambda: mouth.steps()[0] not in (Step.ASKED, Step.OFFERED), SECONDS)
+    assert list(map(bytes, ear.frames[count:])) == list(map(whole, frames))
+    assert mouth.steps() == [Step.IN_USE]
+    ear.close()
 
 
 def test_memory_ends_with_the_last_subscriber(mouth: Mouth) -> None:
