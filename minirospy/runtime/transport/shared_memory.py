@@ -257,7 +257,7 @@ class SharedRing:
         self._stop_waiting(file)
         with self.lock:
             memory.places.release(sender, memory.places.held_by(sender))
-            self.give_back_retired()
+            self.collect()
 
     def _stop_waiting(self, file: int) -> None:
         del self._closed[file]
