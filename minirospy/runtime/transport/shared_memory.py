@@ -207,7 +207,7 @@ class SharedRing:
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
         self._is_watched = False  # whether the timer runs, or is about to
-        # for each subscriber's process that closed its connection and held places: its pidfd, the memory, the connection
+        # by pidfd of a subscriber that closed its connection while it held places: the memory, and the connection
         self._closed: dict[int, tuple[_Memory, RingSender]] = {}
 
     @property
@@ -246,6 +246,10 @@ class SharedRing:
             return  # no other connection uses it, so it is freed when its subscriber unmaps it
         try:
             file = os.pidfd_open(process)
+        except ProcessLookupError:
+            # It has exited, and its parent has been notified.
+            self._release(memory, sender)
+            return
         except (OSError, AttributeError):
             # The memory stays until the other subscribers have a new ring, that is until the next large messages.
             return
@@ -256,8 +260,11 @@ class SharedRing:
         memory, sender = self._closed[file]
         self._stop_waiting(file)
         with self.lock:
-            memory.places.release(sender, memory.places.held_by(sender))
-            self.collect()
+            self._release(memory, sender)
+
+    def _release(self, memory: _Memory, sender: RingSender) -> None:
+        memory.places.release(sender, memory.places.held_by(sender))
+        self.collect()
 
     def _stop_waiting(self, file: int) -> None:
         del self._closed[file]

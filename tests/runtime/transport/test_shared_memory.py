@@ -436,11 +436,14 @@ def stuck_subscriber(mouth: Mouth, tmp_path: Path) -> Iterator[subprocess.Popen[
                 process.kill()
 
 
-@pytest.mark.parametrize("has_pidfd", [True, False])
+@pytest.mark.parametrize(
+    ("fault", "is_given_back"), [(None, True), (ProcessLookupError, True), (OSError, False)]
+)
 def test_a_killed_subscriber_gives_its_unread_messages_back(
     mouth: Mouth,
     stuck_subscriber: subprocess.Popen[str],
-    has_pidfd: bool,
+    fault: type[OSError] | None,
+    is_given_back: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
@@ -455,11 +458,15 @@ def test_a_killed_subscriber_gives_its_unread_messages_back(
     assert mouth.steps() == [Step.IN_USE, Step.IN_USE]
 
     files = len(os.listdir("/proc/self/fd"))
-    if not has_pidfd:
-        monkeypatch.delattr(os, "pidfd_open", raising=False)
+    if fault:
+
+        def pidfd_open(_process: int) -> int:
+            raise fault
+
+        monkeypatch.setattr(os, "pidfd_open", pidfd_open)
     stuck_subscriber.kill()
     wait_until(lambda: len(mouth.links) == 1, SECONDS)
-    if has_pidfd:
+    if is_given_back:
         # No large message follows, so the other subscriber still maps the ring.
         wait_until(lambda: not mouth.publication.shared_bytes, SECONDS)
         wait_until(lambda: not resident_bytes(), SECONDS)
