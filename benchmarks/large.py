@@ -2,7 +2,8 @@
 
 All participants take turns in one run, and the results are medians of the rounds. The bare processes do no more than
 necessary: one write, one read into `bytes`. ``with ring`` is minirospy as it is, ``with socket`` the same with
-MINIROSPY_TRANSPORT=unix. Linux only.
+MINIROSPY_TRANSPORT=unix, ``rospy`` real ROS, if it is installed. A point cloud (``cloud_1mb_30hz``) is read by numpy, and
+its delay includes this. Linux only.
 
     python benchmarks/large.py --rounds 5
 """
@@ -18,6 +19,7 @@ import struct
 import sys
 import time
 from collections import defaultdict
+from pathlib import Path
 from typing import NamedTuple
 
 import run
@@ -26,7 +28,8 @@ ANNOUNCEMENT = struct.Struct("<IId")  # offset, size, time of the start
 RING_BYTES = 64 * 1024 * 1024
 SEND_BUFFER = 4 * 1024 * 1024  # bytes, as minirospy requests
 SECONDS = 2.0
-SIZES = {"vga": 921_600, "6mb": 6_220_800}
+ROSPY = Path("/usr/lib/python3/dist-packages/rospy")
+SIZES = {"vga": 921_600, "6mb": 6_220_800, "cloud": 1_048_576}
 
 
 class Case(NamedTuple):
@@ -42,6 +45,7 @@ CASES = {
     "6mb_30hz": Case("6mb", 30),
     "6mb": Case("6mb", 0),
     "6mb_fanout_30hz": Case("6mb", 30, 5),
+    "cloud_1mb_30hz": Case("cloud", 30),
 }
 
 
@@ -139,7 +143,10 @@ def measure(case: Case) -> dict[str, dict[str, float]]:
         figures[f"{title}, median us"][name] = result.median
         figures[f"{title}, publisher's CPU us"][name] = result.publisher
         figures[f"{title}, CPU us"][name] = result.all
-    for name, stack in (("with ring", "minirospy"), ("with socket", "minirospy by socket")):
+    stacks = {"with ring": "minirospy", "with socket": "minirospy by socket"}
+    if ROSPY.exists():
+        stacks["rospy"] = "rospy"
+    for name, stack in stacks.items():
         for figure, value in run.stream(case.kind, hz=case.hz, listeners=case.listeners)(stack).items():
             what = figure.rpartition(", ")[2]
             figures[f"{title}, {what}"][name] = value
@@ -166,7 +173,7 @@ def main() -> int:
                 for name, value in values.items():
                     rounds[figure][name].append(value)
 
-    names = ["bare ring", "with ring", "bare socket", "with socket"]
+    names = ["bare ring", "with ring", "bare socket", "with socket", "rospy"]
     print(f"{'':48}" + "".join(f"{name:>14}" for name in names))
     for figure, measured in rounds.items():
         values = [statistics.median(measured[name]) if name in measured else float("nan") for name in names]

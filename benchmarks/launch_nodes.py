@@ -82,8 +82,13 @@ def tree(process: psutil.Process) -> list[psutil.Process]:
     return [process, *process.children(recursive=True)]
 
 
-def measure(program: str, variables: dict[str, str], count: int) -> dict[str, float]:
-    """Return the figures of one launch by column. Raise SystemExit if the nodes are not registered in time."""
+def measure(
+    program: str, variables: dict[str, str], count: int, *, settle: float = SETTLE
+) -> dict[str, float]:
+    """Return the figures of one launch by column. Raise SystemExit if the nodes are not registered in time.
+
+    ``settle``: seconds until the memory is measured.
+    """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -110,7 +115,7 @@ def measure(program: str, variables: dict[str, str], count: int) -> dict[str, fl
                     time.sleep(0.02)
                 seconds = time.monotonic() - start
                 cpu = sum(sum(each.cpu_times()[:4]) for each in tree(psutil.Process(launcher.pid)))
-                time.sleep(SETTLE)
+                time.sleep(settle)
                 memory = [each.memory_full_info() for each in tree(psutil.Process(launcher.pid))]
             finally:
                 launcher.send_signal(signal.SIGINT)

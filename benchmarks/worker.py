@@ -10,6 +10,8 @@ import threading
 import time
 
 SCAN_POINTS = 1651
+CLOUD_POINTS = 65_536
+CLOUD_STEP = 16  # bytes per point: x, y, z, intensity
 IMAGES = {"vga": (640, 480), "6mb": (1920, 1080)}
 
 
@@ -57,6 +59,18 @@ def message_of(kind):
         scan.ranges = [1.0 + 0.01 * point for point in range(SCAN_POINTS)]
         scan.intensities = [100.0 + point for point in range(SCAN_POINTS)]
         return scan
+    if kind == "cloud":
+        from sensor_msgs.msg import PointCloud2, PointField
+
+        return PointCloud2(
+            height=1,
+            width=CLOUD_POINTS,
+            fields=[PointField(name, 4 * n, PointField.FLOAT32, 1) for n, name in enumerate("xyzi")],
+            point_step=CLOUD_STEP,
+            row_step=CLOUD_STEP * CLOUD_POINTS,
+            data=bytes(CLOUD_STEP * CLOUD_POINTS),
+            is_dense=True,
+        )
     from sensor_msgs.msg import Image
 
     width, height = IMAGES[kind]
@@ -69,7 +83,25 @@ def reader_of(kind):
         return lambda message: message.data
     if kind == "scan":
         return lambda message: min(message.ranges)
+    if kind == "cloud":
+        return read_cloud
     return lambda message: (len(message.data), message.data[-1])
+
+
+def read_cloud(message):
+    """Return the greatest z of a cloud's points, from an array in the steps of ros_numpy's pointcloud2_to_array."""
+    import numpy
+
+    dtype = numpy.dtype(
+        {
+            "names": [field.name for field in message.fields],
+            "formats": ["<f4"] * len(message.fields),
+            "offsets": [field.offset for field in message.fields],
+            "itemsize": message.point_step,
+        }
+    )
+    cloud = numpy.frombuffer(message.data, dtype).reshape(message.height, message.width)
+    return cloud["z"].max()
 
 
 def talk(options):
@@ -108,12 +140,18 @@ def listen(options):
     read = reader_of(kind)
     count, late = [0], []
 
+    if kind == "cloud":
+        import numpy  # noqa: F401 - before the first message arrives
+
     def on_message(message):
+        if kind == "cloud":
+            read(message)  # the delay includes the reading
         if paced and kind == "small":
             late.append((time.monotonic_ns() - message.data) / 1000)
         elif paced:
             late.append(1e6 * (time.time() - message.header.stamp.to_sec()))
-        read(message)
+        if kind != "cloud":
+            read(message)
         count[0] += 1
 
     rospy.Subscriber("bench", type(message_of(kind)), on_message, tcp_nodelay=bool(paced))

@@ -128,7 +128,14 @@ def _described(answer: NodeAnswer, place: MasterLocation) -> dict[str, object]:
         "trouble": text,
         "advice": advice,
         "links": [
-            [link.topic, link.direction, link.destination, link.true_transport, bool(link.connected)]
+            [
+                link.topic,
+                link.direction,
+                link.destination,
+                link.true_transport,
+                bool(link.connected),
+                [*link.large_messages] if link.large_messages else None,
+            ]
             for link in answer.links
         ],
     }

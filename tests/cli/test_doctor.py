@@ -69,6 +69,7 @@ def test_a_graph_that_is_well(robot: Any, command: Any) -> None:
     assert checks == [
         "ok      python",
         "ok      variables",
+        "ok      shared memory",
         "ok      own address",
         "ok      master",
         "ok      nodes",

@@ -18,7 +18,13 @@ from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError, RpcUnreachable
 from minirospy.base.installation import install_command
 from minirospy.introspect.doctor import Examination, Finding, Status, reach
-from minirospy.introspect.doctor.machine import check_packages, check_python, check_variables
+from minirospy.introspect.doctor.graph import NodeAnswer, check_large_messages
+from minirospy.introspect.doctor.machine import (
+    check_packages,
+    check_python,
+    check_shared_memory,
+    check_variables,
+)
 from minirospy.introspect.doctor.master import clock_finding
 from minirospy.introspect.doctor.reach import (
     Fault,
@@ -30,7 +36,9 @@ from minirospy.introspect.doctor.reach import (
     own_address_towards,
     trouble_of,
 )
-from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.introspect.graph import NodeAddress
+from minirospy.runtime.rpc.master_proxy import BusConnection, MasterProxy
+from minirospy.runtime.transport import shared_memory
 from minirospy.workspace.packages import built_in_roots
 
 HERE = MasterLocation("localhost", 11311, ["127.0.0.1"])
@@ -218,6 +226,83 @@ def test_a_variable_that_cannot_be_read_ends_the_examination() -> None:
         last = list(examination.findings())[-1]
     assert last.status is Status.PROBLEM
     assert "ROS_MASTER_URI [robot:11311] is not of the form http://host:port" in last.text
+
+
+# --- shared memory
+
+
+@pytest.mark.parametrize("transport", ["unix", "tcp"])
+def test_shared_memory_that_is_turned_off(transport: str) -> None:
+    (finding,) = check_shared_memory(Environment.read({"MINIROSPY_TRANSPORT": transport}))
+    text = f"off, by MINIROSPY_TRANSPORT={transport}: messages use sockets"
+    assert finding == Finding("shared memory", Status.OK, text)
+
+
+@pytest.mark.skipif(not shared_memory.is_possible(), reason="shared memory needs Linux")
+def test_shared_memory_that_works() -> None:
+    (finding,) = check_shared_memory(Environment.read({}))
+    text = "works: large messages between processes of this user use it"
+    assert finding == Finding("shared memory", Status.OK, text)
+
+
+def test_shared_memory_that_the_system_does_not_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "darwin")
+    (finding,) = check_shared_memory(Environment.read({}))
+    assert finding == Finding("shared memory", Status.OK, "none: it needs Linux; large messages use sockets")
+
+
+def test_shared_memory_that_python_does_not_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delattr(os, "memfd_create", raising=False)
+    (finding,) = check_shared_memory(Environment.read({}))
+    assert finding.status is Status.OK
+    assert (
+        finding.text == "none: this Python has no os.memfd_create or os.eventfd; large messages use sockets"
+    )
+
+
+@pytest.mark.skipif(not shared_memory.is_possible(), reason="shared memory needs Linux")
+def test_shared_memory_that_a_container_forbids(monkeypatch: pytest.MonkeyPatch) -> None:
+    def forbidden(*_: object) -> int:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "memfd_create", forbidden)
+    (finding,) = check_shared_memory(Environment.read({}))
+    assert finding == Finding(
+        "shared memory",
+        Status.WARNING,
+        "does not work: Operation not permitted; large messages use sockets, which is slower",
+        "in a container: allow memfd_create, eventfd2 and /proc, and enough memory",
+    )
+
+
+def test_topics_of_large_messages() -> None:
+    def link(subscriber: str, topic: str, words: str, direction: str = "o") -> BusConnection:
+        info = f"UNIXROS connection to [unix on socket 9]{words}"
+        return BusConnection(9, subscriber, direction, "TCPROS", topic, True, info)
+
+    by_ring = "; 118 of 120 large messages by shared memory"
+    by_socket = "; 0 of 120 large messages by shared memory: the subscriber belongs to another user"
+    links = (
+        link("/viewer", "/image", by_ring),
+        link("/recorder", "/image", by_ring),
+        link("/remote", "/image", by_socket),
+        link("/remote_too", "/image", by_socket),
+        link("/viewer", "/words", ""),
+        # Only the publisher knows.
+        link("http://x/", "/cloud", by_ring, "i"),
+        BusConnection(7, "/b", "o", "TCPROS", "/odd", True, None),  # type: ignore[arg-type]
+    )
+    answers = {"/camera": NodeAnswer(NodeAddress("/camera", "http://localhost:1/"), links=links)}
+    assert list(check_large_messages(answers)) == [
+        Finding("large messages", Status.OK, "shared memory: /image of /camera"),
+        Finding(
+            "large messages",
+            Status.OK,
+            "socket: /image of /camera to /remote, /remote_too: the subscriber belongs to another user",
+        ),
+    ]
+    assert list(check_large_messages({})) == []
 
 
 # --- clocks

@@ -88,6 +88,21 @@ def test_description_has_nodes_and_what_is_wrong_with_them() -> None:
     assert (node["publishes"], node["services"]) == ([["/t", "std_msgs/Bool"]], ["/s"])
 
 
+def test_description_says_how_large_messages_are_sent() -> None:
+    info = "UNIXROS connection to [unix on socket 1]; 3 of 4 large messages by shared memory"
+    links = (
+        BusConnection(1, "/b", "o", "TCPROS", "/t", True, info),
+        BusConnection(2, "/c", "o", "TCPROS", "/t"),
+    )
+    node = NodeAnswer(NodeAddress("/a", "http://localhost:1/"), links=links)
+    found = describe(Survey(1, SystemState({}, {}, {}), {"/a": node}, PLACE))
+    (row,) = found["nodes"]  # type: ignore[misc]
+    assert row["links"] == [
+        ["/t", "o", "/b", "UNIXROS", True, [3, 4, ""]],
+        ["/t", "o", "/c", "TCPROS", True, None],
+    ]
+
+
 def test_nodes_are_queried_and_their_traffic_is_counted(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # On a busy machine, a response may arrive late.
     monkeypatch.setattr("minirospy.introspect.doctor.graph.CONNECT_SECONDS", 30.0)

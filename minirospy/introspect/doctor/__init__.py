@@ -12,7 +12,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError, UsageError
 from minirospy.introspect.doctor.findings import Finding, Status, ok, problem, warning
-from minirospy.introspect.doctor.machine import check_packages, check_python, check_variables
+from minirospy.introspect.doctor.machine import (
+    check_packages,
+    check_python,
+    check_shared_memory,
+    check_variables,
+)
 from minirospy.introspect.doctor.reach import CONNECT_SECONDS, MasterLocation, addresses_of
 
 __all__ = ["Examination", "Finding", "Status", "ok", "problem", "warning"]
@@ -56,6 +61,7 @@ class Examination:
         known = addresses_of((host, environment.host, self._environ.get("ROS_HOSTNAME") or environment.host))
         place = MasterLocation(host, port, known[host])
         yield from check_variables(self._environ, environment, place, known)
+        yield from check_shared_memory(environment)
         if not self._offline:
             yield from self._network(environment, place, known[environment.host])
         yield from check_packages(environment)
@@ -114,6 +120,7 @@ class Examination:
                 yield from check_listens(host, listeners(state, nodes), environment.master_uri)
             yield from graph_checks.check_topics(state, nodes)
             yield from graph_checks.check_connections(graph, state, nodes)
+            yield from graph_checks.check_large_messages(nodes)
             yield from graph_checks.check_services(graph, state, nodes)
             yield from check_frames(environment, state)
         except (MasterUnreachableError, RpcError) as error:

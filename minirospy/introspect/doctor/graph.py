@@ -35,6 +35,7 @@ __all__ = [
     "NodeAnswer",
     "ask_nodes",
     "check_connections",
+    "check_large_messages",
     "check_nodes",
     "check_services",
     "check_topics",
@@ -231,6 +232,26 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
     if not missing:
         yield ok("connections", f"{len(pairs)} between publishers and subscribers, all there")
+
+
+def check_large_messages(answers: Answers) -> Iterator[Finding]:
+    """Yield findings on how topics of large messages are sent: through shared memory, or why not. None if there are none."""
+    shared: set[str] = set()
+    others: dict[tuple[str, str], list[str]] = {}
+    for answer in answers.values():
+        for link in answer.links:
+            found = link.large_messages
+            if found is None:
+                continue
+            if found.why:
+                receivers = others.setdefault((f"{link.topic} of {answer.node.name}", found.why), [])
+                receivers.append(link.destination)
+            else:
+                shared.add(f"{link.topic} of {answer.node.name}")
+    if shared:
+        yield ok("large messages", f"shared memory: {_names(sorted(shared))}")
+    for (topic, why), receivers in sorted(others.items()):
+        yield ok("large messages", f"socket: {topic} to {_names(sorted(receivers))}: {why}")
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:

@@ -18,10 +18,11 @@ from minirospy.base.errors import ManifestError, NotFoundError, NoThreadsAtEndEr
 from minirospy.base.installation import install_command
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import MasterLocation, is_loopback, is_own_address
+from minirospy.runtime.transport import shared_memory
 from minirospy.workspace.hidden_modules import hiding_files
 from minirospy.workspace.stale import warning_of_stale_definitions, workspace_of
 
-__all__ = ["check_packages", "check_python", "check_variables"]
+__all__ = ["check_packages", "check_python", "check_shared_memory", "check_variables"]
 
 _OURS = Path(minirospy.__file__).parent
 _LIBRARIES = {"yaml": "PyYAML"} | {
@@ -199,6 +200,24 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
                 + (f", or `sudo chown -R $USER {there}`" if there == folder and there.is_dir() else ""),
             )
             break
+
+
+def check_shared_memory(environment: Environment) -> Iterator[Finding]:
+    """Yield one finding: whether messages of 1 to 32 MB between this user's processes can go through shared memory."""
+    if not environment.shares_memory:
+        yield ok(
+            "shared memory", f"off, by MINIROSPY_TRANSPORT={environment.transport}: messages use sockets"
+        )
+    elif not shared_memory.is_possible():
+        yield ok("shared memory", f"none: {shared_memory.try_out()}; large messages use sockets")
+    elif trouble := shared_memory.try_out():
+        yield warning(
+            "shared memory",
+            f"does not work: {trouble}; large messages use sockets, which is slower",
+            "in a container: allow memfd_create, eventfd2 and /proc, and enough memory",
+        )
+    else:
+        yield ok("shared memory", "works: large messages between processes of this user use it")
 
 
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:

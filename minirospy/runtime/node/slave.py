@@ -25,6 +25,7 @@ from minirospy.core.graph.calls import (
     some,
     uris,
 )
+from minirospy.core.wire.ring import LargeMessages
 from minirospy.runtime.transport.local import PROTOCOL
 
 if TYPE_CHECKING:
@@ -128,12 +129,13 @@ class SlaveApi:
     def get_bus_info(self, caller_id: str) -> Answer:
         """Return one row per connection: [id, peer, direction, transport, topic, connected, text].
 
-        The transport is TCPROS also for a Unix socket, as programs expect: both carry the same frames. The text says which it is.
+        The transport is TCPROS also for a Unix socket, as programs expect: both carry the same frames. The text says which
+        it is, and how the large messages are sent.
         """
         rows: list[list[object]] = []
         for publication in list(self._node.publications.values()):
             for out in publication.links:
-                what = connection_text(out)
+                what = connection_text(out) + self._large_messages(out)
                 rows.append([out.number, out.peer, "o", "TCPROS", publication.topic, True, what])
         for subscription in list(self._node.subscriptions.values()):
             for link in subscription.links:
@@ -209,6 +211,16 @@ class SlaveApi:
             return [ERROR, f"this is {self._node.name}", 0]
         self._node.request_shutdown(f"external shutdown request from [{caller_id}]: [{reason}]")
         return [SUCCESS, "shutdown", 0]
+
+    def _large_messages(self, link: OutLink) -> str:
+        """Return the end of a connection's text: how its large messages are sent, or "" if there were none."""
+        if not link.large:
+            return ""
+        chosen = self._node.environment.transport
+        why = (
+            f"MINIROSPY_TRANSPORT={chosen} for the publisher" if chosen in ("tcp", "unix") else link.obstacle
+        )
+        return LargeMessages(link.shared, link.large, why).text
 
 
 def _refusal_before_tcpros(protocols: object) -> Answer | None:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from minirospy.base.environment import split_uri
 from minirospy.base.errors import SUSPENDED, MasterUnreachableError, RpcRefused, RpcTimeout, RpcUnreachable
+from minirospy.core.wire.ring import LargeMessages, parse_large_messages
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.transport.limits import is_file_limit
 
@@ -43,6 +44,11 @@ class BusConnection(NamedTuple):
     def true_transport(self) -> str:
         """Return the transport; UNIXROS for a Unix socket, which nodes report as TCPROS (docs/transports.md)."""
         return "UNIXROS" if str(self.info).startswith("UNIXROS ") else self.transport
+
+    @property
+    def large_messages(self) -> LargeMessages | None:
+        """Return how the publisher sends large messages; None if it has sent none, or is not a minirospy node."""
+        return parse_large_messages(str(self.info)) if "o" in str(self.direction) else None
 
 
 def unwrap(method: str, answer: object) -> Any:

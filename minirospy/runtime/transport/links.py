@@ -15,7 +15,9 @@ from collections.abc import Callable
 from itertools import islice
 from typing import TYPE_CHECKING
 
+from minirospy.core.wire import ring as ring_limits
 from minirospy.core.wire.framing import LargeFrame
+from minirospy.runtime.transport import shared_memory
 from minirospy.runtime.transport.sockets import FAMILIES, is_writable
 
 if TYPE_CHECKING:
@@ -62,6 +64,8 @@ class OutLink:
         self.sent_bytes = len(header)
         self.sent = 0
         self.dropped = 0
+        self.large = 0  # number of messages that are long enough for shared memory
+        self._last_large = 0  # size in bytes of the last of them
         self.ring = ring  # this end of the shared memory, or None if the subscriber cannot read any
 
         self._is_same_host = sock.family not in FAMILIES
@@ -103,6 +107,23 @@ class OutLink:
             return sum(
                 len(frame) if isinstance(frame, bytes) else sum(map(len, frame)) for frame in self._outbox
             )
+
+    @property
+    def shared(self) -> int:
+        """Return the number of messages that went through shared memory."""
+        return self.ring.announced if self.ring else 0
+
+    @property
+    def obstacle(self) -> str:
+        """Return why large messages do not go through shared memory, or "" if they do, or there were none."""
+        if not self.large:
+            return ""
+        if self.ring:
+            return self.ring.obstacle(self.large, self._last_large)
+        try:
+            return shared_memory.obstacle(self._sock, is_same_host=self._is_same_host)
+        except OSError:
+            return "the connection has ended"
 
     @property
     def is_sending(self) -> bool:
@@ -204,6 +225,9 @@ class OutLink:
     def _send_large(self, frame: LargeFrame, sharing: Sharing | None) -> None:
         buffers: list[bytes | memoryview] = [*frame.buffers(split=self._split)]
         self.sent_bytes += 4 + frame.size
+        if frame.size >= ring_limits.MIN_MESSAGE:
+            self.large += 1
+            self._last_large = frame.size
         if self._outbox and self._has_to_wait(buffers):
             return
         if sharing and self.ring:

@@ -19,18 +19,24 @@ import sys
 import threading
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 from minirospy.base.errors import WireError
 from minirospy.core.wire import ring
-from minirospy.core.wire.framing import SplitFrame, may_split
+from minirospy.core.wire.framing import CHUNK, LargeFrame, SplitFrame, may_split
 from minirospy.core.wire.ring import Announcement, Layout, Places, Step
 from minirospy.runtime.transport.sockets import peer
 
-if TYPE_CHECKING:
-    from minirospy.core.wire.framing import LargeFrame
-
-__all__ = ["FIELD", "RingReceiver", "RingSender", "SharedRing", "Sharing", "is_possible", "may_share"]
+__all__ = [
+    "FIELD",
+    "RingReceiver",
+    "RingSender",
+    "SharedRing",
+    "Sharing",
+    "is_possible",
+    "may_share",
+    "obstacle",
+    "try_out",
+]
 
 FIELD = "shared_memory"
 """The connection header's field by which a subscriber says that it can read from a ring."""
@@ -56,6 +62,68 @@ def may_share(sock: socket.socket) -> bool:
     Another user could shrink a ring that this process reads, or read the memory of a topic longer than it is connected.
     """
     return is_possible() and sock.family == socket.AF_UNIX and peer(sock).user == os.geteuid()
+
+
+def obstacle(sock: socket.socket, *, is_same_host: bool) -> str:
+    """Return why a publisher's connection that has no :class:`RingSender` has none."""
+    if sock.family != getattr(socket, "AF_UNIX", None):
+        if not is_same_host:
+            return "the subscriber is on another machine or in another container"
+        return "the subscriber is not a minirospy node, or cannot use Unix sockets (MINIROSPY_TRANSPORT=tcp)"
+    if not is_possible():
+        return _missing()
+    if peer(sock).user != os.geteuid():
+        return "the subscriber belongs to another user"
+    return "the subscriber does not use it (MINIROSPY_TRANSPORT=unix, a bridge or a dashboard)"
+
+
+def try_out() -> str:
+    """Try shared memory in this process: pass a sealed file through a socket, map it, and read a message from it.
+
+    Return "" if that works, else the reason. It costs less than a millisecond.
+    """
+    if not is_possible():
+        return _missing()
+    try:
+        return _pass_a_message()
+    except (OSError, ValueError) as error:
+        # A sandbox may forbid the calls, and a container may lack memory.
+        return _text_of(error)
+
+
+def _missing() -> str:
+    """Return the reason why :func:`is_possible` is false."""
+    if sys.platform != "linux":
+        return "it needs Linux"
+    return "this Python has no os.memfd_create or os.eventfd"
+
+
+def _pass_a_message() -> str:
+    body = LargeFrame((bytes(range(256)), bytes(CHUNK)), 256 + CHUNK)
+    memory = _Memory(ring.layout_for(body.size))
+    counter, receiver = -1, RingReceiver()
+    one, other = socket.socketpair()
+    with one, other:
+        try:
+            counter = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+            place = memory.take(body.size)
+            assert place is not None
+            memory.fill(place, body)
+            socket.send_fds(one, [ring.offer(memory.layout.size)], [memory.read_only, counter])
+            word = receiver.receive(other, len(ring.offer(0)))
+            receiver.take_offer(other, word[-ring.OFFER_BYTES :])
+            if one.recv(1) != ring.MAPPED:
+                return "a file that another process passes cannot be mapped"
+            word = ring.announcement(place * memory.layout.place_size, body.size, 0)
+            is_same = receiver.read(word[-ring.ANNOUNCEMENT_BYTES :]) == b"".join(body.pieces)
+            if not is_same or os.eventfd_read(counter) != 1:
+                return "a message did not arrive as it was sent"
+        finally:
+            receiver.close()
+            memory.close()
+            if counter >= 0:
+                os.close(counter)
+    return ""
 
 
 class _Memory:
@@ -129,6 +197,7 @@ class SharedRing:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.lock = threading.Lock()
         self.memory: _Memory | None = None
+        self.trouble = ""  # why there is no memory, set by turn_off()
         self._loop = loop
         self._senders: set[RingSender] = set()
         self._retired: list[
@@ -138,6 +207,8 @@ class SharedRing:
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
         self._is_watched = False  # whether the timer runs, or is about to
+        # by pidfd of a subscriber that closed its connection while it held places: the memory, and the connection
+        self._closed: dict[int, tuple[_Memory, RingSender]] = {}
 
     @property
     def memory_bytes(self) -> int:
@@ -165,6 +236,40 @@ class SharedRing:
         if not self._senders:
             self.retire()
         self.give_back_retired()
+
+    def release_at_exit(self, memory: _Memory, sender: RingSender, process: int) -> None:
+        """Release a closed connection's places when its subscriber exits, because until then it may read them.
+
+        Call this on the loop, with the lock held.
+        """
+        if memory not in self._retired:
+            return  # no other connection uses it, so it is freed when its subscriber unmaps it
+        try:
+            file = os.pidfd_open(process)
+        except ProcessLookupError:
+            # It has exited, and its parent has been notified.
+            self._release(memory, sender)
+            return
+        except (OSError, AttributeError):
+            # The memory stays until the other subscribers have a new ring, that is until the next large messages.
+            return
+        self._closed[file] = memory, sender
+        self._loop.add_reader(file, self._exited, file)
+
+    def _exited(self, file: int) -> None:
+        memory, sender = self._closed[file]
+        self._stop_waiting(file)
+        with self.lock:
+            self._release(memory, sender)
+
+    def _release(self, memory: _Memory, sender: RingSender) -> None:
+        memory.places.release(sender, memory.places.held_by(sender))
+        self.collect()
+
+    def _stop_waiting(self, file: int) -> None:
+        del self._closed[file]
+        self._loop.remove_reader(file)
+        os.close(file)
 
     def collect(self) -> None:
         """Free the places that subscribers have released. Call this with the lock held."""
@@ -201,6 +306,7 @@ class SharedRing:
     def turn_off(self, error: Exception) -> None:
         """Use sockets only from now on. Call this with the lock held."""
         _log.debug("no shared memory for a topic's large messages: %s", error)
+        self.trouble = f"the publisher has no memory for it: {_text_of(error)}"
         self._is_off = True
         self.retire()
 
@@ -218,6 +324,8 @@ class SharedRing:
             self._is_off = True
             self.retire()
             self._retired = []
+        for file in list(self._closed):
+            self._stop_waiting(file)
         if self._timer:
             self._timer.cancel()
 
@@ -244,6 +352,9 @@ class SharedRing:
                     self.memory.give_back()
                 except OSError as error:
                     self.turn_off(error)
+            for file, (memory, _) in list(self._closed.items()):
+                if memory not in self._retired:
+                    self._stop_waiting(file)
             self._is_watched = bool(self._retired or (self.memory and self.memory.backed_bytes))
             if self._is_watched:
                 self._watch()
@@ -303,11 +414,26 @@ class RingSender:
     def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
         self.step = Step.NEW
         self.announced = 0  # number of messages that went through the ring
+        self._trouble = ""  # why the ring is not used, set with Step.OFF
         self._ring = shared
         self._sock = sock
+        self._process = peer(sock).process
         self.memory: _Memory | None = None  # the memory that was offered last
         self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
         self._is_releasing = True  # whether the last wait for a release was successful
+
+    def obstacle(self, large: int, last_size: int) -> str:
+        """Return why messages go through the socket, or "" if most go through the ring.
+
+        ``large``: the number of messages that are long enough for a ring; ``last_size``: the size of the last one.
+        """
+        if self.step is Step.OFF:
+            return self._trouble
+        if last_size > ring.MAX_MESSAGE:
+            return f"messages over {ring.MAX_MESSAGE // 2**20} MB are too large for it"
+        if not self.announced:
+            return "the first messages use the socket"
+        return "the subscriber reads more slowly than it is sent to" if 2 * self.announced < large else ""
 
     def announce(self, sharing: Sharing, *, may_wait: bool) -> bool:
         """Announce a message in the ring. Return False if it has to go through the socket.
@@ -338,6 +464,9 @@ class RingSender:
             after = ring.ANSWERS.get((self.step, bytes((byte,))))
             # A publishing thread may take another step meanwhile, but none from a step that waits for an answer.
             if after:
+                self._trouble = (
+                    "the subscriber cannot map the publisher's memory" if after is Step.OFF else ""
+                )
                 self.step = after
 
     def collect(self) -> None:
@@ -351,16 +480,22 @@ class RingSender:
             return
         self._is_releasing = True
         if not memory.places.release(self, count):
-            self.step = Step.OFF
+            self._turn_off("the subscriber has released more than it held")
 
     def close(self) -> None:
-        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced."""
+        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced.
+
+        Call this on the loop.
+        """
         with self._ring.lock:
             self.collect()
             memory, self.memory = self.memory, None
-            if memory and memory is self._ring.memory and memory.places.held_by(self):
+            holds = memory is not None and memory.places.held_by(self)
+            if holds and memory is self._ring.memory:
                 self._ring.retire()
             self._ring.remove(self)
+            if holds and memory:
+                self._ring.release_at_exit(memory, self, self._process)
             self.step = Step.OFF
             self._close_counter()
 
@@ -417,7 +552,7 @@ class RingSender:
         with self._ring.lock:
             memory = self._ring.fitting(size)
             if memory is None:
-                self.step = Step.OFF
+                self._turn_off(self._ring.trouble)
                 return
             self._forget_memory()
             try:
@@ -425,13 +560,18 @@ class RingSender:
             except OSError as error:
                 # This process has reached its limit of open files.
                 _log.debug("no shared memory for a connection: %s", error)
-                self.step = Step.OFF
+                self._turn_off(f"the publisher cannot open another file: {_text_of(error)}")
                 return
             self.memory = memory
             self._is_releasing = True
             self.step = Step.OFFERED
             files = array.array("i", [memory.read_only, self._counter])
             self._send(ring.offer(memory.layout.size), [(socket.SOL_SOCKET, socket.SCM_RIGHTS, files)])
+
+    def _turn_off(self, trouble: str) -> None:
+        """Use the socket only from now on."""
+        self._trouble = trouble
+        self.step = Step.OFF
 
     def _forget_memory(self) -> None:
         """Release all places of the previous ring: the subscriber had read them before it answered :data:`ring.READY`."""
@@ -533,6 +673,10 @@ class RingReceiver:
         if self._counter >= 0:
             os.close(self._counter)
             self._counter = -1
+
+
+def _text_of(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _answer(sock: socket.socket, byte: bytes) -> None:

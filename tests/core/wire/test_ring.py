@@ -45,6 +45,39 @@ def test_an_announcement_outside_the_ring_is_refused(offset: int, size: int, tai
         ring.parse_announcement(ring.announcement(offset, size, tail)[4:], 131_072)
 
 
+@pytest.mark.parametrize(
+    ("large", "text"),
+    [
+        (ring.LargeMessages(118, 120), "; 118 of 120 large messages by shared memory"),
+        (
+            ring.LargeMessages(0, 3, "the subscriber belongs to another user"),
+            "; 0 of 3 large messages by shared memory: the subscriber belongs to another user",
+        ),
+    ],
+)
+def test_large_messages_are_read_back_from_a_connections_text(large: ring.LargeMessages, text: str) -> None:
+    assert large.text == text
+    assert ring.parse_large_messages(f"UNIXROS connection to [unix on socket 9]{text}") == large
+
+
+@pytest.mark.parametrize(
+    "info",
+    [
+        "",
+        "UNIXROS connection to [unix on socket 9]",
+        "; 1 of x large messages by shared memory",
+        "; 1 of 2 large messages by shared memory: ",
+        "; 1 of 2 large messages by shared memory: \x1b[31mred",
+        "; 1 of 2 large messages by shared memory: a\nb",
+        "; 1 of 2 large messages by shared memory\n",
+        f"; 1 of 2 large messages by shared memory: {'x' * 201}",
+        f"; {'1' * 19} of 2 large messages by shared memory",
+    ],
+)
+def test_other_texts_of_connections_say_nothing_about_large_messages(info: str) -> None:
+    assert ring.parse_large_messages(info) is None
+
+
 @pytest.mark.parametrize("size", [0, ring.MAX_RING + 1, 0xFFFFFFFF])
 def test_a_ring_of_any_size_is_not_mapped(size: int) -> None:
     with pytest.raises(WireError, match="over the limit"):

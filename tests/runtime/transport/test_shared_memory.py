@@ -149,16 +149,20 @@ class Mouth:
     def connect(self, *, shared: bool = True, name: str = "/ear") -> socket.socket:
         """Return the subscriber's end of a new connection, after the headers."""
         one, other = socket.socketpair()
-        one.setblocking(False)
-        fields = subscriber_header("/t", IMAGE, name, split_frames=True, shared_memory=shared)
-
-        async def accept() -> str | None:
-            return self.publication.accept(one, fields, "/mouth", "", shares_memory=True)
-
-        assert self._loop.run(accept()) is None
+        self.accept(one, shared=shared, name=name)
         (length,) = struct.unpack("<I", other.recv(4, socket.MSG_WAITALL))
         other.recv(length, socket.MSG_WAITALL)
         return other
+
+    def accept(self, sock: socket.socket, *, shared: bool = True, name: str = "/ear") -> None:
+        """Connect a subscriber whose other end of ``sock`` receives the header."""
+        sock.setblocking(False)
+        fields = subscriber_header("/t", IMAGE, name, split_frames=True, shared_memory=shared)
+
+        async def accept() -> str | None:
+            return self.publication.accept(sock, fields, "/mouth", "", shares_memory=True)
+
+        assert self._loop.run(accept()) is None
 
     def publish(self, *frames: bytes | LargeFrame) -> None:
         for frame in frames:
@@ -397,6 +401,90 @@ def test_a_replaced_ring_gives_its_memory_back(loop: LoopThread, monkeypatch: py
     mouth.close()
 
 
+STUCK = 99  # the number of the image whose callback never returns
+STUCK_SUBSCRIBER = f"""
+import socket, struct, sys, threading
+from types import SimpleNamespace
+from minirospy.runtime.transport import readers
+
+sock = socket.socket(socket.AF_UNIX)
+sock.connect(sys.argv[1])
+sock.recv(*struct.unpack("<I", sock.recv(4, socket.MSG_WAITALL)), socket.MSG_WAITALL)
+
+def deliver(frame):
+    if struct.unpack_from("<Q", frame)[0] == {STUCK}:
+        print("stuck", flush=True)
+        threading.Event().wait()
+
+readers.read_frames(sock, deliver, SimpleNamespace(newest=0), readers.ReaderSet(), shares_memory=True)
+"""
+
+
+@pytest.fixture
+def stuck_subscriber(mouth: Mouth, tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """Connect a subscriber in another process. It never returns from the callback of the image number STUCK."""
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(tmp_path / "socket"))
+        server.listen()
+        server.settimeout(60)
+        command = [sys.executable, "-c", STUCK_SUBSCRIBER, str(tmp_path / "socket")]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            try:
+                mouth.accept(server.accept()[0], name="/stuck")
+                yield process
+            finally:
+                process.kill()
+
+
+@pytest.mark.parametrize(
+    ("fault", "is_given_back"), [(None, True), (ProcessLookupError, True), (OSError, False)]
+)
+def test_a_killed_subscriber_gives_its_unread_messages_back(
+    mouth: Mouth,
+    stuck_subscriber: subprocess.Popen[str],
+    fault: type[OSError] | None,
+    is_given_back: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
+    size = 200_000
+    ear = Ear(mouth.connect(name="/fast"))
+    count = mouth.warm_up(ear, size=size)
+    frames = [image(STUCK, size), image(1, size), image(2, size)]
+    mouth.publish(*frames)
+    ear.wait(count + 3)
+    assert stuck_subscriber.stdout
+    assert stuck_subscriber.stdout.readline() == "stuck\n"
+    assert mouth.steps() == [Step.IN_USE, Step.IN_USE]
+
+    files = len(os.listdir("/proc/self/fd"))
+    if fault:
+
+        def pidfd_open(_process: int) -> int:
+            raise fault
+
+        monkeypatch.setattr(os, "pidfd_open", pidfd_open)
+    stuck_subscriber.kill()
+    wait_until(lambda: len(mouth.links) == 1, SECONDS)
+    if is_given_back:
+        # No large message follows, so the other subscriber still maps the ring.
+        wait_until(lambda: not mouth.publication.shared_bytes, SECONDS)
+        wait_until(lambda: not resident_bytes(), SECONDS)
+    else:
+        wait_until(lambda: mouth.publication.shared_bytes == 2 * size, SECONDS)
+    # The connection's socket and its counter, and the two files of the ring are closed, and a pidfd, too.
+    wait_until(lambda: len(os.listdir("/proc/self/fd")) <= files - 4, SECONDS)
+
+    for number in range(3, 13):
+        frames.append(image(number, size))
+        mouth.publish(frames[-1])
+        ear.wait(count + len(frames))
+        wait_until(lambda: mouth.steps()[0] not in (Step.ASKED, Step.OFFERED), SECONDS)
+    assert list(map(bytes, ear.frames[count:])) == list(map(whole, frames))
+    assert mouth.steps() == [Step.IN_USE]
+    ear.close()
+
+
 def test_memory_ends_with_the_last_subscriber(mouth: Mouth) -> None:
     ear = Ear(mouth.connect())
     mouth.warm_up(ear)
@@ -516,6 +604,135 @@ def test_a_subscriber_that_does_not_know_rings_is_sent_plain_frames(mouth: Mouth
     assert take(sock, len(expected)) == expected
     thread.join(SECONDS)
     sock.close()
+
+
+# --- what a connection says about it
+
+
+def test_a_connection_says_how_large_messages_are_sent(mouth: Mouth, monkeypatch: pytest.MonkeyPatch) -> None:
+    ear = Ear(mouth.connect())
+    (link,) = mouth.links
+    mouth.publish(serialize_frame(b"small"))
+    assert (link.large, link.shared, link.obstacle) == (0, 0, "")
+    mouth.publish(image(0, CHUNK))
+    assert (link.large, link.shared, link.obstacle) == (1, 0, "the first messages use the socket")
+    ear.wait(2)
+    count = 1 + mouth.warm_up(ear)
+    for number in range(10):
+        mouth.publish(image(number, CHUNK))
+        ear.wait(1 + count + number + 1)
+    assert (link.large, link.obstacle) == (count + 10, "")
+    assert link.shared == mouth.sender(0).announced >= 10
+
+    monkeypatch.setattr(ring, "MAX_MESSAGE", 2**21)
+    mouth.publish(image(1, 2**21 + 1))
+    assert (link.large, link.obstacle) == (count + 11, "messages over 2 MB are too large for it")
+    ear.close()
+
+
+def test_a_connection_says_that_its_subscriber_is_slow(mouth: Mouth) -> None:
+    ear = Ear(mouth.connect())
+    count = mouth.warm_up(ear, size=3_000_000)
+    ear.may_read.clear()
+    mouth.publish(*(image(number, 3_000_000) for number in range(2 * count + 20)))
+    assert mouth.links[0].obstacle == "the subscriber reads more slowly than it is sent to"
+    ear.close()
+
+
+def test_a_connection_says_why_its_subscriber_does_not_map(
+    mouth: Mouth, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(RingReceiver, "take_offer", refuse)
+    ear = Ear(mouth.connect())
+    mouth.warm_up(ear)
+    assert mouth.links[0].obstacle == "the subscriber cannot map the publisher's memory"
+    ear.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "broken", "why"),
+    [
+        ("memfd_create", no_memfd, "the publisher has no memory for it: no memfd here"),
+        ("posix_fallocate", no_memory, "the publisher has no memory for it: no space left"),
+        ("eventfd", no_memfd, "the publisher cannot open another file: no memfd here"),
+    ],
+)
+def test_a_connection_says_why_its_publisher_has_no_memory(
+    mouth: Mouth, name: str, broken: Any, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, name, broken)
+    ear = Ear(mouth.connect())
+    for number in range(10):
+        mouth.publish(image(number, CHUNK))
+        ear.wait(number + 1)
+        wait_until(lambda: Step.ASKED not in mouth.steps() and Step.OFFERED not in mouth.steps(), SECONDS)
+    assert mouth.links[0].obstacle == why
+    ear.close()
+
+
+def test_a_connection_without_a_ring_says_why(mouth: Mouth, monkeypatch: pytest.MonkeyPatch) -> None:
+    ear = Ear(mouth.connect(shared=False), shares_memory=False)
+    (link,) = mouth.links
+    mouth.publish(image(0, CHUNK))
+    ear.wait(1)
+    assert link.obstacle == (
+        "the subscriber does not use it (MINIROSPY_TRANSPORT=unix, a bridge or a dashboard)"
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "geteuid", lambda: 12345)
+        assert link.obstacle == "the subscriber belongs to another user"
+    with monkeypatch.context() as patch:
+        patch.delattr(os, "eventfd")
+        assert link.obstacle == "this Python has no os.memfd_create or os.eventfd"
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "platform", "darwin")
+        assert link.obstacle == "it needs Linux"
+    ear.close()
+
+
+@pytest.mark.parametrize(
+    ("is_same_host", "why"),
+    [
+        (False, "the subscriber is on another machine or in another container"),
+        (
+            True,
+            "the subscriber is not a minirospy node, or cannot use Unix sockets (MINIROSPY_TRANSPORT=tcp)",
+        ),
+    ],
+)
+def test_a_tcp_connection_says_why_it_has_no_ring(is_same_host: bool, why: str) -> None:
+    with socket.socket() as sock:
+        assert shared_memory.obstacle(sock, is_same_host=is_same_host) == why
+
+
+def test_shared_memory_is_tried_out() -> None:
+    files = len(os.listdir("/proc/self/fd"))
+    assert shared_memory.try_out() == ""
+    assert len(os.listdir("/proc/self/fd")) == files
+
+
+def forbidden(*_: Any) -> Any:
+    raise PermissionError(1, "Operation not permitted")
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "broken", "why"),
+    [
+        (os, "memfd_create", forbidden, "Operation not permitted"),
+        (os, "eventfd", forbidden, "Operation not permitted"),
+        (os, "posix_fallocate", no_memory, "no space left"),
+        (mmap, "mmap", no_map, "no mapping here"),
+        (RingReceiver, "take_offer", refuse, "a file that another process passes cannot be mapped"),
+        (RingReceiver, "read", lambda *_: b"other bytes", "a message did not arrive as it was sent"),
+    ],
+)
+def test_a_machine_without_shared_memory_is_found_out(
+    owner: Any, name: str, broken: Any, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = len(os.listdir("/proc/self/fd"))
+    monkeypatch.setattr(owner, name, broken)
+    assert shared_memory.try_out() == why
+    assert len(os.listdir("/proc/self/fd")) == files
 
 
 # --- peers that lie

@@ -843,6 +843,8 @@ export const GERMAN = {
   "Connections": "Verbindungen",
   "{topic} by {transport}": "{topic} über {transport}",
   ", not connected": ", nicht verbunden",
+  ", {shared} of {all} large messages by shared memory":
+    ", {shared} von {all} großen Nachrichten über gemeinsamen Speicher",
   "answered in {time} ms": "hat nach {time} ms geantwortet",
   "Shut down {name}? What it controls stops or goes on without it.":
     "{name} beenden? Was er steuert, bleibt stehen oder läuft ohne ihn weiter.",

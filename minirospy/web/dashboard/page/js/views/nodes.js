@@ -255,7 +255,7 @@ export class Nodes {
       ),
       part(
         "Connections",
-        node.links.map(([topic, direction, other, transport, isConnected]) =>
+        node.links.map(([topic, direction, other, transport, isConnected, large]) =>
           h(
             "li",
             { class: isConnected ? "" : "error" },
@@ -263,7 +263,9 @@ export class Nodes {
             h(
               "span",
               { class: "muted" },
-              t("{topic} by {transport}", { topic, transport }) + (isConnected ? "" : t(", not connected")),
+              t("{topic} by {transport}", { topic, transport }) +
+                (isConnected ? "" : t(", not connected")) +
+                largeMessages(large),
             ),
           ),
         ),
@@ -355,6 +357,13 @@ export class Nodes {
 
 function part(title, items) {
   return items.length ? [h("h3", {}, `${t(title)} (${items.length})`), h("ul", {}, items)] : [];
+}
+
+/** How the large messages of a connection are sent: [by shared memory, all, why the others are not], or null. */
+function largeMessages(large) {
+  if (!large) return "";
+  const [shared, all, why] = large;
+  return t(", {shared} of {all} large messages by shared memory", { shared, all }) + (why ? ` (${why})` : "");
 }
 
 function sentence(text) {
