@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 _MASTER_SECONDS = 1.0  # to connect to a master before the page is served without one
-_OWN_MASTER_SECONDS = 30.0  # the same on this machine, which refuses immediately and is slow only if it is busy
+_OWN_MASTER_SECONDS = 30.0  # the same on loopback, which is slow only if the machine is busy
 
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
