@@ -11,6 +11,7 @@ LIMITS = (
     "aio.topics.JOIN_SECONDS",
     "fleet.definitions.ANSWER_SECONDS",
     "web.foxglove.channels.TYPE_SECONDS",
+    "web.rosbridge.client_actions.SERVER_SECONDS",
     "introspect.node_queries.QUERY_SECONDS",
     "ros2.action_to_ros1.SERVER_SECONDS",
     "ros2.action_to_ros2.ACCEPT_SECONDS",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 _MASTER_SECONDS = 1.0  # to connect to a master before the page is served without one
+_OWN_MASTER_SECONDS = 30.0  # the same on loopback, which is slow only if the machine is busy
 
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
@@ -447,15 +448,20 @@ def _serve(
 
 
 async def _is_reachable(uri: str) -> bool:
-    """Return whether a program listens at a URI's host and port. Wait at most _MASTER_SECONDS."""
+    """Return whether a program listens at a URI's host and port.
+
+    Wait at most _MASTER_SECONDS, or _OWN_MASTER_SECONDS for an address of loopback.
+    """
     import asyncio
     import contextlib
 
     from minirospy.base.environment import split_uri
+    from minirospy.web.access import is_loopback
 
     host, port, _ = split_uri(uri)
+    seconds = _OWN_MASTER_SECONDS if is_loopback(host) else _MASTER_SECONDS
     with contextlib.suppress(OSError, UnicodeError, asyncio.TimeoutError):
-        _, writer = await asyncio.wait_for(asyncio.open_connection(host, port), _MASTER_SECONDS)
+        _, writer = await asyncio.wait_for(asyncio.open_connection(host, port), seconds)
         writer.close()
         return True
     return False

@@ -515,7 +515,7 @@ def test_first_messages_all_arrive(master: str, monkeypatch: pytest.MonkeyPatch)
         async with Node("a") as talker, Node("b") as listener:
             subscription = await listener.subscribe("t", String)
             await asyncio.gather(*(talker.publish("t", String(text)) for text in "abc"))
-            assert [(await subscription.next(10)).data for _ in "abc"] == ["a", "b", "c"]
+            assert [(await subscription.next(SECONDS)).data for _ in "abc"] == ["a", "b", "c"]
 
     run(main)
 

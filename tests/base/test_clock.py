@@ -40,7 +40,7 @@ class Sleeping(threading.Thread):
 
         def wait(sleeper: SignalSafeEvent) -> None:
             self.waits.release()
-            sleeper.wait(5)
+            sleeper.wait(100)
             sleeper.clear()
 
         clock._wait = wait  # type: ignore[method-assign]

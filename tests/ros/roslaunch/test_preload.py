@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import os
@@ -17,7 +18,7 @@ from typing import NamedTuple
 import psutil
 import pytest
 
-from minirospy.ros.roslaunch.launcher import preloaded
+from minirospy.ros.roslaunch.launcher import preload
 from minirospy.ros.roslaunch.launcher.preload import MIN_NODES, ForkedProcess, Preload, Start
 from tests.conftest import free_port
 from tests.ros.roslaunch.conftest import Running
@@ -26,6 +27,12 @@ from tests.ros.roslaunch.conftest import Start as RoslaunchStart
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks nodes")
 
 PROBE = Path(__file__).with_name("probe.py")
+
+
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a preloaded process import its modules for longer than a machine may stall."""
+    monkeypatch.setattr(preload, "REPLY_SECONDS", 100.0)
 
 
 class Result(NamedTuple):
@@ -134,7 +141,7 @@ def runner(tmp_path: Path) -> Iterator[Runner]:
     made = Runner(tmp_path)
     yield made
     made.preload.close()
-    assert not [each for each in psutil.Process().children() if "preloaded.py" in " ".join(each.cmdline())]
+    assert not preloaded_processes(psutil.Process())
 
 
 @pytest.mark.parametrize("namespace", [{}, {"ROS_NAMESPACE": "a/b"}], ids=["root", "namespace"])
@@ -179,7 +186,9 @@ PROGRAMS: dict[str, str | bytes] = {
     "excepthook": "import sys\nsys.excepthook = lambda t, v, b: print(t, v, b.tb_lineno, b.tb_next)\n1/0",
     "atexit": "import atexit, threading, time\n"
     "atexit.register(lambda: print('atexit', '__file__' in globals()))\n"
-    "threading.Thread(target=lambda: (time.sleep(0.1), print('thread'))).start()\nprint('main')",
+    "has_printed = threading.Event()\n"
+    "threading.Thread(target=lambda: (has_printed.wait(), time.sleep(0.1), print('thread'))).start()\n"
+    "print('main')\nhas_printed.set()",
     "unflushed": "import sys; sys.stdout.write('no newline'); sys.stderr.write('x')",
     "names": "print(__name__, __file__, __package__, __spec__, __doc__, __builtins__.__name__)",
     "doc": "'''A docstring.'''\nx: int = 1\nprint(__doc__, sorted(globals()), __annotations__)",
@@ -362,9 +371,8 @@ def test_few_programs_are_not_forked(runner: Runner, monkeypatch: pytest.MonkeyP
 def test_program_is_started_if_the_preloaded_process_was_killed(runner: Runner) -> None:
     start = runner.start(runner.write("print(1)"))
     assert runner.forked(start).stdout == "1\n"
-    for process in psutil.Process().children():
-        if str(preloaded.__file__) in process.cmdline():
-            process.kill()
+    for process in preloaded_processes(psutil.Process()):
+        process.kill()
     assert runner.fork(start, 1, 2) is None
     assert runner.fork(start, 1, 2) is None
 
@@ -450,7 +458,13 @@ NODES = """<env name="E" value="1"/>
 
 def preloaded_processes(process: psutil.Process) -> list[psutil.Process]:
     """Return the preloaded processes among the descendants."""
-    return [each for each in process.children(recursive=True) if "preloaded.py" in " ".join(each.cmdline())]
+    found = []
+    for each in process.children(recursive=True):
+        # A process of another test may exit in the meantime.
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if "preloaded.py" in " ".join(each.cmdline()):
+                found.append(each)
+    return found
 
 
 def seen(launch: Running) -> list[list[object]]:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from minirospy import Node
+from minirospy.aio.topics import Subscription
 from tests.ros.robot_state_publisher.conftest import SECONDS, Start, end
 
 pytest.importorskip("mujoco", reason="mujoco-core is not installed: pip install minirospy[sim]")
@@ -44,7 +45,19 @@ async def call(node: Node, service: str, kind: Any, *values: object) -> Any:
 
 async def until(node: Node, topic: str, kind: Any, is_right: Callable[[Any], bool]) -> Any:
     """Return the first message on a topic that meets a condition."""
-    async for message in node.subscribe(topic, kind):
+    return await first_of(node.subscribe(topic, kind), is_right)
+
+
+async def connected(node: Node, topic: str, kind: Any) -> Subscription[Any]:
+    """Return a subscription that is connected, and that keeps all messages from now on."""
+    messages: Subscription[Any] = node.subscribe(topic, kind, queue_size=100_000)
+    await messages.wait_for_publishers(1, SECONDS)
+    return messages
+
+
+async def first_of(messages: Subscription[Any], is_right: Callable[[Any], bool]) -> Any:
+    """Return the first of a subscription's further messages that meets a condition."""
+    async for message in messages:
         if is_right(message):
             return message
     raise AssertionError
@@ -62,4 +75,16 @@ def written(folder: Path, name: str, text: str) -> str:
     return str(file)
 
 
-__all__ = ["BOX", "Body", "Start", "call", "end", "run", "start_world", "until", "written"]
+__all__ = [
+    "BOX",
+    "Body",
+    "Start",
+    "call",
+    "connected",
+    "end",
+    "first_of",
+    "run",
+    "start_world",
+    "until",
+    "written",
+]

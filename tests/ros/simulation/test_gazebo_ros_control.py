@@ -23,7 +23,7 @@ from std_srvs.srv import Empty
 from minirospy import Node
 from tests.conftest import write_files
 from tests.ros.robot_state_publisher.conftest import SECONDS
-from tests.ros.simulation.processes import Start, call, end, run, until, written
+from tests.ros.simulation.processes import Start, call, connected, end, first_of, run, until, written
 
 LINK = """<link name="{}"><inertial><origin xyz="0 0 0.2"/><mass value="1"/>
   <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>"""
@@ -117,13 +117,15 @@ def test_each_interface_moves_its_joint(master: str, tmp_path: Path, launch: Sta
         await until(node, "/joint_states", JointState, has_arrived)
 
         # After a reset of the time, the controllers are restarted: the joints are held where they started.
+        # Subscribe before: on a busy machine, as much time may pass again until a subscription is connected.
+        states = await connected(node, "/joint_states", JointState)
         before = (await call(node, "get_world_properties", GetWorldProperties)).sim_time
         await call(node, "reset_simulation", Empty)
 
         def is_at_start(state: JointState) -> bool:
             return state.header.stamp.to_sec() < before and abs(state.position[0]) < 1e-3
 
-        await until(node, "/joint_states", JointState, is_at_start)
+        await first_of(states, is_at_start)
         assert (await call(node, "delete_model", DeleteModel, "rig")).success
 
     run(body)

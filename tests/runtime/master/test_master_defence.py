@@ -257,7 +257,7 @@ def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
     with ServerProxy(uri) as proxy:
         crowd = []
         for _ in range(100):
-            crowd.append(socket.create_connection(("127.0.0.1", serving.port), 5))
+            crowd.append(socket.create_connection(("127.0.0.1", serving.port), 100))
             assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
         status: Any = proxy.minirospy.status("/test")
         assert status[2]["clients"] == 20

@@ -946,6 +946,7 @@ def test_many_publishers_that_answer_nonsense_are_summed_up(
             await until(lambda: not subscription.connecting)
             subscription.close()
 
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger.INTERVAL_SECONDS", 1e9)
     run(scene)
     lines = [r.getMessage() for r in caplog.records if r.name == "minirospy.runtime.node.subscription"]
     assert len(lines) == 11

@@ -25,7 +25,7 @@ def call(method: str, *args: Any) -> bytes:
 
 
 def connect(server: RpcServer) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", server.port), 5)
+    return socket.create_connection(("127.0.0.1", server.port), 100)
 
 
 def test_many_requests_of_a_client_do_not_delay_others() -> None:

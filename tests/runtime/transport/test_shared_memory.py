@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 IMAGE = InterfaceType("sensor_msgs/Image", "060021388200f6f0f447d0fcd9c64743", "uint8[] data\n")
-SECONDS = 10.0
+SECONDS = 100.0  # a machine that runs tests may stall
 KILLS = Path(__file__).parents[3] / "benchmarks" / "kills.py"
 
 

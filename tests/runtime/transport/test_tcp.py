@@ -167,7 +167,7 @@ def test_a_silent_peer_is_disconnected_after_a_while(
 
 
 def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
-    caplog: pytest.LogCaptureFixture,
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def scene() -> None:
         received: list[dict[str, str]] = []
@@ -189,6 +189,7 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
                 sock.close()
             await listener.close()
 
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger.INTERVAL_SECONDS", 1e9)
     run(scene)
     lines = [record.getMessage() for record in caplog.records]
     assert lines[0].endswith("closed: it sent nothing, and 200 others are waiting")

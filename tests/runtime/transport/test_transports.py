@@ -413,12 +413,12 @@ import rospy, std_srvs.srv
 local.reach = lambda *address: print("looked for", address)
 rospy.init_node("n")
 rospy.Service("/s", std_srvs.srv.Empty, lambda _: [])
-rospy.wait_for_service("/s", 10)
+rospy.wait_for_service("/s", 100)
 rospy.ServiceProxy("/s", std_srvs.srv.Empty)()
 
 async def main():
     async with aio.Node("m") as node:
-        await node.wait_for_service("/s", 10)
+        await node.wait_for_service("/s", 100)
         await node.service_proxy("/s", std_srvs.srv.Empty)()
 
 asyncio.run(main())
@@ -576,7 +576,7 @@ def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(famil
             with listening.accept()[0] as sock:
                 before = _received_before_the_header(sock, ahead)
                 sock.sendall(serialize_header({"callerid": "/s", "md5sum": "*", "type": "a/B"}))
-                sock.settimeout(10)
+                sock.settimeout(100)
                 request = before or sock.recv(1000)
                 # A response that arrives together with the header, or directly after it, must be found.
                 sock.sendall(serialize_response(request))
@@ -588,7 +588,7 @@ def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(famil
             client.finish(b"hello")
             assert client.call(b"hello") == b"\5\0\0\0hello"
             client.close()
-            assert served.result(10) == ahead
+            assert served.result(100) == ahead
 
 
 def test_a_request_that_went_ahead_is_sent_once_and_the_next_one_too() -> None:

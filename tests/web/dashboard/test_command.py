@@ -103,6 +103,22 @@ def test_page_is_served_before_there_is_a_master(
     assert "Open in a browser" not in started[0].stdout.read()
 
 
+def test_busy_machine_serves_no_page_without_a_master_beside_its_master(
+    started: list[subprocess.Popen[str]],
+) -> None:
+    slow = (
+        "import asyncio, sys; from minirospy.cli import dashboard; from minirospy.web.dashboard import waiting_page\n"
+        "connect = asyncio.open_connection\n"
+        "async def connect_later(*words):\n"
+        "    await asyncio.sleep(0.01)\n"
+        "    return await connect(*words)\n"
+        "asyncio.open_connection, waiting_page.WaitingPage = connect_later, None\n"
+        "dashboard._MASTER_SECONDS = 0.0\n"
+        "sys.exit(dashboard.dashboard(['--no-browser', '--port', '0']))\n"
+    )
+    assert urlopen(link_of(started, "-c", slow), timeout=60).status == 200
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another process")
 @pytest.mark.parametrize("host", ["localhost", "robot..local"])  # no encoder of names accepts an empty part
 def test_dashboard_without_a_master_ends_with_status_0(
