@@ -346,3 +346,38 @@ def test_page_of_a_phone_in_german_has_everything(serve: Serve, browse: Browse, 
     page.wait_text(f"{SELECTED} h3", "box_0")
     page.wait_text(f"{SELECTED} button", "Lage setzen")
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+LATE_LIST = """(async () => {
+  const { Simulation } = await import("/js/views/simulation.js");
+  Simulation.prototype.load = () => {}; // the test needs no picture
+  const answers = [];
+  const names = ["pause_physics", "get_world_properties", "set_model_state"];
+  const link = Object.assign(new EventTarget(), {
+    state: "open", mayWrite: true, channels: new Map(), parameters: new Map(),
+    services: new Map(names.map((name) => [`/gazebo/${name}`, {}])),
+    subscribe: () => () => {}, watch(_, react) { react(); return () => {}; },
+    call: () => new Promise((resolve) => answers.push(resolve)),
+  });
+  const main = document.createElement("div");
+  document.body.append(main);
+  const view = new Simulation(link, new URLSearchParams("model=old"), main, { remember() {} });
+  const settled = () => new Promise((resolve) => setTimeout(resolve));
+  const [list] = answers;
+  view.select("new");
+  list({ success: true, model_names: ["ground_plane"] });
+  await settled();
+  const kept = view.model;
+  const again = view.list();
+  answers.at(-1)({ success: true, model_names: ["ground_plane"] });
+  await again;
+  view.close();
+  return [kept, view.model];
+})()"""
+
+
+@needs_chromium
+def test_model_that_is_selected_stays_so_if_a_list_from_before_comes(serve: Serve, browse: Browse) -> None:
+    page = browse(address(serve(), "topics"))
+    page.wait_text("#state", "connected")
+    assert page.evaluate(LATE_LIST) == ["new", ""]
