@@ -484,7 +484,8 @@ def test_camera_starts_at_the_robot_and_odometry_is_one_arrow_with_a_trail(
         send("/base/long_odometry_name", message)
     name = "Odometry /base/long_odometry_name"
     status(page, name, "Messages received")
-    settings = page.evaluate(f"{kept}.Displays.find(e => e.Name === {name!r})")
+    # The page saves a while after a change.
+    settings = page.wait(f"return {kept}.Displays.find(e => e.Name === {name!r})")
     assert (settings["Keep"], settings["Trail"]) == (1, 1000)
     # The name may only be broken behind "/" and "_".
     parts = page.evaluate(
