@@ -46,7 +46,7 @@ WALK = ((1.0, None), (2.0, 0.62), (3.2, 0.5), (4.2, 0.36), (5.6, 0.16), (8.0, 0.
 """The person's distance in metres at these seconds, between which the person walks."""
 
 LIT = "return document.querySelector('.lit[aria-label$=\"{} on\"]')?.getClientRects().length"
-"""Tells whether the page shows a lit LED of a colour."""
+"""JavaScript that returns whether the page shows a lit LED of a color."""
 
 _ESCAPE = re.compile(r"\x1b\][^\x07]*\x07|\x1b\[[0-9;?]*[a-zA-Z]|\r")
 

@@ -135,7 +135,7 @@ def test_controllers_are_loaded_started_stopped_and_unloaded(
 
 @pytest.fixture
 def patient_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a page be silent for long, as it may be on a busy machine, so that only what the test does stops the joints."""
+    """Raise the time after which the server stops the joints of a silent page, which may stall on a busy machine."""
     monkeypatch.setattr("minirospy.web.dashboard.drive_endpoint.SILENT_SECONDS", PATIENCE)
 
 
