@@ -26,7 +26,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from minirospy.board.board import Board
 from tests.conftest import free_port
-from tests.interop.browser import Page
+from tests.interop.browser import PATIENCE, Page
 
 ROOT = Path(__file__).parents[1]
 LAUNCH = "roslaunch rpi_feros_bringup sick_zone.launch"
@@ -44,6 +44,9 @@ BACKGROUND, TEXT, PROMPT = (24, 26, 31), (222, 224, 228), (98, 209, 150)
 
 WALK = ((1.0, None), (2.0, 0.62), (3.2, 0.5), (4.2, 0.36), (5.6, 0.16), (8.0, 0.16))
 """The person's distance in metres at these seconds, between which the person walks."""
+
+LIT = "return document.querySelector('.lit[aria-label$=\"{} on\"]')?.getClientRects().length"
+"""JavaScript that returns whether the page shows a lit LED of a color."""
 
 _ESCAPE = re.compile(r"\x1b\][^\x07]*\x07|\x1b\[[0-9;?]*[a-zA-Z]|\r")
 
@@ -86,7 +89,7 @@ class Terminal:
 
     def close(self) -> None:
         self.process.terminate()
-        self.process.wait(30)
+        self.process.wait(PATIENCE)
         os.close(self._parent)
 
 
@@ -145,7 +148,7 @@ def running(home: Path) -> Iterator[tuple[Terminal, Page]]:
 
 def _wait(condition: object, what: str) -> None:
     assert callable(condition)
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > end:
             raise SystemExit(f"first_picture.py: timeout: {what}")
@@ -155,19 +158,28 @@ def _wait(condition: object, what: str) -> None:
 def record(home: Path) -> list[Image.Image]:
     """Return the frames of the picture."""
     frames = []
+
+    def add_frame(terminal: Terminal, page: Page) -> None:
+        data = page.call("Page.captureScreenshot", format="png")["data"]
+        frame = Image.new("RGB", (PANE[0] + PAGE[0], PANE[1]), "white")
+        frame.paste(drawn(terminal.lines(), PANE))
+        frame.paste(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"), (PANE[0], 0))
+        size = (round(frame.width * SCALE), round(frame.height * SCALE))
+        frames.append(frame.resize(size, Image.Resampling.LANCZOS))
+
     with running(home) as (terminal, page), Board("workshop") as board:
+        page.wait(LIT.format("green"))
         time.sleep(1)  # until the page shows the first scan
         begin = time.monotonic()
         while (passed := time.monotonic() - begin) < SECONDS:
             distance = distance_at(passed)
             board.move_person(None if distance is None else (distance, 0.0))
-            data = page.call("Page.captureScreenshot", format="png")["data"]
-            frame = Image.new("RGB", (PANE[0] + PAGE[0], PANE[1]), "white")
-            frame.paste(drawn(terminal.lines(), PANE))
-            frame.paste(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB"), (PANE[0], 0))
-            size = (round(frame.width * SCALE), round(frame.height * SCALE))
-            frames.append(frame.resize(size, Image.Resampling.LANCZOS))
+            add_frame(terminal, page)
             time.sleep(max(0.0, begin + len(frames) / RATE - time.monotonic()))
+        # The last frame shows the end of the walk, even if the machine is too busy for the programs to keep up.
+        board.move_person((WALK[-1][1], 0.0))
+        page.wait(LIT.format("red"))
+        add_frame(terminal, page)
     return frames
 
 

@@ -42,9 +42,14 @@ def robot():
     rospy.Subscriber("/order", String, lambda order: heard.publish("heard " + order.data))
     rospy.Service("/flag", SetBool, lambda request: SetBoolResponse(request.data, "from afar"))
     rospy.set_param("/robot", {"wheels": 2, "name": "r2"})
-    server = actionlib.SimpleActionServer(
-        "/count", TestAction, lambda goal: server.set_succeeded(TestResult(goal.goal + 1)), False
-    )
+
+    def count(goal):
+        # A client of actionlib in Python ignores everything that arrives before send_goal() returns.
+        while not rospy.get_param("/sent", False):
+            time.sleep(0.05)
+        server.set_succeeded(TestResult(goal.goal + 1))
+
+    server = actionlib.SimpleActionServer("/count", TestAction, count, False)
     server.start()
     threading.Thread(target=tick, args=(beat,), daemon=True).start()
     say("ready")
@@ -72,7 +77,9 @@ def laptop():
     client = actionlib.SimpleActionClient("/count", TestAction)
     if not client.wait_for_server(rospy.Duration(SECONDS)):
         sys.exit("no action server")
-    client.send_goal_and_wait(TestGoal(41), rospy.Duration(SECONDS))
+    client.send_goal(TestGoal(41))
+    rospy.set_param("/sent", True)
+    client.wait_for_result(rospy.Duration(SECONDS))
     say("count", client.get_result().result)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -31,6 +32,7 @@ __all__ = ["browse", "serve"]
 
 TRAJECTORIES = "position_controllers/JointTrajectoryController"
 JOINTS = ("lift", "shoulder")
+SWITCH = ".publish-switch input"
 
 
 class Manager:
@@ -132,7 +134,23 @@ def test_controllers_are_loaded_started_stopped_and_unloaded(
 
 
 @pytest.fixture
-def arm(serve: Callable[..., Served], browse: Callable[..., Page]) -> tuple[Served, Page, Callable[..., Any]]:
+def patient_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Raise the time after which the server stops the joints of a silent page, which may stall on a busy machine."""
+    monkeypatch.setattr("minirospy.web.dashboard.drive_endpoint.SILENT_SECONDS", PATIENCE)
+
+
+def switch_on(page: Page) -> None:
+    """Switch the commands on. Try again while the page says that its connection for commands is not open yet."""
+    page.click(SWITCH)
+    while not page.evaluate(f"document.querySelector('{SWITCH}').checked"):
+        page.wait_text("p.error", "Try again in a moment")
+        page.click(SWITCH)
+
+
+@pytest.fixture
+def arm(
+    serve: Callable[..., Served], browse: Callable[..., Page], patient_server: None
+) -> tuple[Served, Page, Callable[..., Any]]:
     """Return a dashboard, its page with a running controller, and a function that returns the next matching command."""
     served = serve()
     manager = Manager(served)
@@ -168,7 +186,7 @@ def test_sliders_send_commands_only_while_they_are_on(
 ) -> None:
     _, page, until = arm
     assert page.evaluate("document.querySelector('[data-joint=shoulder] input[type=range]').disabled")
-    page.click(".publish-switch input")
+    switch_on(page)
     # The first command is where the joints are, whatever was sent before.
     first = until(lambda command: True)
     assert (list(first.joint_names), positions(first)) == (list(JOINTS), [0.2, 0.5])
@@ -180,7 +198,7 @@ def test_sliders_send_commands_only_while_they_are_on(
     # It is cut to the URDF's limit, and lasts as long as 1.5 rad need at half of 1 rad/s.
     assert positions(moved) == [0.2, -1.0]
     assert moved.points[0].time_from_start.to_sec() == 3.0
-    page.click(".publish-switch input")
+    page.click(SWITCH)
     held = until(lambda command: not command.points)
     assert list(held.joint_names) == []
     page.wait("return document.querySelector('[data-joint=shoulder] input[type=range]').disabled")
@@ -193,7 +211,7 @@ def test_joints_are_held_when_the_page(
     arm: tuple[Served, Page, Callable[..., JointTrajectory]], ending: str
 ) -> None:
     _, page, until = arm
-    page.click(".publish-switch input")
+    switch_on(page)
     page.type("[data-joint=shoulder] input[type=number]", "1.5")
     page.evaluate("document.activeElement.blur()")
     until(lambda command: positions(command) == [0.2, 1.5])
@@ -219,7 +237,7 @@ def test_robot_without_limits_is_named(serve: Callable[..., Served], browse: Cal
 
 @needs_chromium
 def test_joint_of_the_loopback_moves_and_stands_when_the_page_is_closed(
-    serve: Callable[..., Served], browse: Callable[..., Page], master: str
+    serve: Callable[..., Served], browse: Callable[..., Page], master: str, patient_server: None
 ) -> None:
     served = serve()
     robot = served.node("robot")
@@ -243,17 +261,22 @@ def test_joint_of_the_loopback_moves_and_stands_when_the_page_is_closed(
         page = browse(address(served, "controllers"))
         page.click("tr[data-controller='arm'] button", "Load and start")
         page.wait_text(badge("arm"), "running")
-        page.evaluate("location.hash = '#/trajectory?speed=10'")
-        page.wait("return document.querySelector('.publish-switch input')?.disabled === false")
-        page.click(".publish-switch input")
+        page.evaluate("location.hash = '#/trajectory?speed=2'")
+        page.wait(f"return document.querySelector('{SWITCH}')?.disabled === false")
+        switch_on(page)
         page.type("[data-joint=shoulder] input[type=number]", "2")
         page.evaluate("document.activeElement.blur()")
-        # At 10 % of 1 rad/s the motion takes 20 s.
-        until(lambda actual: actual.positions[1] > 0.05)
+        # At 2 % of 1 rad/s the motion takes 100 s.
+        until(lambda actual: actual.positions[1] > 0.02)
         page.open("about:blank")
-        stands = until(lambda actual: actual.positions[1] > 0.05 and actual.velocities[1] == 0)
-        assert stands.positions[1] < 1.9
-        assert until(lambda _: True).positions == stands.positions
+        last: deque[float] = deque(maxlen=50)
+
+        def stands(actual: Any) -> bool:
+            # One state does not tell: there is no motion in the cycle in which a command begins.
+            last.append(actual.positions[1])
+            return len(last) == last.maxlen and len(set(last)) == 1
+
+        assert 0.02 < until(stands).positions[1] < 1.9
     finally:
         loopback.terminate()
         loopback.wait(PATIENCE)

@@ -366,7 +366,7 @@ def test_console_keeps_long_texts_in_their_rows(
     served = serve()
     page = browse(address(served, "console"))
     text = "Traceback:\n  line 1\r\n  line 2\n" + "x" * 100_000
-    log = publisher(served, "/rosout_agg", Log, latch=True)
+    log = publisher(served, "/rosout_agg", Log, latch=True, queue_size=None)
     served.run(log.publish(Log(level=8, name="/n" + "n" * 2000, msg=text)))
     page.wait_text(".line .text", "Traceback: ↵   line 1 ↵   line 2 ↵ xxx")
     # A click shows the whole line.

@@ -159,7 +159,7 @@ def test_topics_are_recorded_and_the_recording_is_opened(
         page.click("[data-topic='/robot/words'] input")
         page.type("input[aria-label='Name of the recording']", "walk")
         page.click(".recorder button", "Record")
-        page.wait_text(".recording", "walk.bag · 0:0")
+        page.wait("return /walk\\.bag · \\d+:\\d\\d/.test(document.querySelector('.recording').textContent)")
         page.wait_text(".recording", " kB")
         page.click(".recording button", "Stop")
         page.wait_text(".recording", "saved")

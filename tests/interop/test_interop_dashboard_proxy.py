@@ -90,8 +90,9 @@ def proxy() -> Iterator[Callable[[int], Proxy]]:
 
 @needs_chromium
 def test_page_works_below_a_path_of_a_proxy_with_another_host_name(
-    serve: Callable[..., Served], browse: Callable[..., Page], proxy: Callable[[int], Proxy]
+    serve: Callable[..., Served], proxy: Callable[[int], Proxy], browse: Callable[..., Page]
 ) -> None:
+    # The fixtures end in reverse order: a page that is still open when its proxy ends logs errors.
     served = serve(access=Access(write_token=TOKEN, requires_token=True, hosts=("robots.example",)))
     served.run(publisher(served, "/button_state", Bool, latch=True).publish(True))
     page = browse(

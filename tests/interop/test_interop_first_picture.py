@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.interop.browser import CHROMIUM
+from tests.interop.browser import CHROMIUM, PATIENCE
 
 ROOT = Path(__file__).parents[2]
 PICTURE = ROOT / "docs" / "pictures" / "first.webp"
@@ -54,7 +54,7 @@ def test_picture_is_recorded(tmp_path: Path) -> None:
         [sys.executable, str(ROOT / "tools" / "first_picture.py"), str(file)],
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=2.5 * PATIENCE,
         check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )

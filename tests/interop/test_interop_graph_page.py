@@ -245,6 +245,8 @@ def test_drag_of_a_node_moves_the_drawing_and_a_trembling_click_does_not(
     publisher(served, "/words", String)
     page = browse(address(served, "graph"))
     page.wait(f'return document.querySelector("{key_of("/words")}")')
+    # The line about the dead node makes the bar higher, and the drawing is fitted again.
+    page.wait_text("[role=status].error", "1 dead node")
     where = "document.querySelector('.graph > g').getAttribute('transform')"
     before = page.evaluate(where)
     drag(page, key_of("/words"), 60)

@@ -16,8 +16,8 @@ from std_msgs.msg import Bool, Float64
 
 from minirospy.board.board import Board
 from tests.conftest import free_port
-from tests.interop.browser import Page
-from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher, serve
+from tests.interop.browser import PATIENCE, Page
+from tests.interop.test_interop_dashboard import address, browse, needs_chromium, publisher, repeated, serve
 from tests.web.dashboard.conftest import Served
 
 __all__ = ["browse", "serve"]
@@ -35,7 +35,7 @@ def programs() -> Iterator[list[subprocess.Popen[str]]]:
     for each in started:
         each.terminate()
     for each in started:
-        each.communicate(timeout=60)
+        each.communicate(timeout=PATIENCE)
 
 
 def subscribe(served: Served, name: str, topic: str, cls: type) -> Any:
@@ -120,7 +120,7 @@ def test_page_before_the_master_says_how_to_start_one(
         page.wait(CHECKED)
         # The master ends while the page is open.
         programs[1].terminate()
-        programs[1].wait(60)
+        programs[1].wait(PATIENCE)
         page.wait_text(".verdict", "The ROS master does not answer.")
     finally:
         page.close()
@@ -189,14 +189,10 @@ def test_rate_of_a_topic_is_that_which_its_node_counts(
     sender = publisher(served, "/button_state", Bool)
     kept = subscribe(served, "led", "/button_state", Bool)
     page = browse(address(served))
-    page.wait(f"return {ROW.format('/button_state')}?.dataset.state === 'quiet'")
-
-    async def press() -> None:
-        for _ in range(50):
-            await sender.publish(True)
-
-    served.run(press())
-    page.wait(f"return {ROW.format('/button_state')}.dataset.state === 'flows'")
-    # A button is not expected to be pressed all the time.
-    page.wait(f"return {ROW.format('/button_state')}.dataset.state !== 'flows'")
+    row = ROW.format("/button_state")
+    # A rate is the difference between two reports, so the first messages must not come before a report has counted them.
+    page.wait(f"return {row}?.dataset.state === 'quiet' && {row}.textContent.includes('0.0 Hz')")
+    with repeated(served, sender, Bool(True)):
+        page.wait(f"return {row}.dataset.state === 'flows'")
+    page.wait(f"return {row}.dataset.state !== 'flows'")
     assert kept

@@ -106,15 +106,13 @@ def test_two_bags_a_joint_and_a_difference_share_a_plot(
             serve(), hash_of("long.bag:/joint_states/position[elbow]", "short.bag:/twice/data", difference)
         )
     )
-    page.wait("return document.querySelectorAll('.series').length === 3")
-    rows = {
-        row["label"]: row["value"]
-        for row in page.evaluate(
-            "[...document.querySelectorAll('.series')].map(e => ({label: e.querySelector('.label').textContent,"
-            " value: e.querySelector('.num').textContent}))"
-        )
-    }
-    assert rows == {
+    # The values are shown in the picture after that in which the series come.
+    rows = page.wait(
+        "const rows = [...document.querySelectorAll('.series')].map(e =>"
+        " [e.querySelector('.label').textContent, e.querySelector('.num').textContent]);"
+        "return rows.length === 3 && rows.every(([, value]) => value) && rows"
+    )
+    assert dict(rows) == {
         "long.bag:/joint_states/position[elbow]": "2",
         "short.bag:/twice/data": "18",
         difference: str(8 - 17),

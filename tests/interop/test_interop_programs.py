@@ -15,10 +15,10 @@ from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap
 
 rospy.init_node("reader")
-grid = rospy.wait_for_message("/map", OccupancyGrid, timeout=60)
+grid = rospy.wait_for_message("/map", OccupancyGrid, timeout=150)
 print(list(grid.data), grid.info.width, grid.info.height, round(grid.info.resolution, 3), grid.header.frame_id)
-print(rospy.wait_for_message("/map_metadata", MapMetaData, timeout=60) == grid.info)
-rospy.wait_for_service("static_map", 60)
+print(rospy.wait_for_message("/map_metadata", MapMetaData, timeout=150) == grid.info)
+rospy.wait_for_service("static_map", 150)
 print(list(rospy.ServiceProxy("static_map", GetMap)().map.data))
 change = rospy.ServiceProxy("change_map", LoadMap)
 print(change("/no/such.yaml").result, change(sys.argv[1]).result)

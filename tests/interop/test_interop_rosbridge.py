@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from actionlib_tutorials.msg import FibonacciAction, FibonacciGoal
+from actionlib_tutorials.msg import FibonacciAction, FibonacciActionResult, FibonacciGoal
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import String
@@ -69,6 +69,8 @@ async def serve(node: Node) -> list[Any]:
     """Offer the topics, services and actions that the peer uses."""
 
     async def execute(goal: Any) -> dict[str, Any]:
+        # The bridge may not be connected to the result yet.
+        await results.wait_for_subscribers(timeout=PATIENCE)
         return {"sequence": list(range(goal.request.order))}
 
     latched = await node.advertise("/latched", String, latch=True)
@@ -84,6 +86,7 @@ async def serve(node: Node) -> list[Any]:
     service = await node.serve("/set", SetBool, lambda request: (request.data, "from minirospy"))
     action: Any = ActionServer(node, "/fibonacci", FibonacciAction, execute)
     await action
+    results = await node.advertise("/fibonacci/result", FibonacciActionResult)
     return [latched, images, static, service, action]
 
 

@@ -192,7 +192,7 @@ pose.transform.translation.x, pose.transform.rotation.w = 2.5, 1.0
 static.sendTransform(pose)
 # So long may the server stall.
 client = tf2_ros.BufferClient("tf2_buffer_server", timeout_padding=rospy.Duration(20))
-print(client.wait_for_server(rospy.Duration(60)))
+print(client.wait_for_server(rospy.Duration(150)))
 
 
 def patiently(call, *arguments):

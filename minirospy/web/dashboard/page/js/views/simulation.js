@@ -378,6 +378,7 @@ export class Simulation {
   async list() {
     if (!this.services.isThere || this.isListing || this.isClosed) return;
     this.isListing = true;
+    const { model } = this;
     try {
       // A page that calls no services has the models that it sees.
       this.models = this.link.mayWrite ? await this.services.models() : (this.scene?.world.models() ?? []);
@@ -387,7 +388,8 @@ export class Simulation {
       this.isListing = false;
     }
     if (this.isClosed) return;
-    if (this.model && !this.models.includes(this.model)) this.select("");
+    // A model that was selected meanwhile may be newer than this list.
+    if (model && model === this.model && !this.models.includes(model)) this.select("");
     this.showModels();
   }
 
