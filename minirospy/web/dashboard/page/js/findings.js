@@ -28,6 +28,9 @@ export const TEXTS = [
   "that of {machine} is {seconds} s behind this one",
   "the master's machine ({host})",
   "let both follow one time server (chrony, ntp): stamps and transforms of one are wrong for the other",
+  // shared memory
+  "does not work: {why}; large messages use sockets, which is slower",
+  "in a container: allow memfd_create, eventfd2 and /proc, and enough memory",
   // topics, connections and services
   "nobody publishes {topics}",
   "start the publisher, or correct the topic's name",

@@ -71,6 +71,10 @@ export const GERMAN = {
   "start `roscore`, or set ROS_MASTER_URI to the machine where it runs":
     "`roscore` starten, oder ROS_MASTER_URI auf den Rechner setzen, auf dem er läuft",
   "it answered, and then no more: {why}": "er hat geantwortet, dann nicht mehr: {why}",
+  "does not work: {why}; large messages use sockets, which is slower":
+    "funktioniert nicht: {why}; große Nachrichten gehen über Sockets, das ist langsamer",
+  "in a container: allow memfd_create, eventfd2 and /proc, and enough memory":
+    "in einem Container: memfd_create, eventfd2 und /proc erlauben, und genug Speicher geben",
   "nobody publishes {topics}": "niemand sendet {topics}",
   "start the publisher, or correct the topic's name": "den Publisher starten, oder den Namen des Topics berichtigen",
   "{topic} has nodes of different types, which never connect: {types}":
