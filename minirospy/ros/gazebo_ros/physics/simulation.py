@@ -247,7 +247,7 @@ class Simulation:
         self.warnings += self._builder.take_warnings(name)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
-        added = SimModel(self.engine, name, model, pose, built, self)
+        added = SimModel(self, name, model, pose, built)
         self._models[name] = added
         return added
 
