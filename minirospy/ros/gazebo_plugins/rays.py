@@ -55,11 +55,11 @@ class RayPlugin(SensorPlugin):
         """Read the sensor's rays, and start the topic; ``topic`` is its default."""
         self.shown_rays = self.rays = read_rays(self.sensor)
         self.frame_id = self.frame("frameName", "/world")
-        self.publisher = self.publish_to(self.text("topicName", topic), kind)
+        self.publisher = self.output_to(self.text("topicName", topic), kind)
 
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self.publisher.get_num_connections() > 0
+    def nearest(self) -> float:
+        """Return the shortest distance of all rays, at most the maximum range."""
+        return float(min(np.min(self.rays.cast(self.simulation, self.sensor_pose)), self.rays.max_range))
 
 
 def read_rays(sensor: Sensor) -> Rays:

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from std_msgs.msg import Header
 
 from minirospy import client as rospy
 from minirospy.base.errors import ManifestError
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LIBRARIES",
     "ModelPlugin",
+    "PeriodicPlugin",
     "PluginBase",
     "PluginError",
     "PluginHost",
@@ -129,6 +131,10 @@ class PluginBase:
         """Return the time of the simulation."""
         return time_of(self.simulation.time_ns)
 
+    def header(self, frame_id: str) -> Header:
+        """Return a message's header with the time of the simulation."""
+        return Header(stamp=self.now, frame_id=frame_id)
+
     def call(self, function: Callable[[], _T]) -> _T:
         """Run a function between two steps; for the callbacks of subscribers and services."""
         return self.loop.call(function)
@@ -136,6 +142,12 @@ class PluginBase:
     def text(self, tag: str, default: str = "") -> str:
         """Return a parameter's text, or the default if it is missing or empty."""
         return text_of(self.element, tag, default)
+
+    def required(self, tag: str, title: str) -> str:
+        """Return a parameter's text. Raise PluginError that begins with the title if it is missing or empty."""
+        if not (text := self.text(tag)):
+            raise PluginError(f"{title} missing <{tag}>, cannot proceed".lstrip())
+        return text
 
     def number(self, tag: str, default: float) -> float:
         """Return a parameter's number. Raise PluginError if it is not a number, or out of the tag's range.
@@ -160,6 +172,14 @@ class PluginBase:
     def frame(self, tag: str, default: str) -> str:
         """Return a parameter's name of a frame, without the slash at its start."""
         return self.text(tag, default).lstrip("/")
+
+    def noisy(self, values: Iterable[float], deviation: float) -> list[float]:
+        """Return values with independent noise of a standard deviation."""
+        exact = list(values)
+        if deviation <= 0:
+            return exact
+        noise = self.simulation.random.normal(0.0, deviation, len(exact)).tolist()
+        return [value + error for value, error in zip(exact, noise, strict=True)]
 
     def resolve(self, topic: str) -> str:
         """Return a topic's name in the plugin's namespace."""
@@ -264,30 +284,27 @@ class RayFan(Protocol):
         """Return the distance at which rays end."""
 
 
-class SensorPlugin(ModelPlugin):
-    """A plugin of a sensor: :meth:`sense` is called at the sensor's rate, or at ``self.rate`` if ``load`` sets it.
+class PeriodicPlugin(ModelPlugin):
+    """A plugin of a model whose :meth:`sense` is called ``rate`` times a second of simulated time, or before each step for 0."""
 
-    If ``load`` sets ``self.shown_rays``, the simulation's window can show them.
-    """
+    rate = 0.0
 
-    def __init__(
-        self, loop: SimulationLoop, plugin: Plugin, model: SimModel, sensor: Sensor, link: SimLink
-    ) -> None:
+    def __init__(self, loop: SimulationLoop, plugin: Plugin, model: SimModel) -> None:
         super().__init__(loop, plugin, model)
-        self.sensor = sensor
-        self.sensor_link = link
-        self.rate = sensor.update_rate
-        self.shown_rays: RayFan | None = None
         self._timer: Timer | None = None
+        self._outputs: list[rospy.Publisher[Any]] = []
 
-    @property
-    def sensor_pose(self) -> Pose:
-        """Return the sensor's pose in the world."""
-        return compose(self.sensor_link.pose, self.sensor.pose)
+    def output_to(
+        self, topic: str, kind: type[rospy.Message], *, latch: bool = False
+    ) -> rospy.Publisher[Any]:
+        """Return a publisher in the plugin's namespace. While none of these has a subscriber, the plugin is not needed."""
+        publisher = self.publish_to(topic, kind, latch=latch)
+        self._outputs.append(publisher)
+        return publisher
 
     def is_needed(self) -> bool:
-        """Return whether anything uses the sensor's data, such as a subscriber."""
-        return True
+        """Return whether anything uses the data: a subscriber, or another plugin if there are no outputs."""
+        return not self._outputs or any(each.get_num_connections() for each in self._outputs)
 
     def sense(self) -> None:
         """Measure and publish."""
@@ -300,8 +317,29 @@ class SensorPlugin(ModelPlugin):
             self.sense()
 
     def reset(self) -> None:
-        """Start the sensor's period again."""
+        """Begin the period again."""
         self._timer = None
+
+
+class SensorPlugin(PeriodicPlugin):
+    """A plugin of a sensor. Its rate is the sensor's unless ``load`` sets ``self.rate``.
+
+    If ``load`` sets ``self.shown_rays``, the simulation's window can show them.
+    """
+
+    def __init__(
+        self, loop: SimulationLoop, plugin: Plugin, model: SimModel, sensor: Sensor, link: SimLink
+    ) -> None:
+        super().__init__(loop, plugin, model)
+        self.sensor = sensor
+        self.sensor_link = link
+        self.rate = sensor.update_rate
+        self.shown_rays: RayFan | None = None
+
+    @property
+    def sensor_pose(self) -> Pose:
+        """Return the sensor's pose in the world."""
+        return compose(self.sensor_link.pose, self.sensor.pose)
 
 
 class PluginHost:
