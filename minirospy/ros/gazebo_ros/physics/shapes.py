@@ -44,6 +44,7 @@ __all__ = [
     "SOLREF",
     "Shapes",
     "friction",
+    "to_wxyz",
 ]
 
 # MuJoCo's groups of geoms, of which a ray or a camera selects some.
@@ -183,7 +184,7 @@ class Shapes:
             geom.hfieldname = piece.asset
         whole = compose(pose, piece.pose)
         geom.pos = whole.position
-        geom.quat = _wxyz(whole.orientation)
+        geom.quat = to_wxyz(whole.orientation)
         return geom
 
     def _pieces(self, geometry: Geometry, *, is_static: bool) -> list[_Piece]:
@@ -332,9 +333,8 @@ def _wall(shape: Plane) -> _Piece:
 
 def _area(mesh: Mesh) -> float:
     # MuJoCo has the vertices in single precision.
-    corners = mesh.vertices.astype(np.float32)[mesh.triangles].astype(np.float64)
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(crosses, axis=1).sum()) / 2
+    rounded = Mesh(mesh.vertices.astype(np.float32).astype(np.float64), mesh.triangles)
+    return float(np.linalg.norm(rounded.crosses, axis=1).sum()) / 2
 
 
 def _meshes(geometry: Geometry) -> list[Mesh]:
@@ -364,6 +364,7 @@ def _turn_to(normal: tuple[float, float, float]) -> Quaternion:
     return -y / scale, x / scale, 0.0, scale / 2
 
 
-def _wxyz(rotation: Quaternion) -> tuple[float, float, float, float]:
+def to_wxyz(rotation: Quaternion) -> Quaternion:
+    """Return a quaternion in MuJoCo's order."""
     x, y, z, w = rotation
     return w, x, y, z
