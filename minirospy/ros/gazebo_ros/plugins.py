@@ -13,8 +13,9 @@ from __future__ import annotations
 import importlib
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,20 +269,13 @@ class Timer:
         return True
 
 
-class RayFan(Protocol):
-    """The rays of a sensor: (n, 3) unit vectors in the sensor's frame, and the limits of their length in m."""
+@dataclass(frozen=True)
+class RayFan:
+    """The rays of a sensor: (n, 3) unit vectors in the sensor's frame, and the distances in m at which they begin and end."""
 
-    @property
-    def directions(self) -> NDArray[np.float64]:
-        """Return the directions."""
-
-    @property
-    def min_range(self) -> float:
-        """Return the distance at which rays begin."""
-
-    @property
-    def max_range(self) -> float:
-        """Return the distance at which rays end."""
+    directions: NDArray[np.float64]
+    min_range: float
+    max_range: float
 
 
 class PeriodicPlugin(ModelPlugin):
