@@ -30,7 +30,7 @@ class Velodyne(RayPlugin):
         """Read the sensor's rays."""
         self.load_rays("/points", PointCloud2)
         rays = self.rays
-        if self.namespace:
+        if self.namespace and not self.text("frameName", "/world").startswith("/"):
             self.frame_id = f"{self.namespace.strip('/')}/{self.frame_id}"
         self._is_organized = self.flag("organize_cloud", False)
         self._nearest = max(self.number("min_range", 0.0), rays.min_range)
