@@ -133,6 +133,7 @@ class CameraPlugin(SensorPlugin):
     def _set_rate(self, rate: float) -> None:
         self.rate = rate
         self._timer = None
+        self.due_ns = 0
 
 
 class Lens:

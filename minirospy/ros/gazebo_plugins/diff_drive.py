@@ -56,6 +56,8 @@ class DiffDrive(DrivePlugin):
         if elapsed < self._period_ns:
             return
         self._last_ns = now_ns
+        if not self._uses_encoders:
+            self.due_ns = now_ns + self._period_ns
         self._publish()
         speed, _, turn = self.command
         turn *= self._separation / 2

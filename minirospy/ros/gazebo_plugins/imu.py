@@ -51,13 +51,10 @@ def offset_of(plugin: PluginBase) -> Pose:
 def _message(plugin: PluginBase, frame: str, noise: float, values: tuple[Pose, Vector, Vector]) -> ImuMsg:
     pose, angular, acceleration = values
     noisy = plugin.noisy((*pose.orientation, *angular, *acceleration), noise)
-    message = ImuMsg(header=plugin.header(frame), orientation=Quaternion(*noisy[:4]))
-    message.angular_velocity, message.linear_acceleration = Vector3(*noisy[4:7]), Vector3(*noisy[7:])
     diagonal = [noise * noise if index % 4 == 0 else 0.0 for index in range(9)]
-    message.orientation_covariance = diagonal
-    message.angular_velocity_covariance = diagonal
-    message.linear_acceleration_covariance = diagonal
-    return message
+    measured = (Quaternion(*noisy[:4]), Vector3(*noisy[4:7]), Vector3(*noisy[7:]))
+    # Each of them, then its covariance.
+    return ImuMsg(plugin.header(frame), *(part for each in measured for part in (each, diagonal)))
 
 
 class Imu(PeriodicPlugin):

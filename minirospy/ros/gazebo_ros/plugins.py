@@ -89,8 +89,11 @@ LIBRARIES = {
 class PluginBase:
     """A plugin of the world.
 
-    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's.
+    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's. due_ns: the time of the
+    simulation before which :meth:`update` has nothing to do.
     """
+
+    due_ns = 0
 
     def __init__(self, loop: SimulationLoop, plugin: Plugin) -> None:
         self.loop = loop
@@ -134,7 +137,7 @@ class PluginBase:
 
     def header(self, frame_id: str) -> Header:
         """Return a message's header with the time of the simulation."""
-        return Header(stamp=self.now, frame_id=frame_id)
+        return Header(0, self.now, frame_id)
 
     def call(self, function: Callable[[], _T]) -> _T:
         """Run a function between two steps; for the callbacks of subscribers and services."""
@@ -257,15 +260,15 @@ class Timer:
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate > 0 else 0
-        self._next = 0
+        self.next_ns = 0
 
     def is_due(self, now_ns: int) -> bool:
         """Return whether the next period begins."""
-        if now_ns < self._next - self._period:  # the time was reset
-            self._next = now_ns
-        if now_ns < self._next:
+        if now_ns < self.next_ns - self._period:  # the time was reset
+            self.next_ns = now_ns
+        if now_ns < self.next_ns:
             return False
-        self._next = max(self._next + self._period, now_ns - self._period + 1)
+        self.next_ns = max(self.next_ns + self._period, now_ns - self._period + 1)
         return True
 
 
@@ -286,6 +289,7 @@ class PeriodicPlugin(ModelPlugin):
     def __init__(self, loop: SimulationLoop, plugin: Plugin, model: SimModel) -> None:
         super().__init__(loop, plugin, model)
         self._timer: Timer | None = None
+        self._has_other_work = type(self).update is not PeriodicPlugin.update
         self._outputs: list[rospy.Publisher[Any]] = []
 
     def output_to(
@@ -307,12 +311,16 @@ class PeriodicPlugin(ModelPlugin):
         """Call :meth:`sense` if it is due."""
         if self._timer is None:
             self._timer = Timer(self.rate)
-        if self._timer.is_due(self.simulation.time_ns) and self.is_needed():
-            self.sense()
+        if self._timer.is_due(self.simulation.time_ns):
+            if not self._has_other_work:
+                self.due_ns = self._timer.next_ns
+            if self.is_needed():
+                self.sense()
 
     def reset(self) -> None:
         """Begin the period again."""
         self._timer = None
+        self.due_ns = 0
 
 
 class SensorPlugin(PeriodicPlugin):
@@ -377,8 +385,11 @@ class PluginHost:
         self._list()
 
     def update(self) -> None:
-        """Run all plugins before a step. A plugin that fails is closed and named."""
+        """Run all plugins before a step, unless they are not due. A plugin that fails is closed and named."""
+        now_ns = self._loop.simulation.time_ns
         for plugin in self._running:
+            if now_ns < plugin.due_ns:
+                continue
             try:
                 plugin.update()
             except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's

@@ -277,11 +277,9 @@ class Engine:
         """Return the degrees of freedom of joints whose links are not balanced like wheels."""
         model = self.model
         result: list[int] = []
-        for joint in range(model.njnt):
+        for joint in np.flatnonzero(model.jnt_type == self.mujoco.mjtJoint.mjJNT_HINGE).tolist():
             body = int(model.jnt_bodyid[joint])
             dof = int(model.jnt_dofadr[joint])
-            if model.jnt_type[joint] != self.mujoco.mjtJoint.mjJNT_HINGE:
-                continue
             offset = model.body_ipos[body] - model.jnt_pos[joint]
             distance = np.linalg.norm(np.cross(offset, model.jnt_axis[joint]))
             if distance > 1e-3 or model.body_subtreemass[body] > 1.001 * model.body_mass[body]:
