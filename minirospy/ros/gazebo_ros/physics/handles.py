@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,24 @@ from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, MAX_MOTOR_SPEED, 
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
 from minirospy.ros.gazebo_ros.physics.states import ZERO, State, Wrench
 
-if TYPE_CHECKING:
-    from minirospy.ros.gazebo_ros.physics.simulation import Simulation
+__all__ = ["Owner", "SimJoint", "SimLink", "SimModel"]
 
-__all__ = ["SimJoint", "SimLink", "SimModel"]
+
+class Owner(Protocol):
+    """The part of the simulation that a model uses."""
+
+    engine: Engine
+    forced: dict[str, None]
+
+    @property
+    def time(self) -> float:
+        """Return the time in seconds."""
+
+    def recompile(self) -> None:
+        """Compile the world again."""
+
+    def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
+        """Change one of MuJoCo's joints."""
 
 
 @dataclass
@@ -377,9 +391,7 @@ class SimJoint:
 class SimModel:
     """A model in the simulation: its links and joints by name."""
 
-    def __init__(
-        self, simulation: Simulation, name: str, record: Model, start: Pose, built: BuiltModel
-    ) -> None:
+    def __init__(self, simulation: Owner, name: str, record: Model, start: Pose, built: BuiltModel) -> None:
         self.simulation = simulation
         self.engine = engine = simulation.engine
         self.name = name
