@@ -52,9 +52,8 @@ def _message(plugin: PluginBase, frame: str, noise: float, values: tuple[Pose, V
     pose, angular, acceleration = values
     noisy = plugin.noisy((*pose.orientation, *angular, *acceleration), noise)
     diagonal = [noise * noise if index % 4 == 0 else 0.0 for index in range(9)]
-    measured = (Quaternion(*noisy[:4]), Vector3(*noisy[4:7]), Vector3(*noisy[7:]))
-    # Each of them, then its covariance.
-    return ImuMsg(plugin.header(frame), *(part for each in measured for part in (each, diagonal)))
+    turn, rates, change = Quaternion(*noisy[:4]), Vector3(*noisy[4:7]), Vector3(*noisy[7:])
+    return ImuMsg(plugin.header(frame), turn, diagonal, rates, diagonal, change, diagonal)
 
 
 class Imu(PeriodicPlugin):

@@ -172,7 +172,7 @@ class Engine:
             if (found := grains.get(model.geom(index).name)) is not None:
                 self._grain_directions[index] = found.direction
                 self._frictions[index] = (found.mu, found.mu2)
-        self._has_grain: NDArray[np.bool_] = self._grain_directions.any(axis=1)
+        self._has_grain: NDArray[np.bool_] = (self._grain_directions != 0).any(axis=1)
         self._has_grains = bool(self._has_grain.any())
 
     def _turn_friction(self) -> bool:
