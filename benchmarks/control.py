@@ -7,18 +7,15 @@ cycles are those that the loop publishes on /diagnostics once a second. All traf
 
 from __future__ import annotations
 
-import argparse
 import math
-import os
-import socket
 import statistics
 import subprocess
 import sys
 import time
-from pathlib import Path
 from typing import NamedTuple
 
-BIN = Path(sys.executable).parent
+from cases import measure_cases
+
 WARM_UP = 3.0  # seconds of motion before the measurement
 COLUMNS = ("CPU, %", "cycle, us", "cycle p99, us", "jitter p99, us", "jitter max, us", "overruns", "states/s")
 
@@ -177,8 +174,8 @@ def measure(case: Case, seconds: float, node: list[str]) -> dict[str, float]:
         process.wait(20)
 
 
-def run_case(name: str, seconds: float, profile: str) -> None:
-    """Measure a case, and print its row."""
+def measure_row(name: str, seconds: float, profile: str) -> list[str]:
+    """Measure a case; return its row."""
     import rospy
 
     rospy.init_node("bench", disable_signals=True)
@@ -186,41 +183,16 @@ def run_case(name: str, seconds: float, profile: str) -> None:
     case = CASES[name]
     found = measure(case, seconds, [sys.executable, *program, __file__, "--node"])
     cells = (f"{found[key]:.0f}" if found[key] >= 100 else f"{found[key]:.1f}" for key in COLUMNS)
-    print(f"| {case.name} | {case.target:g} | {' | '.join(cells)} |", flush=True)
+    return [case.name, f"{case.target:g}", *cells]
 
 
 def main() -> int:
-    """Measure the cases, each with a master of its own; return the exit status."""
+    """Measure the cases; return the exit status."""
     if "--node" in sys.argv:
         from minirospy.ros.minirospy_hardware.loopback import main as loopback
 
         return loopback()
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("cases", nargs="*", choices=[[], *CASES], help="by default all")
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument(
-        "--profile", default="", metavar="FILE", help="write a profile of the node's main thread"
-    )
-    parser.add_argument("--worker", default="", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.worker:
-        run_case(options.worker, options.seconds, options.profile)
-        return 0
-    print(f"load {os.getloadavg()[0]:.1f}, Python {sys.version.split()[0]}\n")
-    print(f"| | target, % | {' | '.join(COLUMNS)} |\n|{'---|' * (2 + len(COLUMNS))}", flush=True)
-    for name in options.cases or CASES:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
-        core = subprocess.Popen([str(BIN / "roscore"), "-q", "-p", str(port)], env=environment)
-        try:
-            words = ["--worker", name, "--seconds", str(options.seconds), "--profile", options.profile]
-            subprocess.run([sys.executable, __file__, *words], env=environment, check=True)
-        finally:
-            core.terminate()
-            core.wait(20)
-    return 0
+    return measure_cases(__file__, __doc__, CASES, ("", "target, %", *COLUMNS), measure_row)
 
 
 if __name__ == "__main__":

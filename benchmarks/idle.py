@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import socket
 import statistics
 import subprocess
 import sys
@@ -23,8 +22,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import psutil
+from cases import BIN, free_port, wait_for_port
 
-BIN = Path(sys.executable).parent
 SETTLE = 4.0  # seconds until a process has started and has freed what the start needed
 COLUMNS = ("wake-ups/s", "CPU s/hour", "CPU us/message", "PSS, MB")
 
@@ -118,9 +117,7 @@ def running(stack: Stack, arguments: tuple[str, ...], environ: dict[str, str]) -
 
 def measure(stack: Stack, case: Case, seconds: float) -> dict[str, float]:
     """Return the figures of one case by column. Raise SystemExit if a process ends early."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with tempfile.TemporaryDirectory() as home, ExitStack() as open_now:
         environ = {
             **os.environ,
@@ -129,7 +126,7 @@ def measure(stack: Stack, case: Case, seconds: float) -> dict[str, float]:
             "ROS_MASTER_URI": f"http://localhost:{port}",
         }
         measured = [open_now.enter_context(running(stack, ("roscore", "-p", str(port)), environ))]
-        wait_for(port)
+        wait_for_port(port)
         if case.hz:
             programs: list[tuple[str, ...]] = [("-c", LISTENER), ("-c", TALKER, str(case.hz))]
         else:
@@ -151,16 +148,6 @@ def measure(stack: Stack, case: Case, seconds: float) -> dict[str, float]:
             "CPU us/message": 1e6 * cpu / case.hz if case.hz else math.nan,
             "PSS, MB": sum(each.memory_full_info().pss for each in everything) / 1e6,
         }
-
-
-def wait_for(port: int) -> None:
-    """Wait until a server listens on ``port``."""
-    while True:
-        try:
-            socket.create_connection(("127.0.0.1", port), 0.2).close()
-            return
-        except OSError:
-            time.sleep(0.02)
 
 
 def main() -> int:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import socket
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import psutil
+from cases import free_port
 
 from minirospy.base.errors import MinirospyError
 from minirospy.runtime.rpc.master_proxy import MasterProxy
@@ -89,9 +89,7 @@ def measure(
 
     ``settle``: seconds until the memory is measured.
     """
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with tempfile.TemporaryDirectory() as home:
         launch = write_launch(Path(home), count)
         uri = f"http://localhost:{port}"

@@ -19,6 +19,8 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
+from cases import free_port
+
 REAL = "/usr/bin/python3"
 RUNS = 3
 
@@ -233,9 +235,7 @@ MEASUREMENTS = {
 @functools.cache
 def our_master() -> int:
     """Start a minirospy master for this run; return its port."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
+    port = free_port()
     folder = tempfile.mkdtemp()
     master = subprocess.Popen(
         [str(Path(sys.executable).with_name("roscore")), "-p", str(port)],

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import socket
 import statistics
 import subprocess
 import sys
@@ -20,8 +19,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.sax.saxutils import escape
 
+from cases import BIN, free_port, wait_for_port
+
 WORKER = Path(__file__).parent / "worker.py"
-BIN = Path(sys.executable).parent
 STACKS = {
     "minirospy": (sys.executable, [str(BIN / "roscore"), "-q", "-p"]),
     "minirospy by TCP": (sys.executable, [str(BIN / "roscore"), "-q", "-p"]),
@@ -39,9 +39,7 @@ class Peers:
 
     def __init__(self, stack: str) -> None:
         self._python, master = STACKS[stack]
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         self._environment = {
             **os.environ,
             "ROS_HOSTNAME": "localhost",
@@ -50,12 +48,7 @@ class Peers:
         }
         quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         self._running = [subprocess.Popen([*master, str(port)], env=self._environment, **quiet)]
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", port), 0.2).close()
-                return
-            except OSError:
-                time.sleep(0.02)
+        wait_for_port(port)
 
     def __enter__(self) -> Peers:
         return self

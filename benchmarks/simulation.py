@@ -7,11 +7,8 @@ process's CPU time tells what an idle core would reach. All traffic is on loopba
 
 from __future__ import annotations
 
-import argparse
 import cProfile
 import math
-import os
-import socket
 import subprocess
 import sys
 import tempfile
@@ -20,7 +17,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-BIN = Path(sys.executable).parent
+from cases import BIN, measure_cases
+
 WARM_UP = 5.0  # seconds of motion before the measurement
 COLUMNS = ("CPU, %", "real-time factor", "per CPU second", "PSS, MB", "scans/s", "first scan, s")
 
@@ -272,48 +270,22 @@ def run_node(profile: str, words: list[str]) -> int:
     return status
 
 
-def run_case(name: str, seconds: float, profile: str) -> None:
-    """Measure a case, and print its row."""
+def measure_row(name: str, seconds: float, profile: str) -> list[str]:
+    """Measure a case; return its row."""
     import rospy
 
     rospy.init_node("bench", disable_signals=True, disable_rostime=True)
     case = CASES[name]
     command = [sys.executable, __file__, "--node", profile]
     found = measure_start(case) if name == "start" else measure(case, seconds, command)
-    cells = (f"{found[key]:.3g}" if key in found else "" for key in COLUMNS)
-    print(f"| {case.name} | {case.target} | {' | '.join(cells)} |", flush=True)
+    return [case.name, case.target, *(f"{found[key]:.3g}" if key in found else "" for key in COLUMNS)]
 
 
 def main() -> int:
-    """Measure the cases, each with a new master; return the exit status."""
+    """Measure the cases; return the exit status."""
     if sys.argv[1:2] == ["--node"]:
         return run_node(sys.argv[2], sys.argv[3:])
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("cases", nargs="*", choices=[[], *CASES], help="by default all")
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument(
-        "--profile", default="", metavar="FILE", help="write a profile of the simulation's thread"
-    )
-    parser.add_argument("--worker", default="", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.worker:
-        run_case(options.worker, options.seconds, options.profile)
-        return 0
-    print(f"load {os.getloadavg()[0]:.1f}, Python {sys.version.split()[0]}\n")
-    print(f"| | aim | {' | '.join(COLUMNS)} |\n|{'---|' * (2 + len(COLUMNS))}", flush=True)
-    for name in options.cases or CASES:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
-        core = subprocess.Popen([str(BIN / "roscore"), "-q", "-p", str(port)], env=environment)
-        try:
-            words = ["--worker", name, "--seconds", str(options.seconds), "--profile", options.profile]
-            subprocess.run([sys.executable, __file__, *words], env=environment, check=True)
-        finally:
-            core.terminate()
-            core.wait(20)
-    return 0
+    return measure_cases(__file__, __doc__, CASES, ("", "aim", *COLUMNS), measure_row)
 
 
 if __name__ == "__main__":

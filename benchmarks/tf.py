@@ -7,13 +7,13 @@ listeners at 1 kHz. Each listener looks up one transform ten times a second. All
 import argparse
 import json
 import os
-import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-BIN = Path(sys.executable).parent
+from cases import BIN, free_port, wait_for_port
+
 STACKS = {
     "minirospy": (sys.executable, [str(BIN / "roscore"), "-q", "-p"]),
     "tf2": ("/usr/bin/python3", ["/usr/bin/rosmaster", "--core", "-p"]),
@@ -146,9 +146,7 @@ def send(rate, transforms):
 def measure_listeners(stack, listeners, rate, transforms, seconds):
     """Return the results for all listeners: microseconds per message, share of a core, and messages per second for each."""
     python, master = STACKS[stack]
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     environment = {
         **os.environ,
         "ROS_MASTER_URI": f"http://localhost:{port}",
@@ -168,12 +166,7 @@ def measure_listeners(stack, listeners, rate, transforms, seconds):
         return program
 
     try:
-        while True:
-            try:
-                socket.create_connection(("127.0.0.1", port), 1).close()
-                break
-            except OSError:
-                time.sleep(0.05)
+        wait_for_port(port)
         # Use the same sender for both, because real rospy's reaches only a quarter of this rate.
         start(sys.executable, "--send", rate, transforms)
         programs = [start(python, "--listen", seconds) for _ in range(listeners)]

@@ -7,7 +7,7 @@ whatever it says. Source: https://www.khronos.org/files/collada_spec_1_4.pdf.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -77,8 +77,7 @@ class _Reader:
 
         result: list[Mesh] = []
         scene = _child(self._root, "scene")
-        instance = _child(scene, "instance_visual_scene") if scene else None
-        visual = self._by_id.get(_reference(instance.attributes.get("url", ""))) if instance else None
+        visual = self._target(_child(scene, "instance_visual_scene") if scene else None)
         if visual is None:
             visual = next(
                 (
@@ -117,16 +116,19 @@ class _Reader:
             elif tag == "instance_controller":
                 # A skin: its mesh at rest.
                 skin = _child(self._find(child, "controller"), "skin")
-                source = self._by_id.get(_reference(skin.attributes.get("source", ""))) if skin else None
+                source = self._target(skin, "source")
                 if source is not None:
                     self._add(source, name, self._bindings(child), matrix, result)
 
     def _find(self, instance: XmlElement, tag: str) -> XmlElement:
-        url = instance.attributes.get("url", "")
-        target = self._by_id.get(_reference(url))
+        target = self._target(instance)
         if target is None or _tag(target) != tag:
-            raise MeshError(f"this Collada file has no {tag} '{url[:60]}'")
+            raise MeshError(f"this Collada file has no {tag} '{instance.attributes.get('url', '')[:60]}'")
         return target
+
+    def _target(self, element: XmlElement | None, key: str = "url") -> XmlElement | None:
+        """Return the element to which an attribute refers, or None."""
+        return self._by_id.get(_reference(element.attributes.get(key, ""))) if element is not None else None
 
     def _add(
         self,
@@ -174,7 +176,7 @@ class _Reader:
                 continue
             inputs = list(_children(element, "input"))
             width = max((int(each.attributes.get("offset", "0")) for each in inputs), default=0) + 1
-            vertex = next((each for each in inputs if each.attributes.get("semantic") == "VERTEX"), None)
+            vertex = _input(inputs, "VERTEX")
             if vertex is None:
                 raise MeshError("primitives of this Collada file have no vertices")
             offset = int(vertex.attributes.get("offset", "0"))
@@ -197,7 +199,7 @@ class _Reader:
         self, inputs: list[XmlElement], indices: NDArray[np.int32], corners: NDArray[np.int32]
     ) -> Texcoords | None:
         """Return the places of triangles' corners in the texture, or None if the file has none that can be used."""
-        found = next((each for each in inputs if each.attributes.get("semantic") == "TEXCOORD"), None)
+        found = _input(inputs, "TEXCOORD")
         if found is None:
             return None
         try:
@@ -212,10 +214,7 @@ class _Reader:
     def _positions(self, url: str) -> Matrix:
         source = self._by_id.get(_reference(url))
         if source is not None and _tag(source) == "vertices":
-            rows = [
-                each for each in _children(source, "input") if each.attributes.get("semantic") == "POSITION"
-            ]
-            source = self._by_id.get(_reference(rows[0].attributes.get("source", ""))) if rows else None
+            source = self._target(_input(_children(source, "input"), "POSITION"), "source")
         values = self._values(source.attributes.get("id", ""), 3) if source is not None else None
         if values is None:
             raise MeshError(f"this Collada file has no positions '{url[:60]}' with three coordinates")
@@ -248,12 +247,7 @@ class _Reader:
 
     def _material(self, name: str) -> MeshMaterial:
         material = self._by_id.get(name)
-        effect_instance = _child(material, "instance_effect") if material is not None else None
-        effect = (
-            self._by_id.get(_reference(effect_instance.attributes.get("url", "")))
-            if effect_instance
-            else None
-        )
+        effect = self._target(_child(material, "instance_effect") if material is not None else None)
         if effect is None:
             return MeshMaterial(name)
         diffuse = _descendant(effect, "diffuse")
@@ -356,6 +350,10 @@ def _children(element: XmlElement, tag: str) -> Iterator[XmlElement]:
 
 def _child(element: XmlElement, tag: str) -> XmlElement | None:
     return next(_children(element, tag), None)
+
+
+def _input(inputs: Iterable[XmlElement], semantic: str) -> XmlElement | None:
+    return next((each for each in inputs if each.attributes.get("semantic") == semantic), None)
 
 
 def _descendant(element: XmlElement, tag: str) -> XmlElement | None:

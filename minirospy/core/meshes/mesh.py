@@ -81,6 +81,18 @@ class Mesh:
         vertices = self.vertices @ matrix.T + offset
         return Mesh(vertices, triangles, self.name, self.materials, self.material_of, texcoords)
 
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Return the corners of the triangles (m, 3, 3)."""
+        return self.vertices[self.triangles]
+
+    @property
+    def crosses(self) -> NDArray[np.float64]:
+        """Return a vector (m, 3) for each triangle: its normal, as long as twice its area."""
+        corners = self.corners
+        crosses: NDArray[np.float64] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return crosses
+
     def scaled(self, scale: Vector) -> Mesh:
         """Return the mesh, scaled along the axes."""
         return self if scale == (1.0, 1.0, 1.0) else self.transformed(np.diag(scale), np.zeros(3))

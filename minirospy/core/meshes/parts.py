@@ -91,9 +91,7 @@ def is_convex(part: Mesh) -> bool:
     triangles, vertices = part.triangles, part.vertices
     if len(triangles) < 4 or len(triangles) > MAX_CONVEX:
         return False
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
-        np.int64
-    )
+    edges = _edges(triangles)
     forward = edges[:, 0] * len(vertices) + edges[:, 1]
     backward = edges[:, 1] * len(vertices) + edges[:, 0]
     if len(np.unique(forward)) != len(forward) or not np.array_equal(np.sort(forward), np.sort(backward)):
@@ -115,8 +113,7 @@ def is_hollow(part: Mesh) -> bool:
     """Return whether a mesh's hull is much larger: rays away from much of its surface hit the mesh again."""
     if is_convex(part) or len(part.triangles) < 4:
         return False
-    corners = part.vertices[part.triangles]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    corners, crosses = part.corners, part.crosses
     areas = np.linalg.norm(crosses, axis=1)
     count = max(1, min(MAX_RAYS, MAX_TESTS // len(areas)))
     chosen = np.argsort(-areas, kind="stable")[:count]
@@ -165,9 +162,14 @@ def _compact(vertices: Points, triangles: Triangles) -> Mesh:
     return Mesh(vertices[used], index.reshape(-1, 3).astype(np.int32))
 
 
+def _edges(triangles: Triangles) -> NDArray[np.int64]:
+    """Return the edges (3 n, 2) of triangles as they are passed: all first ones, all second ones, all third ones."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    return edges.astype(np.int64)
+
+
 def _normals(mesh: Mesh) -> Points:
-    corners = mesh.vertices[mesh.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = mesh.crosses
     lengths: Points = np.linalg.norm(normals, axis=1, keepdims=True)
     result: Points = normals / np.maximum(lengths, 1e-300)
     return result
@@ -233,9 +235,9 @@ def _simplified(mesh: Mesh, cell: float) -> Mesh:
 
 def _has_area(mesh: Mesh) -> NDArray[np.bool_]:
     """Return for each triangle whether it has an area."""
-    corners = mesh.vertices[mesh.triangles]
+    corners = mesh.corners
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    areas = np.linalg.norm(np.cross(first, second), axis=1)
+    areas = np.linalg.norm(mesh.crosses, axis=1)
     longest = np.maximum((first * first).sum(axis=1), (second * second).sum(axis=1))
     result: NDArray[np.bool_] = areas > 1e-9 * longest
     return result
@@ -244,10 +246,7 @@ def _has_area(mesh: Mesh) -> NDArray[np.bool_]:
 def _coplanar(mesh: Mesh, normals: Points) -> list[NDArray[np.int64]]:
     """Return groups of triangles that are connected by edges and lie in one plane."""
     count = len(mesh.triangles)
-    triangles = mesh.triangles.astype(np.int64)
-    edges = np.sort(
-        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
-    )
+    edges = np.sort(_edges(mesh.triangles), axis=1)
     owners = np.tile(np.arange(count), 3)
     keys = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
     order = np.argsort(keys, kind="stable")
@@ -269,10 +268,7 @@ def _convex_outline(mesh: Mesh, rows: NDArray[np.int64], normal: Points) -> Poin
     second = np.cross(normal, first)
     flat = np.stack([points @ first, points @ second], axis=1)
     hull = _hull(flat)
-    corners = mesh.vertices[mesh.triangles[rows]]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    ).sum()
+    area = np.linalg.norm(Mesh(mesh.vertices, mesh.triangles[rows]).crosses, axis=1).sum()
     x, y = flat[hull].T
     whole = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
     return points[hull] if abs(whole - area) <= 1e-4 * whole else None
@@ -303,7 +299,7 @@ def _depths(mesh: Mesh, patches: list[tuple[Points, Points]]) -> Points:
     depths = np.full(len(patches), THICKNESS)
     if len(patches) * len(mesh.triangles) > 20_000_000:
         return depths
-    corners = mesh.vertices[mesh.triangles]
+    corners = mesh.corners
     for index, (outline, normal) in enumerate(patches):
         hits = _hits(corners, outline.mean(axis=0), -normal)
         if len(hits):

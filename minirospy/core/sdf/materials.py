@@ -21,90 +21,63 @@ _COLOR = re.compile(r"^\s*(ambient|diffuse|emissive)\s+([\d.eE+\- \t]+)", re.MUL
 _TEXTURE = re.compile(r"^\s*texture\s+(\S+)", re.MULTILINE)
 
 
-def _opaque(*red_green_blue: float) -> Color:
-    red, green, blue = red_green_blue
-    return red, green, blue, 1.0
-
-
-# Diffuse colours. Materials with a picture have the picture's average colour.
-_COLORS: dict[str, Color] = {
-    "Grey": _opaque(0.7, 0.7, 0.7),
-    "Gray": _opaque(0.7, 0.7, 0.7),
-    "DarkGrey": _opaque(0.175, 0.175, 0.175),
-    "DarkGray": _opaque(0.175, 0.175, 0.175),
-    "LightGrey": _opaque(0.8, 0.8, 0.8),
-    "White": _opaque(1.0, 1.0, 1.0),
-    "FlatBlack": _opaque(0.1, 0.1, 0.1),
-    "Black": _opaque(0.0, 0.0, 0.0),
-    "Red": _opaque(1.0, 0.0, 0.0),
-    "RedBright": _opaque(0.87, 0.26, 0.07),
-    "Green": _opaque(0.0, 1.0, 0.0),
-    "Blue": _opaque(0.0, 0.0, 1.0),
-    "SkyBlue": _opaque(0.13, 0.44, 0.7),
-    "Yellow": _opaque(1.0, 1.0, 0.0),
-    "ZincYellow": _opaque(0.9725, 0.9529, 0.2078),
-    "DarkYellow": _opaque(0.7, 0.7, 0.0),
-    "Purple": _opaque(1.0, 0.0, 1.0),
-    "Turquoise": _opaque(0.0, 1.0, 1.0),
-    "Orange": _opaque(1.0, 0.5088, 0.0468),
-    "Indigo": _opaque(0.33, 0.0, 0.5),
-    "Gold": _opaque(0.8, 0.64869, 0.120759),
-    "Pioneer2Body": _opaque(0.681193, 0.000923, 0.000923),
-    "PioneerBody": _opaque(0.8, 0.1, 0.1),
-    "Wood": _opaque(0.62, 0.44, 0.26),
-    "WoodFloor": _opaque(0.55, 0.36, 0.2),
-    "WoodPallet": _opaque(0.7, 0.55, 0.35),
-    "WoodTexture": _opaque(0.62, 0.44, 0.26),
-    "Bricks": _opaque(0.6, 0.32, 0.25),
-    "CeilingTiled": _opaque(0.85, 0.85, 0.82),
-    "PaintedWall": _opaque(0.85, 0.82, 0.75),
-    "WindowFrame": _opaque(0.75, 0.75, 0.75),
-    "BuildingFrame": _opaque(0.75, 0.75, 0.75),
-    "Road": _opaque(0.25, 0.25, 0.25),
-    "Residential": _opaque(0.3, 0.3, 0.3),
-    "Tertiary": _opaque(0.3, 0.3, 0.3),
-    "Motorway": _opaque(0.25, 0.25, 0.25),
-    "Primary": _opaque(0.25, 0.25, 0.25),
-    "Secondary": _opaque(0.25, 0.25, 0.25),
-    "Lane_1": _opaque(0.25, 0.25, 0.25),
-    "Lanes_2": _opaque(0.25, 0.25, 0.25),
-    "Lanes_4": _opaque(0.25, 0.25, 0.25),
-    "Lanes_6": _opaque(0.25, 0.25, 0.25),
-    "Runway": _opaque(0.25, 0.25, 0.25),
-    "Pedestrian": _opaque(0.55, 0.55, 0.53),
-    "Footway": _opaque(0.55, 0.55, 0.53),
-    "Steps": _opaque(0.55, 0.55, 0.53),
-    "Grass": _opaque(0.25, 0.45, 0.15),
-    "Trunk": _opaque(0.4, 0.28, 0.18),
-    "JointAnchor": _opaque(1.0, 1.0, 1.0),
-    "CoM": _opaque(0.9, 0.9, 0.3),
-    "RedTransparent": (1.0, 0.0, 0.0, 0.5),
-    "GreenTransparent": (0.0, 1.0, 0.0, 0.5),
-    "BlueTransparent": (0.0, 0.0, 1.0, 0.5),
-    "GreyTransparent": (0.5, 0.5, 0.5, 0.5),
-    "BlackTransparent": (0.0, 0.0, 0.0, 0.5),
-    "YellowTransparent": (1.0, 1.0, 0.0, 0.5),
-    "OrangeTransparent": (1.0, 0.44, 0.0, 0.4),
-    "DarkMagentaTransparent": (0.6, 0.0, 0.6, 0.5),
-    "BlueLaser": (0.0, 0.0, 1.0, 0.4),
-    "LightBlueLaser": (0.5, 0.5, 1.0, 0.4),
-    "RedTransparentOverlay": (1.0, 0.0, 0.0, 0.5),
-    "GreenTransparentOverlay": (0.0, 1.0, 0.0, 0.5),
-    "BlueTransparentOverlay": (0.0, 0.0, 1.0, 0.5),
-    "OrangeTransparentOverlay": (1.0, 0.5, 0.0, 0.5),
-    "DarkOrangeTransparentOverlay": (0.7, 0.35, 0.0, 0.5),
+# Diffuse colours, and the names of the materials that have them. Those with a picture have the picture's average colour.
+_TABLE: dict[Color, str] = {
+    (0.7, 0.7, 0.7, 1.0): "Grey Gray",
+    (0.175, 0.175, 0.175, 1.0): "DarkGrey DarkGray",
+    (0.8, 0.8, 0.8, 1.0): "LightGrey",
+    (1.0, 1.0, 1.0, 1.0): "White JointAnchor",
+    (0.1, 0.1, 0.1, 1.0): "FlatBlack",
+    (0.0, 0.0, 0.0, 1.0): "Black",
+    (1.0, 0.0, 0.0, 1.0): "Red",
+    (0.87, 0.26, 0.07, 1.0): "RedBright",
+    (0.0, 1.0, 0.0, 1.0): "Green",
+    (0.0, 0.0, 1.0, 1.0): "Blue",
+    (0.13, 0.44, 0.7, 1.0): "SkyBlue",
+    (1.0, 1.0, 0.0, 1.0): "Yellow",
+    (0.9725, 0.9529, 0.2078, 1.0): "ZincYellow",
+    (0.7, 0.7, 0.0, 1.0): "DarkYellow",
+    (1.0, 0.0, 1.0, 1.0): "Purple",
+    (0.0, 1.0, 1.0, 1.0): "Turquoise",
+    (1.0, 0.5088, 0.0468, 1.0): "Orange",
+    (0.33, 0.0, 0.5, 1.0): "Indigo",
+    (0.8, 0.64869, 0.120759, 1.0): "Gold",
+    (0.681193, 0.000923, 0.000923, 1.0): "Pioneer2Body",
+    (0.8, 0.1, 0.1, 1.0): "PioneerBody",
+    (0.62, 0.44, 0.26, 1.0): "Wood WoodTexture",
+    (0.55, 0.36, 0.2, 1.0): "WoodFloor",
+    (0.7, 0.55, 0.35, 1.0): "WoodPallet",
+    (0.6, 0.32, 0.25, 1.0): "Bricks",
+    (0.85, 0.85, 0.82, 1.0): "CeilingTiled",
+    (0.85, 0.82, 0.75, 1.0): "PaintedWall",
+    (0.75, 0.75, 0.75, 1.0): "WindowFrame BuildingFrame",
+    (0.25, 0.25, 0.25, 1.0): "Road Motorway Primary Secondary Lane_1 Lanes_2 Lanes_4 Lanes_6 Runway",
+    (0.3, 0.3, 0.3, 1.0): "Residential Tertiary",
+    (0.55, 0.55, 0.53, 1.0): "Pedestrian Footway Steps",
+    (0.25, 0.45, 0.15, 1.0): "Grass",
+    (0.4, 0.28, 0.18, 1.0): "Trunk",
+    (0.9, 0.9, 0.3, 1.0): "CoM",
+    (1.0, 0.0, 0.0, 0.5): "RedTransparent RedTransparentOverlay",
+    (0.0, 1.0, 0.0, 0.5): "GreenTransparent GreenTransparentOverlay",
+    (0.0, 0.0, 1.0, 0.5): "BlueTransparent BlueTransparentOverlay",
+    (0.5, 0.5, 0.5, 0.5): "GreyTransparent",
+    (0.0, 0.0, 0.0, 0.5): "BlackTransparent",
+    (1.0, 1.0, 0.0, 0.5): "YellowTransparent",
+    (1.0, 0.44, 0.0, 0.4): "OrangeTransparent",
+    (0.6, 0.0, 0.6, 0.5): "DarkMagentaTransparent",
+    (0.0, 0.0, 1.0, 0.4): "BlueLaser",
+    (0.5, 0.5, 1.0, 0.4): "LightBlueLaser",
+    (1.0, 0.5, 0.0, 0.5): "OrangeTransparentOverlay",
+    (0.7, 0.35, 0.0, 0.5): "DarkOrangeTransparentOverlay",
 }
-_GLOWING: dict[str, Color] = {
-    "WhiteGlow": _opaque(1.0, 1.0, 1.0),
-    "RedGlow": _opaque(1.0, 0.0, 0.0),
-    "GreenGlow": _opaque(0.0, 1.0, 0.0),
-    "BlueGlow": _opaque(0.0, 0.0, 1.0),
-    "YellowGlow": _opaque(1.0, 1.0, 0.0),
-    "PurpleGlow": _opaque(1.0, 0.0, 1.0),
-    "TurquoiseGlow": _opaque(0.0, 1.0, 1.0),
-    "TurquoiseGlowOutline": _opaque(0.0, 1.0, 1.0),
-    "LightOn": _opaque(0.0, 1.0, 0.0),
-    "LightOff": _opaque(1.0, 0.0, 0.0),
+_COLORS = {name: color for color, names in _TABLE.items() for name in names.split()}
+_GLOWING = {
+    f"{name}Glow": _COLORS[name]
+    for name in ["White", "Red", "Green", "Blue", "Yellow", "Purple", "Turquoise"]
+} | {
+    "TurquoiseGlowOutline": _COLORS["Turquoise"],
+    "LightOn": _COLORS["Green"],
+    "LightOff": _COLORS["Red"],
 }
 
 
@@ -211,7 +184,7 @@ def _block_material(name: str, block: str, folders: list[str]) -> Material:
             colors.setdefault(match.group(1), (red, green, blue, numbers[3] if len(numbers) > 3 else 1.0))
     texture = _TEXTURE.search(block)
     picture = _picture(texture.group(1), folders) if texture else ""
-    white = _opaque(1.0, 1.0, 1.0) if picture else None
+    white = (1.0, 1.0, 1.0, 1.0) if picture else None
     emissive = colors.get("emissive")
     if emissive is not None and not any(emissive[:3]):
         emissive = None

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 from minirospy.base.errors import SdfError
 from minirospy.core.sdf.model import (
-    IDENTITY,
     Axis,
     Inertial,
     Light,
@@ -114,8 +113,7 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
     inertia = (xx, xy, xz, yy, yz, zz)
     if not is_static and min(inertia[index] for index in _DIAGONAL) <= 0.0:
         source.warn(element, f"link [{name}] has an inertia of 0 or less, which is not possible")
-    pose = element.first("pose")
-    return Inertial(mass, IDENTITY if pose is None else pose_of(pose), inertia)
+    return Inertial(mass, pose_of(element), inertia)
 
 
 def read_axis(element: Element | None, source: Source, turned: Callable[[Element, Vector], Vector]) -> Axis:

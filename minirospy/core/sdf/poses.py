@@ -9,7 +9,10 @@ from minirospy.core.tf2.rotation import multiply, rotate
 from minirospy.core.urdf.poses import quaternion_from_rpy
 
 __all__ = [
+    "add",
     "compose",
+    "cross",
+    "difference",
     "inverse",
     "multiply",
     "normalized",
@@ -42,6 +45,23 @@ def normalized(rotation: Quaternion) -> Quaternion:
         return 0.0, 0.0, 0.0, 1.0
     x, y, z, w = rotation
     return x / length, y / length, z / length, w / length
+
+
+def add(left: Vector, right: Vector) -> Vector:
+    """Return the sum of two vectors."""
+    return left[0] + right[0], left[1] + right[1], left[2] + right[2]
+
+
+def difference(left: Vector, right: Vector) -> Vector:
+    """Return ``left - right``."""
+    return left[0] - right[0], left[1] - right[1], left[2] - right[2]
+
+
+def cross(left: Vector, right: Vector) -> Vector:
+    """Return the cross product of two vectors."""
+    ax, ay, az = left
+    bx, by, bz = right
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def unit(vector: Vector) -> Vector | None:

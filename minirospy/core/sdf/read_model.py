@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from minirospy.core.sdf.frames import MODEL, Frame, FrameError, Frames
 from minirospy.core.sdf.includes import Included, open_include
 from minirospy.core.sdf.model import (
     IDENTITY,
-    Collision,
     Joint,
-    Light,
     Link,
     Mimic,
     Model,
     Plugin,
     Pose,
-    Sensor,
     Vector,
-    Visual,
 )
 from minirospy.core.sdf.parts import (
     read_axis,
@@ -35,6 +32,8 @@ from minirospy.core.sdf.source import Source
 from minirospy.core.sdf.text import Element
 
 __all__ = ["read_included_model", "read_model"]
+
+_Part = TypeVar("_Part")
 
 _WORLD = "world"
 _KINDS = {
@@ -57,11 +56,8 @@ def read_model(element: Element, source: Source, name: str = "", is_static: bool
     """
     source = replace(source, warnings=[])
     reader = _Reader(element, source, name or source.name(element), is_static)
-    pose = element.first("pose")
     model = reader.read()
-    return replace(
-        model, pose=source.pose(pose) if pose is not None else IDENTITY, warnings=tuple(source.warnings)
-    )
+    return replace(model, pose=source.pose_of(element), warnings=tuple(source.warnings))
 
 
 def read_included_model(included: Included, source: Source) -> Model:
@@ -70,10 +66,9 @@ def read_included_model(included: Included, source: Source) -> Model:
     Raise SdfError if the model cannot be used.
     """
     model = read_model(included.entity, included.source, included.name, included.is_static)
-    pose = included.element.first("pose")
     return replace(
         model,
-        pose=model.pose if pose is None else source.pose(pose),
+        pose=source.pose_of(included.element, model.pose),
         plugins=model.plugins + read_plugins(included.element, source),
     )
 
@@ -258,8 +253,7 @@ class _Reader:
 
     def _in_link(self, part: Element, link: str) -> Pose:
         """Return the pose of a link's part in the link."""
-        pose = part if part.tag == "pose" else part.first("pose")
-        frame, value = self._placed(pose, link)
+        frame, value = self._placed(part.first("pose"), link)
         try:
             return self.frames.relative(value, frame, link)
         except FrameError as error:
@@ -279,14 +273,18 @@ class _Reader:
                     "Gazebo loads plugins of models and sensors only",
                 )
         decay = element.first("velocity_decay")
+
+        def pose_of(part: Element) -> Pose:
+            return self._in_link(part, name)
+
         return Link(
             name,
             self._in_model(name, element),
-            read_inertial(element, source, static, lambda pose: self._in_link(pose, name)),
-            tuple(self._collisions(name, element)),
-            tuple(self._visuals(name, element)),
-            tuple(self._sensors(name, element, lambda part: self._in_link(part, name))),
-            tuple(self._lights(name, element)),
+            read_inertial(element, source, static, pose_of),
+            self._parts(element, "collision", read_collision, pose_of),
+            self._parts(element, "visual", read_visual, pose_of),
+            self._parts(element, "sensor", read_sensor, pose_of),
+            self._parts(element, "light", read_light, pose_of),
             source.flag(element, "gravity", True),
             source.flag(element, "kinematic", False),
             source.flag(element, "self_collide", self_collide),
@@ -294,27 +292,16 @@ class _Reader:
             source.amount(decay, "angular", 0.0),
         )
 
-    def _collisions(self, link: str, element: Element) -> Iterator[Collision]:
-        for part in element.all("collision"):
-            collision = read_collision(part, self._in_link(part, link), self.source)
-            if collision is not None:
-                yield collision
-
-    def _visuals(self, link: str, element: Element) -> Iterator[Visual]:
-        for part in element.all("visual"):
-            visual = read_visual(part, self._in_link(part, link), self.source)
-            if visual is not None:
-                yield visual
-
-    def _sensors(self, owner: str, element: Element, pose_of: Callable[[Element], Pose]) -> Iterator[Sensor]:
-        for part in element.all("sensor"):
-            sensor = read_sensor(part, pose_of(part), self.source)
-            if sensor is not None:
-                yield sensor
-
-    def _lights(self, link: str, element: Element) -> Iterator[Light]:
-        for part in element.all("light"):
-            yield read_light(part, self._in_link(part, link), self.source)
+    def _parts(
+        self,
+        element: Element,
+        tag: str,
+        read: Callable[[Element, Pose, Source], _Part | None],
+        pose_of: Callable[[Element], Pose],
+    ) -> tuple[_Part, ...]:
+        """Return the children with a tag that can be used."""
+        parts = (read(part, pose_of(part), self.source) for part in element.all(tag))
+        return tuple(part for part in parts if part is not None)
 
     # ---- joints
 
@@ -344,7 +331,7 @@ class _Reader:
             parent, child = child, parent
             axis, axis2 = (each._replace(xyz=_negative(each.xyz)) for each in (axis, axis2))
         pose = relative(links[child].pose, here)
-        sensors = tuple(self._sensors(name, element, self._in_joint))
+        sensors = self._parts(element, "sensor", read_sensor, source.pose_of)
         return Joint(name, kind, parent, child, pose, axis, axis2, read_mimic(axis_element, source), sensors)
 
     def _kind(self, name: str, element: Element) -> str | None:
@@ -363,10 +350,6 @@ class _Reader:
                 break
             name = self.attached[name]
         return name
-
-    def _in_joint(self, part: Element) -> Pose:
-        pose = part.first("pose")
-        return IDENTITY if pose is None else self.source.pose(pose)
 
     def _turner(self, joint: Pose, element: Element) -> Callable[[Element, Vector], Vector]:
         """Return a function that turns an axis into the joint's frame. Before SDF 1.5 axes are given in the model's frame."""

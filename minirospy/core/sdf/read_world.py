@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from minirospy.base.errors import SdfError
 from minirospy.core.sdf.includes import open_include
 from minirospy.core.sdf.model import (
-    IDENTITY,
     MIN_STEP,
     Color,
     Light,
@@ -156,10 +155,8 @@ class _Reader:
         if included.entity.tag == "model":
             self._add(read_included_model(included, source), child)
         elif included.entity.tag == "light":
-            pose = child.first("pose") or included.entity.first("pose")
-            light = read_light(
-                included.entity, IDENTITY if pose is None else source.pose(pose), included.source
-            )
+            pose = source.pose_of(child if child.first("pose") is not None else included.entity)
+            light = read_light(included.entity, pose, included.source)
             self._add_light(light._replace(name=included.name or light.name), child)
         else:
             source.warn(child, f"{_title(child)}: <{included.entity.tag}> is not simulated")
@@ -169,10 +166,7 @@ class _Reader:
         self.models.append(replace(model, name=name))
 
     def _light(self, child: Element) -> None:
-        pose = child.first("pose")
-        self._add_light(
-            read_light(child, IDENTITY if pose is None else self.source.pose(pose), self.source), child
-        )
+        self._add_light(read_light(child, self.source.pose_of(child), self.source), child)
 
     def _add_light(self, light: Light, child: Element) -> None:
         self.lights.append(light._replace(name=self._unused(light.name, child)))
@@ -203,9 +197,8 @@ class _Reader:
             self.camera = self.source.pose(pose)
 
     def _state_pose(self, part: Element | None, default: Pose) -> Pose:
-        pose = part.first("pose") if part is not None else None
         try:
-            return default if pose is None else self.source.pose(pose)
+            return default if part is None else self.source.pose_of(part, default)
         except SdfError as error:
             self.source.warnings.append(f"a pose in <state> is not used: {error}")
             return default

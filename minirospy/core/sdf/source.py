@@ -9,10 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from minirospy.base.errors import SdfError
-from minirospy.core.sdf.model import Color, Pose, Vector
-from minirospy.core.sdf.poses import pose_from_rpy
+from minirospy.core.sdf.model import IDENTITY, Color, Pose, Vector
+from minirospy.core.sdf.poses import normalized, pose_from_rpy
 from minirospy.core.sdf.text import Element, parse_document
-from minirospy.core.urdf.poses import quaternion_from_rpy
 
 __all__ = ["MAX_PARTS", "Resolve", "Shared", "Source", "no_files"]
 
@@ -157,8 +156,7 @@ class Source:
 
     def number(self, element: Element | None, tag: str, default: float, *, infinite: bool = False) -> float:
         """Return a child's number. Raise SdfError if it is not a number, or infinite and ``infinite`` is false."""
-        child = element.first(tag) if element else None
-        if child is None or not child.text.strip():
+        if (child := _given(element, tag)) is None:
             return default
         return (self.numbers if infinite else self.finite)(child, (1,))[0]
 
@@ -172,19 +170,22 @@ class Source:
 
     def vector(self, element: Element | None, tag: str, default: Vector) -> Vector:
         """Return a child's three numbers."""
-        child = element.first(tag) if element else None
-        if child is None or not child.text.strip():
+        if (child := _given(element, tag)) is None:
             return default
         x, y, z = self.finite(child, (3,))
         return x, y, z
 
     def color(self, element: Element | None, tag: str, default: Color | None) -> Color | None:
         """Return a child's colour; without an opacity it is opaque."""
-        child = element.first(tag) if element else None
-        if child is None or not child.text.strip():
+        if (child := _given(element, tag)) is None:
             return default
         red, green, blue, *opacity = (min(max(value, 0.0), 1.0) for value in self.finite(child, (3, 4)))
         return red, green, blue, opacity[0] if opacity else 1.0
+
+    def pose_of(self, element: Element, default: Pose = IDENTITY) -> Pose:
+        """Return the pose in the child ``<pose>``, or the default if there is none."""
+        pose = element.first("pose")
+        return default if pose is None else self.pose(pose)
 
     def pose(self, element: Element) -> Pose:
         """Return the pose in an element's text: ``x y z roll pitch yaw``, or with a quaternion (``rotation_format``)."""
@@ -192,15 +193,10 @@ class Source:
             return Pose()
         if element.attributes.get("rotation_format") == "quat_xyzw":
             x, y, z, qx, qy, qz, qw = self.finite(element, (7,))
-            length = math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
-            if not length:
-                return Pose((x, y, z))
-            return Pose((x, y, z), (qx / length, qy / length, qz / length, qw / length))
+            return Pose((x, y, z), normalized((qx, qy, qz, qw)))
         x, y, z, roll, pitch, yaw = self.finite(element, (6,))
         if element.attributes.get("degrees", "").strip().lower() in _TRUE:
-            return Pose(
-                (x, y, z), quaternion_from_rpy(math.radians(roll), math.radians(pitch), math.radians(yaw))
-            )
+            roll, pitch, yaw = math.radians(roll), math.radians(pitch), math.radians(yaw)
         return pose_from_rpy((x, y, z), (roll, pitch, yaw))
 
     def finite(self, element: Element, counts: tuple[int, ...]) -> list[float]:
@@ -233,6 +229,12 @@ class Source:
                 f"<{element.tag}> has {len(values)} numbers instead of {expected}: '{_short(element.text)}'",
             )
         return values
+
+
+def _given(element: Element | None, tag: str) -> Element | None:
+    """Return the first child with this tag, or None if it is missing or empty."""
+    child = element.first(tag) if element else None
+    return child if child is not None and child.text.strip() else None
 
 
 def _read(path: str) -> bytes:

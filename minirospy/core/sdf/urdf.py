@@ -12,7 +12,7 @@ Source: http://sdformat.org/tutorials?tut=pose_frame_semantics, https://classic.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from minirospy.base.errors import SdfError, UrdfError
@@ -326,11 +326,8 @@ class _Converter:
             elif tag == "dampingFactor":
                 if link.first("velocity_decay") is not None:
                     continue
-                decay = new_element(
-                    "velocity_decay", "", new_element("linear", _value(child), line=child.line),
-                    new_element("angular", _value(child), line=child.line), line=child.line,
-                )  # fmt: skip
-                link.children.append(decay)
+                values = {"linear": _value(child), "angular": _value(child)}
+                link.children.append(_record("velocity_decay", values, child.line))
             elif tag == "selfCollide":
                 _replace(
                     link, "self_collide", "true" if _value(child).lower() in _TRUE else "false", child.line
@@ -388,31 +385,22 @@ class _Converter:
         return str(joint.type.value)
 
     def _axis(self, joint: UrdfJoint) -> Element:
-        axis, limit = new_element("axis", line=joint.line), new_element("limit", line=joint.line)
+        axis = new_element("axis", line=joint.line)
         if joint.type is JointType.FIXED:
-            limit.children += [new_element("lower", "0"), new_element("upper", "0")]
-            axis.children.append(limit)
+            axis.children.append(_record("limit", {"lower": "0", "upper": "0"}, joint.line))
             return axis
         axis.children.append(new_element("xyz", _numbers(*joint.axis), line=joint.line))
         if joint.limit is not None:
             values = {"effort": joint.limit.effort, "velocity": joint.limit.velocity}
             if joint.type is not JointType.CONTINUOUS:
                 values = {"lower": joint.limit.lower, "upper": joint.limit.upper, **values}
-            limit.children += [new_element(tag, _numbers(value)) for tag, value in values.items()]
-            axis.children.append(limit)
+            axis.children.append(_record("limit", values, joint.line))
         if joint.dynamics is not None:
-            dynamics = new_element("dynamics")
-            dynamics.children += [
-                new_element("damping", _numbers(joint.dynamics.damping)),
-                new_element("friction", _numbers(joint.dynamics.friction)),
-            ]
-            axis.children.append(dynamics)
+            values = {"damping": joint.dynamics.damping, "friction": joint.dynamics.friction}
+            axis.children.append(_record("dynamics", values))
         if joint.mimic is not None:
-            mimic = new_element("mimic", attributes={"joint": joint.mimic.joint})
-            mimic.children += [
-                new_element("multiplier", _numbers(joint.mimic.multiplier)),
-                new_element("offset", _numbers(joint.mimic.offset)),
-            ]
+            mimic = _record("mimic", {"multiplier": joint.mimic.multiplier, "offset": joint.mimic.offset})
+            mimic.attributes["joint"] = joint.mimic.joint
             axis.children.append(mimic)
         return axis
 
@@ -474,21 +462,17 @@ def _shape(tag: str, name: str, pose: Pose, origin: Origin, geometry: Geometry, 
 
 def _geometry(geometry: Geometry, line: int) -> Element:
     if isinstance(geometry, Box):
-        return new_element("box", "", new_element("size", _numbers(*geometry.size), line=line), line=line)
+        return _record("box", {"size": _numbers(*geometry.size)}, line)
     if isinstance(geometry, Cylinder):
-        parts = (("radius", geometry.radius), ("length", geometry.length))
-        children = (new_element(tag, _numbers(value), line=line) for tag, value in parts)
-        return new_element("cylinder", "", *children, line=line)
+        return _record("cylinder", {"radius": geometry.radius, "length": geometry.length}, line)
     if isinstance(geometry, Mesh):
-        scale = new_element("scale", _numbers(*geometry.scale), line=line)
-        return new_element("mesh", "", new_element("uri", geometry.filename, line=line), scale, line=line)
-    return new_element("sphere", "", new_element("radius", _numbers(geometry.radius), line=line), line=line)
+        return _record("mesh", {"uri": geometry.filename, "scale": _numbers(*geometry.scale)}, line)
+    return _record("sphere", {"radius": geometry.radius}, line)
 
 
 def _inertial(inertial: Inertial) -> Element:
     keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    values = zip(keys, inertial.inertia, strict=True)
-    inertia = new_element("inertia", "", *(new_element(key, _numbers(value)) for key, value in values))
+    inertia = _record("inertia", dict(zip(keys, inertial.inertia, strict=True)))
     mass = new_element("mass", _numbers(inertial.mass))
     return new_element("inertial", "", mass, _pose_element(inertial.pose), inertia)
 
@@ -508,6 +492,14 @@ def _pose_element(pose: Pose, relative_to: str = "") -> Element:
     if relative_to:
         attributes["relative_to"] = relative_to
     return new_element("pose", _numbers(*pose.position, *pose.orientation), attributes=attributes)
+
+
+def _record(tag: str, values: Mapping[str, float | str], line: int = 0) -> Element:
+    """Return an element with a child for each value."""
+    texts = {key: value if isinstance(value, str) else _numbers(value) for key, value in values.items()}
+    return new_element(
+        tag, "", *(new_element(key, text, line=line) for key, text in texts.items()), line=line
+    )
 
 
 def _numbers(*values: float) -> str:

@@ -30,9 +30,7 @@ class BlockLaser(RayPlugin):
             is_hit = (ranges < rays.max_range)[:, None]
             points = points + is_hit * random.normal(0.0, self._noise, points.shape)
             intensities = random.normal(0.0, self._noise, len(ranges))
-        cloud = PointCloud()
-        cloud.header.stamp = self.now
-        cloud.header.frame_id = self.frame_id
+        cloud = PointCloud(header=self.header(self.frame_id))
         cloud.points = [Point32(*each) for each in points.tolist()]
         cloud.channels = [ChannelFloat32(values=intensities.tolist())]
         self.publisher.publish(cloud)

@@ -25,17 +25,11 @@ class Bumper(SensorPlugin):
         chosen = known.intersection(names) or known
         self._collisions = {f"{link.scoped_name}::{name}" for name in chosen}
         self._frame = self.frame("frameName", "world")
-        self._publisher = self.publish_to(self.text("bumperTopicName", "bumper_states"), ContactsState)
-
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self._publisher.get_num_connections() > 0
+        self._publisher = self.output_to(self.text("bumperTopicName", "bumper_states"), ContactsState)
 
     def sense(self) -> None:
         """Publish the contacts, also if there are none."""
-        message = ContactsState()
-        message.header.stamp = self.now
-        message.header.frame_id = self._frame
+        message = ContactsState(header=self.header(self._frame))
         for contact in self.simulation.contacts():
             if not self._collisions.intersection((contact.collision1, contact.collision2)):
                 continue

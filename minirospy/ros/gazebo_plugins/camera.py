@@ -75,10 +75,6 @@ class CameraPlugin(SensorPlugin):
         self.lenses.append(lens)
         return lens
 
-    def is_needed(self) -> bool:
-        """Return whether any topic has a subscriber."""
-        return any(lens.has_subscribers() for lens in self.lenses)
-
     def is_due(self) -> bool:
         """Return whether ``updateRate`` allows a picture of this moment."""
         now_ns = self.simulation.time_ns
@@ -137,6 +133,7 @@ class CameraPlugin(SensorPlugin):
     def _set_rate(self, rate: float) -> None:
         self.rate = rate
         self._timer = None
+        self.due_ns = 0
 
 
 class Lens:
@@ -168,11 +165,7 @@ class Lens:
         """Return a publisher below the camera's name; a parameter may name the topic."""
         name = self.plugin.text(tag, topic)
         full = name if name.startswith("/") or not self.folder else f"{self.folder}/{name}"
-        return self.plugin.publish_to(full, kind, latch=latch)
-
-    def has_subscribers(self) -> bool:
-        """Return whether a topic has a subscriber."""
-        return bool(self.images.get_num_connections() or self.infos.get_num_connections())
+        return self.plugin.output_to(full, kind, latch=latch)
 
     def sense(self) -> None:
         """Publish a picture, and its camera_info; camera_info alone needs no picture."""

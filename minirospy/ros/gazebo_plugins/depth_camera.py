@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+from std_msgs.msg import Header
 
 from minirospy.base.times import Time
 from minirospy.ros.gazebo_plugins.camera import CameraPlugin, Lens
@@ -55,11 +56,6 @@ class DepthCamera(CameraPlugin):
         """Return the distance from which on there are no points."""
         return np.inf
 
-    def is_needed(self) -> bool:
-        """Return whether any topic has a subscriber."""
-        own = (self._points, self._depths, self._infos)
-        return super().is_needed() or any(each.get_num_connections() for each in own)
-
     def sense(self) -> None:
         """Publish; ``updateRate`` concerns only camera_info."""
         now, lens = self.now, self._lens
@@ -85,8 +81,7 @@ class DepthCamera(CameraPlugin):
 
     def _to_depth_image(self, depths: NDArray[np.float32], valid: NDArray[np.bool_], stamp: Time) -> Image:
         height, width = depths.shape
-        image = Image(height=height, width=width)
-        image.header.stamp, image.header.frame_id = stamp, self.frame_id
+        image = Image(header=Header(stamp=stamp, frame_id=self.frame_id), height=height, width=width)
         if self._is_16_bit:
             image.encoding, image.step = "16UC1", 2 * width
             millimetres = np.clip(np.where(valid, depths * np.float32(1000), 0), 0, 0xFFFF)
@@ -113,7 +108,7 @@ class DepthCamera(CameraPlugin):
         cloud = PointCloud2(height=height, width=width, point_step=POINT_STEP)
         if not self.is_organized:
             cloud.height, cloud.width = 1, height * width
-        cloud.header.stamp, cloud.header.frame_id = stamp, self.frame_id
+        cloud.header = Header(stamp=stamp, frame_id=self.frame_id)
         cloud.fields = [PointField(name, offset, PointField.FLOAT32, 1) for name, offset in _FIELDS]
         cloud.row_step = POINT_STEP * cloud.width
         cloud.is_dense = bool(valid.all())

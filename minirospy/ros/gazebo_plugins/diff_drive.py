@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Twist
-from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
 from minirospy.core.sdf.poses import relative
-from minirospy.ros.gazebo_plugins.odometry import (
-    PlanarOdometry,
-    TransformPublisher,
-    body_velocity,
-    is_usable,
-    to_odometry,
-)
+from minirospy.ros.gazebo_plugins.odometry import DrivePlugin, PlanarOdometry, body_velocity
 from minirospy.ros.gazebo_ros.physics import SimJoint
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin
 
 __all__ = ["DiffDrive"]
 
-_VARIANCES = (1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3)
 _NEAR_SPEED = 0.01  # m/s: a wheel this near to its target is not accelerated any more
 
 
-class DiffDrive(ModelPlugin):
+class DiffDrive(DrivePlugin):
     """The plugin."""
 
     def load(self) -> None:
@@ -39,43 +29,23 @@ class DiffDrive(ModelPlugin):
         self._torque = self.number("wheelTorque", 5.0)
         rate = self.number("updateRate", 100.0)
         self._period_ns = round(1e9 / rate) if rate > 0 else 0
-        self._frames = (
-            self.frame("odometryFrame", "odom"),
-            self.frame("robotBaseFrame", "base_footprint"),
-        )
         self._uses_encoders = self.text("odometrySource", "world") == "encoder"
         self._publishes_transform = self.flag("publishOdomTF", True)
         self._publishes_wheels = self.flag("publishWheelTF", False)
-
-        self._odometry = None
-        if self.flag("publishTf", True):
-            self._odometry = self.publish_to(self.text("odometryTopic", "odom"), Odometry)
         self._states = None
         if self.flag("publishWheelJointState", False):
             self._states = self.publish_to("joint_states", JointState)
-        self._transforms = TransformPublisher()
-        self._closing.append(self._transforms.close)
-        self._start()
-        self.subscribe_to(self.text("commandTopic", "cmd_vel"), Twist, self._on_command)
+        self.load_drive(has_odometry=self.flag("publishTf", True))
 
-    def _start(self) -> None:
-        self._speed = self._turn = 0.0
+    def reset(self) -> None:
+        """Stop, and begin the odometry again."""
+        super().reset()
         self._encoders = PlanarOdometry()
         self._encoder_speed = (0.0, 0.0, 0.0)
         self._instructed = [0.0, 0.0]
         self._last_ns = self._last_encoder_ns = self.simulation.time_ns
         for joint in self._joints:
             joint.set_velocity(0.0, self._torque)
-
-    def reset(self) -> None:
-        """Stop, and begin the odometry again."""
-        self._start()
-
-    def _on_command(self, message: Twist) -> None:
-        if not is_usable(message):
-            return
-        # Two floats: the simulation's thread reads both between two steps.
-        self._speed, self._turn = message.linear.x, message.angular.z
 
     def update(self) -> None:
         """Publish, and set the motors."""
@@ -86,9 +56,12 @@ class DiffDrive(ModelPlugin):
         if elapsed < self._period_ns:
             return
         self._last_ns = now_ns
+        if not self._uses_encoders:
+            self.due_ns = now_ns + self._period_ns
         self._publish()
-        turn = self._turn * self._separation / 2
-        self._drive((self._speed - turn, self._speed + turn), elapsed / 1e9)
+        speed, _, turn = self.command
+        turn *= self._separation / 2
+        self._drive((speed - turn, speed + turn), elapsed / 1e9)
 
     def _drive(self, targets: tuple[float, float], seconds: float) -> None:
         speeds = [joint.velocity * self._radius for joint in self._joints]
@@ -113,21 +86,16 @@ class DiffDrive(ModelPlugin):
         self._encoder_speed = (speed, 0.0, turn)
 
     def _publish(self) -> None:
-        now = self.now
         pose, velocity = self._encoders.pose, self._encoder_speed
         if not self._uses_encoders:
             state = self.model.state
             pose, velocity = state.pose, body_velocity(state)
-        if self._odometry is not None:
-            if self._publishes_transform:
-                self._transforms.send(now, *self._frames, pose)
-            self._odometry.publish(to_odometry(now, self._frames, pose, velocity, _VARIANCES))
+        self.publish_odometry(pose, velocity, shown=pose if self._publishes_transform else None)
         if self._publishes_wheels:
             for joint in self._joints:
                 self._send_wheel(joint)
         if self._states is not None:
-            states = JointState(name=[joint.name for joint in self._joints])
-            states.header.stamp = now
+            states = JointState(header=self.header(""), name=[joint.name for joint in self._joints])
             states.position = [joint.position for joint in self._joints]
             self._states.publish(states)
 
@@ -135,4 +103,4 @@ class DiffDrive(ModelPlugin):
         parent, child = joint.record.parent, joint.record.child
         if parent in self.model.links:
             pose = relative(self.model.links[parent].pose, self.model.links[child].pose)
-            self._transforms.send(self.now, parent, child, pose)
+            self.send_transform(parent, child, pose)

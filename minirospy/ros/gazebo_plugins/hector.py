@@ -15,11 +15,11 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from minirospy.core.sdf.model import Pose, Vector
 from minirospy.core.sdf.poses import compose, pose_from_rpy, rotate, rotate_back
-from minirospy.ros.gazebo_plugins.rays import read_rays
+from minirospy.ros.gazebo_plugins.rays import RayPlugin, read_rays
 from minirospy.ros.gazebo_ros.messages import to_pose, to_vector
 from minirospy.ros.gazebo_ros.parameters import numbers_of
 from minirospy.ros.gazebo_ros.physics import SimLink
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, SensorPlugin, Timer
+from minirospy.ros.gazebo_ros.plugins import PeriodicPlugin, PluginBase
 
 __all__ = ["ErrorModel", "HectorGps", "HectorImu", "HectorSonar"]
 
@@ -69,7 +69,7 @@ class ErrorModel:
         return deviation * self._random.standard_normal(len(deviation)) if deviation.any() else 0 * deviation
 
 
-class _HectorPlugin(ModelPlugin):
+class _HectorPlugin(PeriodicPlugin):
     """A plugin of a link that publishes at ``updateRate``."""
 
     default_rate = 0.0
@@ -78,21 +78,19 @@ class _HectorPlugin(ModelPlugin):
         """Find the link."""
         name = self.text("bodyName")
         self.body: SimLink = self.link(name)[0] if name else self.model.canonical_link
-        self._rate = self.number("updateRate", self.default_rate)
-        self._timer = Timer(self._rate)
+        self.rate = self.number("updateRate", self.default_rate)
         self._last_ns = self.simulation.time_ns
 
     def reset(self) -> None:
         """Begin the period again."""
-        self._timer = Timer(self._rate)
+        super().reset()
         self._last_ns = self.simulation.time_ns
 
-    def update(self) -> None:
-        """Measure if the period has passed."""
+    def sense(self) -> None:
+        """Measure."""
         now_ns = self.simulation.time_ns
-        if self._timer.is_due(now_ns):
-            self.measure((now_ns - self._last_ns) / 1e9)
-            self._last_ns = now_ns
+        self.measure((now_ns - self._last_ns) / 1e9)
+        self._last_ns = now_ns
 
     def measure(self, seconds: float) -> None:
         """Publish; ``seconds`` is the time since the last measurement."""
@@ -139,8 +137,7 @@ class HectorGps(_HectorPlugin):
         x, y, z = self._position.measured(state.pose.position, seconds).tolist()
         self._position.current = self._position.current + seconds * self._velocity.current
         cosine, sine = math.cos(self._heading), math.sin(self._heading)
-        fix = NavSatFix(status=self._status)
-        fix.header.stamp, fix.header.frame_id = self.now, self._frame
+        fix = NavSatFix(header=self.header(self._frame), status=self._status)
         fix.latitude = self._latitude + math.degrees((cosine * x + sine * y) / self._radii[0])
         fix.longitude = self._longitude - math.degrees((-sine * x + cosine * y) / self._radii[1])
         fix.altitude = self._altitude + z
@@ -203,8 +200,7 @@ class HectorImu(_HectorPlugin):
         tilted = Pose((0.0, 0.0, 0.0), (tilt[0] / length, tilt[1] / length, 0.0, 1 / length))
         error = compose(pose_from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, float(self._yaw.bias[0]))), tilted)
 
-        message = Imu()
-        message.header.stamp, message.header.frame_id = self.now, self._frame
+        message = Imu(header=self.header(self._frame))
         message.orientation = to_pose(compose(error, turned)).orientation
         message.angular_velocity = to_vector((rates[0], rates[1], rates[2]))
         message.linear_acceleration = to_vector((acceleration[0], acceleration[1], acceleration[2]))
@@ -229,17 +225,17 @@ class HectorImu(_HectorPlugin):
         return self.call(clear)
 
 
-class HectorSonar(SensorPlugin):
+class HectorSonar(RayPlugin):
     """The plugin. Parameters: topicName, frameId, updateRate; errors without a prefix."""
 
     def load(self) -> None:
         """Read the sensor's rays."""
-        self._rays = read_rays(self.sensor)
+        self.rays = read_rays(self.sensor)
         self._frame = self.frame("frameId", "/sonar_link")
         self._errors = ErrorModel(self, "", 1)
         self.rate = self.number("updateRate", 10.0)
-        heights = np.arcsin(self._rays.directions[:, 2])
-        self._view = min(abs(self._rays.max_angle - self._rays.min_angle), float(np.ptp(heights)))
+        heights = np.arcsin(self.rays.directions[:, 2])
+        self._view = min(abs(self.rays.max_angle - self.rays.min_angle), float(np.ptp(heights)))
         self._publisher = self.publish_to(self.text("topicName", "sonar"), Range)
         self._last_ns = self.simulation.time_ns
 
@@ -251,13 +247,11 @@ class HectorSonar(SensorPlugin):
 
     def sense(self) -> None:
         """Publish the shortest distance."""
-        rays, now_ns = self._rays, self.simulation.time_ns
-        shortest = min(float(np.min(rays.cast(self.simulation, self.sensor_pose))), rays.max_range)
+        rays, now_ns = self.rays, self.simulation.time_ns
+        shortest = self.nearest()
         if shortest < rays.max_range:
             measured = self._errors.measured(np.array([shortest]), (now_ns - self._last_ns) / 1e9)
             shortest = float(np.clip(measured[0], rays.min_range, rays.max_range))
         self._last_ns = now_ns
-        message = Range(radiation_type=Range.ULTRASOUND, field_of_view=self._view, range=shortest)
-        message.header.stamp, message.header.frame_id = self.now, self._frame
-        message.min_range, message.max_range = rays.min_range, rays.max_range
-        self._publisher.publish(message)
+        header, limits = self.header(self._frame), (rays.min_range, rays.max_range)
+        self._publisher.publish(Range(header, Range.ULTRASOUND, self._view, *limits, shortest))

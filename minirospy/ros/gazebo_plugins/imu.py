@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from geometry_msgs.msg import Quaternion
+from geometry_msgs.msg import Quaternion, Vector3
 from sensor_msgs.msg import Imu as ImuMsg
 from std_srvs.srv import Empty, EmptyResponse
 
 from minirospy.core.sdf.model import IDENTITY, Pose, Vector
-from minirospy.core.sdf.poses import compose, inverse, pose_from_rpy, rotate_back
-from minirospy.ros.gazebo_ros.messages import to_vector
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginBase, PluginError, SensorPlugin, Timer
+from minirospy.core.sdf.poses import add, compose, cross, difference, inverse, pose_from_rpy, rotate_back
+from minirospy.ros.gazebo_ros.plugins import PeriodicPlugin, PluginBase, SensorPlugin
 
 if TYPE_CHECKING:
     from minirospy.ros.gazebo_ros.physics import SimLink
@@ -31,15 +30,13 @@ class _Accelerometer:
         """Return the pose in the world, and the angular velocity and the acceleration in the sensor's axes."""
         state = self._link.state
         pose = compose(state.pose, self._place)
-        ax, ay, az = (a - b for a, b in zip(pose.position, state.pose.position, strict=True))
-        wx, wy, wz = state.angular
-        vx, vy, vz = state.linear
-        velocity = (vx + wy * az - wz * ay, vy + wz * ax - wx * az, vz + wx * ay - wy * ax)
+        arm = difference(pose.position, state.pose.position)
+        velocity = add(state.linear, cross(state.angular, arm))
         acceleration: Vector = (0.0, 0.0, 0.0)
         if self._last is not None and time_ns > self._last[0]:
             seconds = (time_ns - self._last[0]) / 1e9
-            x, y, z = ((new - old) / seconds for new, old in zip(velocity, self._last[1], strict=True))
-            acceleration = (x, y, z)
+            x, y, z = difference(velocity, self._last[1])
+            acceleration = (x / seconds, y / seconds, z / seconds)
         self._last = (time_ns, velocity)
         return pose, rotate_back(pose.orientation, state.angular), rotate_back(pose.orientation, acceleration)
 
@@ -53,25 +50,13 @@ def offset_of(plugin: PluginBase) -> Pose:
 
 def _message(plugin: PluginBase, frame: str, noise: float, values: tuple[Pose, Vector, Vector]) -> ImuMsg:
     pose, angular, acceleration = values
-    message = ImuMsg()
-    message.header.stamp = plugin.now
-    message.header.frame_id = frame
-    if noise > 0:
-        drawn = plugin.simulation.random.normal(0.0, noise, 10).tolist()
-        pose = pose._replace(orientation=tuple(a + b for a, b in zip(pose.orientation, drawn, strict=False)))
-        angular = tuple(a + b for a, b in zip(angular, drawn[4:], strict=False))
-        acceleration = tuple(a + b for a, b in zip(acceleration, drawn[7:], strict=False))
-    message.orientation = Quaternion(*pose.orientation)
-    message.angular_velocity = to_vector(angular)
-    message.linear_acceleration = to_vector(acceleration)
+    noisy = plugin.noisy((*pose.orientation, *angular, *acceleration), noise)
     diagonal = [noise * noise if index % 4 == 0 else 0.0 for index in range(9)]
-    message.orientation_covariance = diagonal
-    message.angular_velocity_covariance = diagonal
-    message.linear_acceleration_covariance = diagonal
-    return message
+    turn, rates, change = Quaternion(*noisy[:4]), Vector3(*noisy[4:7]), Vector3(*noisy[7:])
+    return ImuMsg(plugin.header(frame), turn, diagonal, rates, diagonal, change, diagonal)
 
 
-class Imu(ModelPlugin):
+class Imu(PeriodicPlugin):
     """gazebo_ros_imu: reports accelerations without gravity.
 
     Parameters: bodyName (required), topicName, serviceName, frameName, updateRate, gaussianNoise, xyzOffset, rpyOffset.
@@ -79,31 +64,25 @@ class Imu(ModelPlugin):
 
     def load(self) -> None:
         """Find the link."""
-        body = self.text("bodyName")
-        if not body:
-            raise PluginError("imu plugin missing <bodyName>, cannot proceed")
-        link, place = self.link(body)
+        body = self.required("bodyName", "imu plugin")
+        self._link, place = self.link(body)
         self._place = compose(place, offset_of(self))
-        self._meter = _Accelerometer(link, self._place)
-        self._link = link
+        self._meter = _Accelerometer(self._link, self._place)
         self._noise = self.number("gaussianNoise", 0.0)
         self._frame = self.frame("frameName", body)
-        self._rate = self.number("updateRate", 0.0)
-        self._publisher = self.publish_to(self.text("topicName", "/default_imu"), ImuMsg)
+        self.rate = self.number("updateRate", 0.0)
+        self._publisher = self.output_to(self.text("topicName", "/default_imu"), ImuMsg)
         self.serve(self.text("serviceName", "/default_imu"), Empty, lambda _: EmptyResponse())
-        self.reset()
 
     def reset(self) -> None:
         """Begin the period again."""
-        self._timer = Timer(self._rate)
+        super().reset()
         self._meter = _Accelerometer(self._link, self._place)
 
-    def update(self) -> None:
-        """Publish if the period has passed."""
-        now_ns = self.simulation.time_ns
-        if not self._timer.is_due(now_ns) or not self._publisher.get_num_connections():
-            return
-        self._publisher.publish(_message(self, self._frame, self._noise, self._meter.measure(now_ns)))
+    def sense(self) -> None:
+        """Publish a measurement."""
+        values = self._meter.measure(self.simulation.time_ns)
+        self._publisher.publish(_message(self, self._frame, self._noise, values))
 
 
 class ImuSensor(SensorPlugin):
@@ -115,16 +94,14 @@ class ImuSensor(SensorPlugin):
     def load(self) -> None:
         """Read the parameters."""
         self.default_namespace = self.model.name
-        self._frame = self.frame("frameName", "")
-        if not self._frame:
-            raise PluginError("missing <frameName>, cannot proceed")
+        self._frame = self.required("frameName", "").lstrip("/")
         self._noise = self.number("gaussianNoise", 0.0)
         self._offset = offset_of(self)._replace(position=(0.0, 0.0, 0.0))
         self._meter = _Accelerometer(self.sensor_link, self.sensor.pose)
         self._reference = IDENTITY
         if self.flag("initialOrientationAsReference", False):
             self._reference = Pose((0.0, 0.0, 0.0), inverse(self.sensor_pose).orientation)
-        self._publisher = self.publish_to(self.text("topicName", "imu_data"), ImuMsg)
+        self._publisher = self.output_to(self.text("topicName", "imu_data"), ImuMsg)
         self.rate = self.number("updateRateHZ", 1.0)
 
     def reset(self) -> None:
@@ -132,16 +109,11 @@ class ImuSensor(SensorPlugin):
         super().reset()
         self._meter = _Accelerometer(self.sensor_link, self.sensor.pose)
 
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self._publisher.get_num_connections() > 0
-
     def sense(self) -> None:
         """Publish a measurement."""
         pose, angular, acceleration = self._meter.measure(self.simulation.time_ns)
-        gx, gy, gz = rotate_back(pose.orientation, self.simulation.physics.gravity)
-        ax, ay, az = acceleration
+        gravity = rotate_back(pose.orientation, self.simulation.physics.gravity)
         turned = compose(self._reference, pose._replace(position=(0.0, 0.0, 0.0)))
         shown = compose(self._offset, turned)
-        values = (shown, angular, (ax - gx, ay - gy, az - gz))
+        values = (shown, angular, difference(acceleration, gravity))
         self._publisher.publish(_message(self, self._frame, self._noise, values))

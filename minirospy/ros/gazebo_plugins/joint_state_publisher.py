@@ -6,12 +6,12 @@ import re
 
 from sensor_msgs.msg import JointState
 
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin, Timer
+from minirospy.ros.gazebo_ros.plugins import PeriodicPlugin
 
 __all__ = ["JointStatePublisher"]
 
 
-class JointStatePublisher(ModelPlugin):
+class JointStatePublisher(PeriodicPlugin):
     """The plugin. Parameters: jointName (names with commas; default: all joints), updateRate."""
 
     def load(self) -> None:
@@ -21,20 +21,12 @@ class JointStatePublisher(ModelPlugin):
         if not names:
             names = [joint.name for joint in self.model.joints.values() if joint.has_axis]
         self._joints = [self.joint(name) for name in names]
-        self._rate = self.number("updateRate", 100.0)
-        self._timer = Timer(self._rate)
-        self._publisher = self.publish_to("joint_states", JointState)
+        self.rate = self.number("updateRate", 100.0)
+        self._publisher = self.output_to("joint_states", JointState)
 
-    def reset(self) -> None:
-        """Begin the period again."""
-        self._timer = Timer(self._rate)
-
-    def update(self) -> None:
-        """Publish if the period has passed."""
-        if not self._timer.is_due(self.simulation.time_ns):
-            return
-        message = JointState(name=[joint.name for joint in self._joints])
-        message.header.stamp = self.now
+    def sense(self) -> None:
+        """Publish the states."""
+        message = JointState(header=self.header(""), name=[joint.name for joint in self._joints])
         message.position = [joint.position for joint in self._joints]
         message.velocity = [joint.velocity for joint in self._joints]
         self._publisher.publish(message)

@@ -26,9 +26,7 @@ class Laser(RayPlugin):
             self.sensor_pose, directions, rays.max_range, min_range=rays.min_range
         )
         ranges = rays.noisy(self.simulation, np.asarray(hits.distances))
-        scan = LaserScan()
-        scan.header.stamp = self.now
-        scan.header.frame_id = self.frame_id
+        scan = LaserScan(header=self.header(self.frame_id))
         scan.angle_min, scan.angle_max = rays.min_angle, rays.max_angle
         scan.angle_increment = (rays.max_angle - rays.min_angle) / max(rays.count - 1, 1)
         scan.range_min, scan.range_max = rays.min_range, rays.max_range

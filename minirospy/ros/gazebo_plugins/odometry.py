@@ -1,50 +1,88 @@
-"""Odometry messages and transforms of the plugins that drive robots."""
+"""The base class of the plugins that drive robots: commands, odometry and transforms."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import Any
 
-from geometry_msgs.msg import TransformStamped, Twist
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Twist, Vector3
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 from minirospy import client as rospy
-from minirospy.base.times import Time
-from minirospy.core.sdf.model import Pose, Quaternion
+from minirospy.core.sdf.model import Pose
 from minirospy.ros.gazebo_ros.messages import to_pose, yaw_of
 from minirospy.ros.gazebo_ros.physics import State
+from minirospy.ros.gazebo_ros.plugins import PeriodicPlugin
 
-__all__ = [
-    "PlanarOdometry",
-    "TransformPublisher",
-    "body_velocity",
-    "is_usable",
-    "rotation_of_yaw",
-    "to_odometry",
-]
+__all__ = ["DrivePlugin", "PlanarOdometry", "body_velocity"]
 
 
-class TransformPublisher:
-    """Publishes transforms on /tf."""
+class DrivePlugin(PeriodicPlugin):
+    """A plugin that moves a robot by Twist messages, and publishes odometry.
 
-    def __init__(self) -> None:
-        self._publisher = rospy.Publisher("/tf", TFMessage, queue_size=100)
+    Parameters: commandTopic, odometryTopic, odometryFrame, robotBaseFrame. command: the velocity forwards and to the left (m/s),
+    and the turn rate (rad/s), of the last message. commanded_ns: its time. variances: the diagonal of the pose's covariance.
+    """
 
-    def send(self, stamp: Time, parent: str, child: str, pose: Pose) -> None:
-        """Publish the pose of a frame in its parent's."""
-        message = TransformStamped()
-        message.header.stamp = stamp
-        message.header.frame_id = parent
-        message.child_frame_id = child
-        translation = message.transform.translation
-        translation.x, translation.y, translation.z = pose.position
-        message.transform.rotation = to_pose(pose).orientation
-        self._publisher.publish(TFMessage([message]))
+    variances: tuple[float, ...] = (1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3)
 
-    def close(self) -> None:
-        """End publishing."""
-        self._publisher.unregister()
+    def load_drive(self, *, has_odometry: bool = True, has_transforms: bool = True) -> None:
+        """Start the topics, after the subclass has read its parameters."""
+        self._frames = (self.frame("odometryFrame", "odom"), self.frame("robotBaseFrame", "base_footprint"))
+        self._odometry: rospy.Publisher[Any] | None = None
+        if has_odometry:
+            self._odometry = self.publish_to(self.text("odometryTopic", "odom"), Odometry)
+        self._transforms: rospy.Publisher[Any] | None = None
+        if has_transforms:
+            self._transforms = rospy.Publisher("/tf", TFMessage, queue_size=100)
+            self._closing.append(self._transforms.unregister)
+        self.reset()
+        self.subscribe_to(self.text("commandTopic", "cmd_vel"), Twist, self._on_command)
+
+    def reset(self) -> None:
+        """Forget the command."""
+        super().reset()
+        self.command = (0.0, 0.0, 0.0)
+        self.commanded_ns = self.simulation.time_ns
+
+    def _on_command(self, message: Twist) -> None:
+        linear, angular = message.linear, message.angular
+        if not all(map(math.isfinite, (linear.x, linear.y, angular.z))):
+            rospy.logerr(
+                "a velocity command that is not finite is ignored: x %s, y %s, turn %s",
+                linear.x,
+                linear.y,
+                angular.z,
+            )
+            return
+        # One assignment: the simulation's thread reads it between two steps.
+        self.command = (linear.x, linear.y, angular.z)
+        self.commanded_ns = self.simulation.time_ns
+
+    def publish_odometry(
+        self, pose: Pose, velocity: tuple[float, float, float], *, shown: Pose | None
+    ) -> None:
+        """Publish the odometry, and the transform of the pose ``shown`` before it, if they are wanted."""
+        if self._odometry is None:
+            return
+        parent, child = self._frames
+        if shown is not None:
+            self.send_transform(parent, child, shown)
+        message = Odometry(header=self.header(parent), child_frame_id=child)
+        message.pose.pose = to_pose(pose)
+        twist = message.twist.twist
+        twist.linear.x, twist.linear.y, twist.angular.z = velocity
+        covariance = [0.0] * 36
+        covariance[::7] = self.variances
+        message.pose.covariance = covariance
+        self._odometry.publish(message)
+
+    def send_transform(self, parent: str, child: str, pose: Pose) -> None:
+        """Publish the pose of a frame in its parent's on /tf, if transforms are wanted."""
+        if self._transforms is not None:
+            transform = Transform(Vector3(*pose.position), Quaternion(*pose.orientation))
+            self._transforms.publish(TFMessage([TransformStamped(self.header(parent), child, transform)]))
 
 
 class PlanarOdometry:
@@ -62,12 +100,7 @@ class PlanarOdometry:
     @property
     def pose(self) -> Pose:
         """Return the pose."""
-        return Pose((self.x, self.y, 0.0), rotation_of_yaw(self.yaw))
-
-
-def rotation_of_yaw(yaw: float) -> Quaternion:
-    """Return the rotation about z by an angle in rad."""
-    return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)
+        return Pose((self.x, self.y, 0.0), (0.0, 0.0, math.sin(self.yaw / 2), math.cos(self.yaw / 2)))
 
 
 def body_velocity(state: State) -> tuple[float, float, float]:
@@ -76,34 +109,3 @@ def body_velocity(state: State) -> tuple[float, float, float]:
     vx, vy, _ = state.linear
     cos, sin = math.cos(yaw), math.sin(yaw)
     return cos * vx + sin * vy, cos * vy - sin * vx, state.angular[2]
-
-
-def to_odometry(
-    stamp: Time,
-    frames: tuple[str, str],
-    pose: Pose,
-    velocity: tuple[float, float, float],
-    variances: Sequence[float],
-) -> Odometry:
-    """Return a message. ``frames``: of the pose and of the velocity. ``variances``: the diagonal of the pose's covariance."""
-    message = Odometry()
-    message.header.stamp = stamp
-    message.header.frame_id, message.child_frame_id = frames
-    message.pose.pose = to_pose(pose)
-    twist = message.twist.twist
-    twist.linear.x, twist.linear.y, twist.angular.z = velocity
-    covariance = [0.0] * 36
-    covariance[::7] = variances
-    message.pose.covariance = covariance
-    return message
-
-
-def is_usable(command: Twist) -> bool:
-    """Return whether a command is finite; log an error if not."""
-    linear, angular = command.linear, command.angular
-    if all(map(math.isfinite, (linear.x, linear.y, angular.z))):
-        return True
-    rospy.logerr(
-        "a velocity command that is not finite is ignored: x %s, y %s, turn %s", linear.x, linear.y, angular.z
-    )
-    return False

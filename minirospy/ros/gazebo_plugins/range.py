@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from sensor_msgs.msg import Range as RangeMsg
 
 from minirospy.ros.gazebo_plugins.rays import RayPlugin
@@ -25,12 +24,9 @@ class Range(RayPlugin):
     def sense(self) -> None:
         """Publish the shortest distance."""
         rays = self.rays
-        nearest = float(min(np.min(rays.cast(self.simulation, self.sensor_pose)), rays.max_range))
-        if self._noise > 0 and nearest < rays.max_range:
-            nearest += float(self.simulation.random.normal(0.0, self._noise))
-        message = RangeMsg(radiation_type=self._kind, field_of_view=self._fov)
-        message.header.stamp = self.now
-        message.header.frame_id = self.frame_id
-        message.min_range, message.max_range = rays.min_range, rays.max_range
-        message.range = min(max(nearest, rays.min_range), rays.max_range)
-        self.publisher.publish(message)
+        nearest = self.nearest()
+        if nearest < rays.max_range:
+            (nearest,) = self.noisy([nearest], self._noise)
+        nearest = min(max(nearest, rays.min_range), rays.max_range)
+        header, limits = self.header(self.frame_id), (rays.min_range, rays.max_range)
+        self.publisher.publish(RangeMsg(header, self._kind, self._fov, *limits, nearest))

@@ -12,7 +12,7 @@ from minirospy.base.xml_text import XmlElement
 from minirospy.core.sdf.model import Pose, Sensor
 from minirospy.ros.gazebo_ros.parameters import PluginError, number_of, text_of
 from minirospy.ros.gazebo_ros.physics import Simulation
-from minirospy.ros.gazebo_ros.plugins import SensorPlugin
+from minirospy.ros.gazebo_ros.plugins import RayFan, SensorPlugin
 
 __all__ = ["RayPlugin", "Rays", "read_rays"]
 
@@ -20,19 +20,15 @@ MAX_RAYS = 1_000_000  # of one sensor; more would fill the memory
 
 
 @dataclass(frozen=True)
-class Rays:
-    """The rays of a sensor.
+class Rays(RayFan):
+    """The rays of a sensor; the rows of angles follow each other.
 
-    directions: (n, 3) unit vectors in the sensor's frame; the rows of angles follow each other. min_angle, max_angle: of a row,
-    in rad. count: of a row. noise_mean, noise_deviation: of distances, in m.
+    min_angle, max_angle: of a row, in rad. count: of a row. noise_mean, noise_deviation: of distances, in m.
     """
 
-    directions: NDArray[np.float64]
     min_angle: float
     max_angle: float
     count: int
-    min_range: float
-    max_range: float
     noise_mean: float = 0.0
     noise_deviation: float = 0.0
 
@@ -55,11 +51,11 @@ class RayPlugin(SensorPlugin):
         """Read the sensor's rays, and start the topic; ``topic`` is its default."""
         self.shown_rays = self.rays = read_rays(self.sensor)
         self.frame_id = self.frame("frameName", "/world")
-        self.publisher = self.publish_to(self.text("topicName", topic), kind)
+        self.publisher = self.output_to(self.text("topicName", topic), kind)
 
-    def is_needed(self) -> bool:
-        """Return whether there is a subscriber."""
-        return self.publisher.get_num_connections() > 0
+    def nearest(self) -> float:
+        """Return the shortest distance of all rays, at most the maximum range."""
+        return float(min(np.min(self.rays.cast(self.simulation, self.sensor_pose)), self.rays.max_range))
 
 
 def read_rays(sensor: Sensor) -> Rays:
@@ -79,11 +75,11 @@ def read_rays(sensor: Sensor) -> Rays:
     is_noisy = noise is not None and text_of(noise, "type") in ("gaussian", "gaussian_quantized")
     return Rays(
         np.stack(columns, axis=1),
+        number_of(limits, "min", 0.0),
+        number_of(limits, "max", 0.0),
         low,
         high,
         count,
-        number_of(limits, "min", 0.0),
-        number_of(limits, "max", 0.0),
         number_of(noise, "mean", 0.0) if is_noisy else 0.0,
         number_of(noise, "stddev", 0.0) if is_noisy else 0.0,
     )

@@ -10,7 +10,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 from minirospy import client as rospy
 from minirospy.core.sdf.model import Pose
 from minirospy.ros.gazebo_ros.physics import SimLink, State
-from minirospy.ros.gazebo_ros.plugins import ModelPlugin, PluginError
+from minirospy.ros.gazebo_ros.plugins import ModelPlugin
 
 __all__ = ["VacuumGripper"]
 
@@ -24,13 +24,10 @@ class VacuumGripper(ModelPlugin):
 
     def load(self) -> None:
         """Find the link."""
-        if not self.text("bodyName"):
-            raise PluginError("vacuum_gripper plugin missing <bodyName>, cannot proceed")
-        if not self.text("topicName"):
-            raise PluginError("vacuum_gripper plugin missing <topicName>, cannot proceed")
-        self._link, _ = self.link(self.text("bodyName"))
+        body, topic = (self.required(tag, "vacuum_gripper plugin") for tag in ("bodyName", "topicName"))
+        self._link, _ = self.link(body)
         self._is_on = False
-        self._publisher = self.publish_to(self.text("topicName"), Bool)
+        self._publisher = self.publish_to(topic, Bool)
         self.serve("on", Empty, lambda request: self._switch(request, is_on=True))
         self.serve("off", Empty, lambda request: self._switch(request, is_on=False))
 

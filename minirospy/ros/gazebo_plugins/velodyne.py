@@ -30,7 +30,7 @@ class Velodyne(RayPlugin):
         """Read the sensor's rays."""
         self.load_rays("/points", PointCloud2)
         rays = self.rays
-        if self.namespace:
+        if self.namespace and not self.text("frameName", "/world").startswith("/"):
             self.frame_id = f"{self.namespace.strip('/')}/{self.frame_id}"
         self._is_organized = self.flag("organize_cloud", False)
         self._nearest = max(self.number("min_range", 0.0), rays.min_range)
@@ -55,8 +55,8 @@ class Velodyne(RayPlugin):
         rows = len(ranges) // rays.count
         points, is_valid = (each.reshape(rows, rays.count).T.ravel() for each in (points, is_valid))
 
-        cloud = PointCloud2(height=1, point_step=_POINT.itemsize, is_dense=not self._is_organized)
-        cloud.header.stamp, cloud.header.frame_id = self.now, self.frame_id
+        cloud = PointCloud2(header=self.header(self.frame_id), height=1, point_step=_POINT.itemsize)
+        cloud.is_dense = not self._is_organized
         offset = 0
         for name, kind in _FIELDS.items():
             cloud.fields.append(PointField(name, offset, _KINDS[kind], 1))

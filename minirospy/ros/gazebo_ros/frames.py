@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from minirospy.core.sdf.model import Vector
-from minirospy.core.sdf.poses import relative, rotate_back
+from minirospy.core.sdf.poses import difference, relative, rotate_back
 from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, SimModel, State
 
 if TYPE_CHECKING:
@@ -13,7 +12,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "WORLD_FRAMES",
-    "difference",
     "find_entity",
     "find_joint",
     "find_link",
@@ -56,8 +54,3 @@ def relative_state(state: State, frame: State) -> State:
         rotate_back(frame.pose.orientation, difference(state.linear, frame.linear)),
         rotate_back(frame.pose.orientation, difference(state.angular, frame.angular)),
     )
-
-
-def difference(left: Vector, right: Vector) -> Vector:
-    """Return ``left - right``."""
-    return left[0] - right[0], left[1] - right[1], left[2] - right[2]

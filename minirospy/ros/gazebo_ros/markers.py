@@ -56,6 +56,9 @@ class WorldMarkers:
         self._simulation = simulation
         self._publisher = rospy.Publisher(TOPIC, MarkerArray, queue_size=2, latch=True)
         self._published: NDArray[np.float64] = np.zeros((0, 7))  # the poses of all links
+        self._known: dict[
+            SimModel, tuple[NDArray[np.float64], list[Marker]]
+        ] = {}  # with the poses of their links
         self._next_ns = 0
 
     def publish_all(self) -> None:
@@ -63,8 +66,16 @@ class WorldMarkers:
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        self._published = self._simulation.body_poses()
-        return [marker for model in self._simulation.models.values() for marker in model_markers(model)]
+        """Return the markers of all models. Those of a model that has not moved are kept: each new one needs all others."""
+        self._published = poses = self._simulation.body_poses()
+        known, self._known = self._known, {}
+        for model in self._simulation.models.values():
+            here = poses[[link.id for link in model.links.values()]]
+            before = known.get(model)
+            if before is None or has_moved(before[0], here):
+                before = here, model_markers(model)
+            self._known[model] = before
+        return [marker for _, markers in self._known.values() for marker in markers]
 
     def publish_moved(self) -> None:
         """Publish the links that have moved, at a low rate, if there are subscribers."""

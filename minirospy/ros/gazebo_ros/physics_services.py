@@ -5,62 +5,19 @@ Source: http://wiki.ros.org/gazebo_ros, gazebo_msgs. A request that cannot be se
 
 from __future__ import annotations
 
+from gazebo_msgs import srv
 from gazebo_msgs.msg import ODEPhysics
-from gazebo_msgs.srv import (
-    ApplyBodyWrench,
-    ApplyBodyWrenchRequest,
-    ApplyBodyWrenchResponse,
-    ApplyJointEffort,
-    ApplyJointEffortRequest,
-    ApplyJointEffortResponse,
-    BodyRequest,
-    BodyRequestRequest,
-    BodyRequestResponse,
-    DeleteLight,
-    DeleteLightRequest,
-    DeleteLightResponse,
-    GetJointProperties,
-    GetJointPropertiesRequest,
-    GetJointPropertiesResponse,
-    GetLightProperties,
-    GetLightPropertiesRequest,
-    GetLightPropertiesResponse,
-    GetLinkProperties,
-    GetLinkPropertiesRequest,
-    GetLinkPropertiesResponse,
-    GetPhysicsProperties,
-    GetPhysicsPropertiesRequest,
-    GetPhysicsPropertiesResponse,
-    GetWorldProperties,
-    GetWorldPropertiesRequest,
-    GetWorldPropertiesResponse,
-    JointRequest,
-    JointRequestRequest,
-    JointRequestResponse,
-    SetJointProperties,
-    SetJointPropertiesRequest,
-    SetJointPropertiesResponse,
-    SetLightProperties,
-    SetLightPropertiesRequest,
-    SetLightPropertiesResponse,
-    SetLinkProperties,
-    SetLinkPropertiesRequest,
-    SetLinkPropertiesResponse,
-    SetPhysicsProperties,
-    SetPhysicsPropertiesRequest,
-    SetPhysicsPropertiesResponse,
-)
 from std_msgs.msg import ColorRGBA
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from std_srvs.srv import Empty
 
 from minirospy import client as rospy
-from minirospy.core.sdf.model import Inertial, Light, Pose, Vector
-from minirospy.core.sdf.poses import compose, rotate, rotate_back
-from minirospy.ros.gazebo_ros.frames import WORLD_FRAMES, difference, find_entity, find_joint, find_link
-from minirospy.ros.gazebo_ros.messages import duration_seconds, pose_of, vector_of
+from minirospy.core.sdf.model import Inertial, Light, Pose
+from minirospy.core.sdf.poses import compose, difference, rotate, rotate_back
+from minirospy.ros.gazebo_ros.frames import WORLD_FRAMES, find_entity, find_link
+from minirospy.ros.gazebo_ros.messages import duration_seconds, pose_of, to_pose, to_vector, vector_of
 from minirospy.ros.gazebo_ros.physics import SimulationError
 from minirospy.ros.gazebo_ros.server import Server
-from minirospy.ros.gazebo_ros.services import offer, offer_directly
+from minirospy.ros.gazebo_ros.services import Refused, offer, offer_directly, require_joint, require_link
 
 __all__ = ["PhysicsServices"]
 
@@ -68,66 +25,55 @@ __all__ = ["PhysicsServices"]
 class PhysicsServices:
     """Offers the services of properties, forces and physics.
 
-    ode: the parameters of Gazebo's engine, which are kept and reported.
+    ode: the parameters of Gazebo's engine, which are kept and reported, and have no effect here.
     """
 
     def __init__(self, server: Server) -> None:
         self._server = server
         self._loop = loop = server.loop
         self._simulation = loop.simulation
-        self.ode = _ode_defaults(self._simulation.physics.iterations, self._simulation.physics.sor)
-        self.ode.max_contacts = self._simulation.physics.max_contacts
-        offer(loop, "delete_light", DeleteLight, self._delete_light)
-        offer(loop, "get_world_properties", GetWorldProperties, self._get_world_properties)
-        offer(loop, "get_joint_properties", GetJointProperties, self._get_joint_properties)
-        offer(loop, "get_link_properties", GetLinkProperties, self._get_link_properties)
-        offer(loop, "get_light_properties", GetLightProperties, self._get_light_properties)
-        offer(loop, "set_joint_properties", SetJointProperties, self._set_joint_properties)
-        offer(loop, "set_link_properties", SetLinkProperties, self._set_link_properties)
-        offer(loop, "set_light_properties", SetLightProperties, self._set_light_properties)
-        offer(loop, "get_physics_properties", GetPhysicsProperties, self._get_physics_properties)
-        offer(loop, "set_physics_properties", SetPhysicsProperties, self._set_physics_properties)
-        offer(loop, "apply_body_wrench", ApplyBodyWrench, self._apply_body_wrench)
-        offer(loop, "apply_joint_effort", ApplyJointEffort, self._apply_joint_effort)
-        offer(loop, "clear_joint_forces", JointRequest, self._clear_joint_forces)
-        offer(loop, "clear_body_wrenches", BodyRequest, self._clear_body_wrenches)
-        offer(loop, "reset_simulation", Empty, self._reset_simulation)
-        offer(loop, "reset_world", Empty, self._reset_world)
-        offer(loop, "step_physics", Empty, self._step_physics)
-        offer_directly("pause_physics", Empty, self._pause_physics)
-        offer_directly("unpause_physics", Empty, self._unpause_physics)
+        physics = self._simulation.physics
+        self.ode = ODEPhysics(
+            sor_pgs_iters=physics.iterations,
+            sor_pgs_w=physics.sor,
+            contact_surface_layer=0.001,
+            contact_max_correcting_vel=100.0,
+            erp=0.2,
+            max_contacts=physics.max_contacts,
+        )
+        offer(loop, "delete_light", srv.DeleteLight, self._delete_light)
+        offer(loop, "get_world_properties", srv.GetWorldProperties, self._get_world_properties)
+        offer(loop, "get_joint_properties", srv.GetJointProperties, self._get_joint_properties)
+        offer(loop, "get_link_properties", srv.GetLinkProperties, self._get_link_properties)
+        offer(loop, "get_light_properties", srv.GetLightProperties, self._get_light_properties)
+        offer(loop, "set_joint_properties", srv.SetJointProperties, self._set_joint_properties)
+        offer(loop, "set_link_properties", srv.SetLinkProperties, self._set_link_properties)
+        offer(loop, "set_light_properties", srv.SetLightProperties, self._set_light_properties)
+        offer(loop, "get_physics_properties", srv.GetPhysicsProperties, self._get_physics_properties)
+        offer(loop, "set_physics_properties", srv.SetPhysicsProperties, self._set_physics_properties)
+        offer(loop, "apply_body_wrench", srv.ApplyBodyWrench, self._apply_body_wrench)
+        offer(loop, "apply_joint_effort", srv.ApplyJointEffort, self._apply_joint_effort)
+        offer(loop, "clear_joint_forces", srv.JointRequest, self._clear_joint_forces)
+        offer(loop, "clear_body_wrenches", srv.BodyRequest, self._clear_body_wrenches)
+        offer(loop, "reset_simulation", Empty, lambda _: server.reset(with_time=True))
+        offer(loop, "reset_world", Empty, lambda _: server.reset(with_time=False))
+        # For use while paused. Gazebo has this in its window only.
+        offer(loop, "step_physics", Empty, lambda _: loop.step(1))
+        offer_directly("pause_physics", Empty, lambda _: loop.set_paused(True))
+        offer_directly("unpause_physics", Empty, lambda _: loop.set_paused(False))
 
     # ---- links and joints
 
-    def _get_link_properties(self, request: GetLinkPropertiesRequest) -> GetLinkPropertiesResponse:
-        response = GetLinkPropertiesResponse()
-        link = find_link(self._simulation, request.link_name)
-        if link is None:
-            response.status_message = (
-                "GetLinkProperties: link not found, did you forget to scope the link by model name?"
-            )
-            return response
-        inertial = link.record.inertial
-        response.gravity_mode = link.has_gravity
-        response.mass = inertial.mass
-        (response.ixx, response.ixy, response.ixz, response.iyy, response.iyz, response.izz) = (
-            inertial.inertia
-        )
-        position = response.com.position
-        position.x, position.y, position.z = inertial.pose.position
-        response.com.orientation.w = 1.0
-        response.success = True
-        response.status_message = "GetLinkProperties: got properties"
-        return response
+    def _get_link_properties(self, request: srv.GetLinkPropertiesRequest) -> srv.GetLinkPropertiesResponse:
+        link = require_link(self._simulation, request.link_name, "GetLinkProperties")
+        mass, pose, inertia = link.record.inertial
+        center, text = to_pose(Pose(pose.position)), "GetLinkProperties: got properties"
+        return srv.GetLinkPropertiesResponse(center, link.has_gravity, mass, *inertia, True, text)
 
-    def _set_link_properties(self, request: SetLinkPropertiesRequest) -> SetLinkPropertiesResponse:
-        link = find_link(self._simulation, request.link_name)
-        if link is None:
-            return SetLinkPropertiesResponse(
-                False, "SetLinkProperties: link not found, did you forget to scope the link by model name?"
-            )
+    def _set_link_properties(self, request: srv.SetLinkPropertiesRequest) -> str:
+        link = require_link(self._simulation, request.link_name, "SetLinkProperties")
         if not request.mass > 0:
-            return SetLinkPropertiesResponse(False, f"SetLinkProperties: the mass is {request.mass}")
+            raise Refused(f"SetLinkProperties: the mass is {request.mass}")
         old = link.record.inertial
         new = Inertial(
             request.mass,
@@ -138,27 +84,22 @@ class PhysicsServices:
             if new != old:
                 link.set_inertial(new)
         except SimulationError as error:
-            return SetLinkPropertiesResponse(False, f"SetLinkProperties: {error}")
+            raise Refused(f"SetLinkProperties: {error}") from None
         link.has_gravity = request.gravity_mode
-        return SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
+        return "SetLinkProperties: properties set"
 
-    def _get_joint_properties(self, request: GetJointPropertiesRequest) -> GetJointPropertiesResponse:
-        joint = find_joint(self._simulation, request.joint_name)
-        response = GetJointPropertiesResponse()
-        if joint is None:
-            response.status_message = "GetJointProperties: joint not found"
-            return response
-        response.type = GetJointPropertiesResponse.REVOLUTE  # as in ROS, for all joints
-        response.position = [joint.position]
-        response.rate = [joint.velocity]
-        response.success = True
-        response.status_message = "GetJointProperties: got properties"
-        return response
+    def _get_joint_properties(self, request: srv.GetJointPropertiesRequest) -> srv.GetJointPropertiesResponse:
+        joint = require_joint(self._simulation, request.joint_name, "GetJointProperties")
+        return srv.GetJointPropertiesResponse(
+            type=srv.GetJointPropertiesResponse.REVOLUTE,  # as in ROS, for all joints
+            position=[joint.position],
+            rate=[joint.velocity],
+            success=True,
+            status_message="GetJointProperties: got properties",
+        )
 
-    def _set_joint_properties(self, request: SetJointPropertiesRequest) -> SetJointPropertiesResponse:
-        joint = find_joint(self._simulation, request.joint_name)
-        if joint is None:
-            return SetJointPropertiesResponse(False, "SetJointProperties: joint not found")
+    def _set_joint_properties(self, request: srv.SetJointPropertiesRequest) -> str:
+        joint = require_joint(self._simulation, request.joint_name, "SetJointProperties")
         config = request.ode_joint_config
         if config.fmax or config.vel:
             force = config.fmax[0] if config.fmax else 0.0
@@ -177,16 +118,16 @@ class PhysicsServices:
             if axis != joint.axis:
                 joint.set_axis(axis)
         except SimulationError as error:
-            return SetJointPropertiesResponse(False, f"SetJointProperties: {error}")
-        return SetJointPropertiesResponse(True, "SetJointProperties: properties set")
+            raise Refused(f"SetJointProperties: {error}") from None
+        return "SetJointProperties: properties set"
 
     # ---- forces
 
-    def _apply_body_wrench(self, request: ApplyBodyWrenchRequest) -> ApplyBodyWrenchResponse:
+    def _apply_body_wrench(self, request: srv.ApplyBodyWrenchRequest) -> str:
         link = find_link(self._simulation, request.body_name)
         if link is None:
             rospy.logerr("ApplyBodyWrench: body [%s] does not exist", request.body_name)
-            return ApplyBodyWrenchResponse(False, "ApplyBodyWrench: body does not exist")
+            raise Refused("ApplyBodyWrench: body does not exist")
         force, torque = vector_of(request.wrench.force), vector_of(request.wrench.torque)
         point = vector_of(request.reference_point)
         pose = link.pose
@@ -194,137 +135,83 @@ class PhysicsServices:
         if frame is not None:
             base = frame.pose
             force, torque = rotate(base.orientation, force), rotate(base.orientation, torque)
-            x, y, z = difference(compose(base, _at(point)).position, pose.position)
-            point = rotate_back(pose.orientation, (x, y, z))
+            offset = difference(compose(base, Pose(point)).position, pose.position)
+            point = rotate_back(pose.orientation, offset)
         elif request.reference_frame in WORLD_FRAMES:
             # In ROS, too, the point counts from the body's origin, in world axes, although the frame is the world.
             point = rotate_back(pose.orientation, point)
         else:
             rospy.logerr("ApplyBodyWrench: reference_frame is not a valid entity name")
-            return ApplyBodyWrenchResponse(False, "ApplyBodyWrench: reference_frame not found")
+            raise Refused("ApplyBodyWrench: reference_frame not found")
         start, duration = request.start_time, duration_seconds(request.duration)
         link.add_wrench(force, torque, point=point, start=start.secs + start.nsecs / 1e9, duration=duration)
-        return ApplyBodyWrenchResponse(True, "")
+        return ""
 
-    def _clear_body_wrenches(self, request: BodyRequestRequest) -> BodyRequestResponse:
+    def _clear_body_wrenches(self, request: srv.BodyRequestRequest) -> None:
         if (link := find_link(self._simulation, request.body_name)) is not None:
             link.clear_wrenches()
-        return BodyRequestResponse()
 
-    def _apply_joint_effort(self, request: ApplyJointEffortRequest) -> ApplyJointEffortResponse:
-        joint = find_joint(self._simulation, request.joint_name)
-        if joint is None:
-            return ApplyJointEffortResponse(False, "ApplyJointEffort: joint not found")
+    def _apply_joint_effort(self, request: srv.ApplyJointEffortRequest) -> str:
+        joint = require_joint(self._simulation, request.joint_name, "ApplyJointEffort")
         start, duration = request.start_time, duration_seconds(request.duration)
         joint.add_force(request.effort, start=start.secs + start.nsecs / 1e9, duration=duration)
-        return ApplyJointEffortResponse(True, "ApplyJointEffort: effort set")
+        return "ApplyJointEffort: effort set"
 
-    def _clear_joint_forces(self, request: JointRequestRequest) -> JointRequestResponse:
+    def _clear_joint_forces(self, request: srv.JointRequestRequest) -> None:
         for model in self._simulation.models.values():
             if request.joint_name in model.joints:
                 model.joints[request.joint_name].clear_forces()
-        return JointRequestResponse()
 
     # ---- lights
 
-    def _get_light_properties(self, request: GetLightPropertiesRequest) -> GetLightPropertiesResponse:
-        light = self._server.lights.get(request.light_name)
-        response = GetLightPropertiesResponse()
-        if light is None:
-            response.status_message = f"getLightProperties: Requested light {request.light_name} not found!"
-            return response
-        response.diffuse = ColorRGBA(*light.diffuse)
-        response.success = True
-        return response
+    def _require_light(self, name: str, service: str) -> Light:
+        if (light := self._server.lights.get(name)) is None:
+            raise Refused(f"{service}: Requested light {name} not found!")
+        return light
 
-    def _set_light_properties(self, request: SetLightPropertiesRequest) -> SetLightPropertiesResponse:
-        light = self._server.lights.get(request.light_name)
-        if light is None:
-            return SetLightPropertiesResponse(
-                False, f"setLightProperties: Requested light {request.light_name} not found!"
-            )
+    def _get_light_properties(self, request: srv.GetLightPropertiesRequest) -> srv.GetLightPropertiesResponse:
+        light = self._require_light(request.light_name, "getLightProperties")
+        return srv.GetLightPropertiesResponse(diffuse=ColorRGBA(*light.diffuse), success=True)
+
+    def _set_light_properties(self, request: srv.SetLightPropertiesRequest) -> str:
+        light = self._require_light(request.light_name, "setLightProperties")
         diffuse, specular = request.diffuse, request.specular
-        self._server.lights[request.light_name] = Light(
-            light.name,
-            light.kind,
-            pose_of(request.pose),
-            (diffuse.r, diffuse.g, diffuse.b, diffuse.a),
-            (specular.r, specular.g, specular.b, specular.a),
-            vector_of(request.direction),
-            light.range,
-            request.cast_shadows,
+        self._server.lights[request.light_name] = light._replace(
+            pose=pose_of(request.pose),
+            diffuse=(diffuse.r, diffuse.g, diffuse.b, diffuse.a),
+            specular=(specular.r, specular.g, specular.b, specular.a),
+            direction=vector_of(request.direction),
+            casts_shadows=request.cast_shadows,
         )
-        return SetLightPropertiesResponse(True, "")
+        return ""
 
-    def _delete_light(self, request: DeleteLightRequest) -> DeleteLightResponse:
-        if self._server.lights.pop(request.light_name, None) is None:
-            return DeleteLightResponse(False, f"DeleteLight: Requested light {request.light_name} not found!")
-        return DeleteLightResponse(True, f"DeleteLight: {request.light_name} successfully deleted")
+    def _delete_light(self, request: srv.DeleteLightRequest) -> str:
+        self._require_light(request.light_name, "DeleteLight")
+        del self._server.lights[request.light_name]
+        return f"DeleteLight: {request.light_name} successfully deleted"
 
     # ---- the world
 
-    def _get_world_properties(self, _request: GetWorldPropertiesRequest) -> GetWorldPropertiesResponse:
-        return GetWorldPropertiesResponse(
-            self._simulation.time,
-            list(self._simulation.models),
-            True,
-            True,
-            "GetWorldProperties: got properties",
+    def _get_world_properties(self, _request: object) -> srv.GetWorldPropertiesResponse:
+        names, text = list(self._simulation.models), "GetWorldProperties: got properties"
+        return srv.GetWorldPropertiesResponse(self._simulation.time, names, True, True, text)
+
+    def _get_physics_properties(self, _request: object) -> srv.GetPhysicsPropertiesResponse:
+        physics = self._simulation.physics
+        return srv.GetPhysicsPropertiesResponse(
+            time_step=physics.step,
+            pause=self._loop.is_paused,
+            max_update_rate=self._loop.update_rate,
+            gravity=to_vector(physics.gravity),
+            ode_config=self.ode,
+            success=True,
+            status_message="GetPhysicsProperties: got properties",
         )
 
-    def _get_physics_properties(self, _request: GetPhysicsPropertiesRequest) -> GetPhysicsPropertiesResponse:
-        physics = self._simulation.physics
-        response = GetPhysicsPropertiesResponse()
-        response.time_step = physics.step
-        response.pause = self._loop.is_paused
-        response.max_update_rate = self._loop.update_rate
-        response.gravity.x, response.gravity.y, response.gravity.z = physics.gravity
-        response.ode_config = self.ode
-        response.success = True
-        response.status_message = "GetPhysicsProperties: got properties"
-        return response
-
-    def _set_physics_properties(self, request: SetPhysicsPropertiesRequest) -> SetPhysicsPropertiesResponse:
+    def _set_physics_properties(self, request: srv.SetPhysicsPropertiesRequest) -> str:
         try:
             self._server.set_physics(request.time_step, request.max_update_rate, vector_of(request.gravity))
         except SimulationError as error:
-            return SetPhysicsPropertiesResponse(False, str(error))
+            raise Refused(str(error)) from None
         self.ode = request.ode_config
-        return SetPhysicsPropertiesResponse(True, "physics engine updated")
-
-    def _pause_physics(self, _request: EmptyRequest) -> EmptyResponse:
-        self._loop.set_paused(True)
-        return EmptyResponse()
-
-    def _unpause_physics(self, _request: EmptyRequest) -> EmptyResponse:
-        self._loop.set_paused(False)
-        return EmptyResponse()
-
-    def _reset_simulation(self, _request: EmptyRequest) -> EmptyResponse:
-        self._server.reset(with_time=True)
-        return EmptyResponse()
-
-    def _step_physics(self, _request: EmptyRequest) -> EmptyResponse:
-        """Advance by one step, for use while paused. Gazebo has this in its window only."""
-        self._loop.step(1)
-        return EmptyResponse()
-
-    def _reset_world(self, _request: EmptyRequest) -> EmptyResponse:
-        self._server.reset(with_time=False)
-        return EmptyResponse()
-
-
-def _at(point: Vector) -> Pose:
-    return Pose(point)
-
-
-def _ode_defaults(iterations: int, sor: float) -> ODEPhysics:
-    """Return the parameters of Gazebo's default engine. They are kept and reported, and have no effect here."""
-    return ODEPhysics(
-        sor_pgs_iters=iterations,
-        sor_pgs_w=sor,
-        contact_surface_layer=0.001,
-        contact_max_correcting_vel=100.0,
-        erp=0.2,
-        max_contacts=20,
-    )
+        return "physics engine updated"

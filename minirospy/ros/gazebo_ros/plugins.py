@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from std_msgs.msg import Header
 
 from minirospy import client as rospy
 from minirospy.base.errors import ManifestError
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LIBRARIES",
     "ModelPlugin",
+    "PeriodicPlugin",
     "PluginBase",
     "PluginError",
     "PluginHost",
@@ -86,8 +89,11 @@ LIBRARIES = {
 class PluginBase:
     """A plugin of the world.
 
-    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's.
+    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's. due_ns: the time of the
+    simulation before which :meth:`update` has nothing to do.
     """
+
+    due_ns = 0
 
     def __init__(self, loop: SimulationLoop, plugin: Plugin) -> None:
         self.loop = loop
@@ -129,6 +135,10 @@ class PluginBase:
         """Return the time of the simulation."""
         return time_of(self.simulation.time_ns)
 
+    def header(self, frame_id: str) -> Header:
+        """Return a message's header with the time of the simulation."""
+        return Header(0, self.now, frame_id)
+
     def call(self, function: Callable[[], _T]) -> _T:
         """Run a function between two steps; for the callbacks of subscribers and services."""
         return self.loop.call(function)
@@ -136,6 +146,12 @@ class PluginBase:
     def text(self, tag: str, default: str = "") -> str:
         """Return a parameter's text, or the default if it is missing or empty."""
         return text_of(self.element, tag, default)
+
+    def required(self, tag: str, title: str) -> str:
+        """Return a parameter's text. Raise PluginError that begins with the title if it is missing or empty."""
+        if not (text := self.text(tag)):
+            raise PluginError(f"{title} missing <{tag}>, cannot proceed".lstrip())
+        return text
 
     def number(self, tag: str, default: float) -> float:
         """Return a parameter's number. Raise PluginError if it is not a number, or out of the tag's range.
@@ -160,6 +176,14 @@ class PluginBase:
     def frame(self, tag: str, default: str) -> str:
         """Return a parameter's name of a frame, without the slash at its start."""
         return self.text(tag, default).lstrip("/")
+
+    def noisy(self, values: Iterable[float], deviation: float) -> list[float]:
+        """Return values with independent noise of a standard deviation."""
+        exact = list(values)
+        if deviation <= 0:
+            return exact
+        noise = self.simulation.random.normal(0.0, deviation, len(exact)).tolist()
+        return [value + error for value, error in zip(exact, noise, strict=True)]
 
     def resolve(self, topic: str) -> str:
         """Return a topic's name in the plugin's namespace."""
@@ -236,36 +260,71 @@ class Timer:
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate > 0 else 0
-        self._next = 0
+        self.next_ns = 0
 
     def is_due(self, now_ns: int) -> bool:
         """Return whether the next period begins."""
-        if now_ns < self._next - self._period:  # the time was reset
-            self._next = now_ns
-        if now_ns < self._next:
+        if now_ns < self.next_ns - self._period:  # the time was reset
+            self.next_ns = now_ns
+        if now_ns < self.next_ns:
             return False
-        self._next = max(self._next + self._period, now_ns - self._period + 1)
+        self.next_ns = max(self.next_ns + self._period, now_ns - self._period + 1)
         return True
 
 
-class RayFan(Protocol):
-    """The rays of a sensor: (n, 3) unit vectors in the sensor's frame, and the limits of their length in m."""
+@dataclass(frozen=True)
+class RayFan:
+    """The rays of a sensor: (n, 3) unit vectors in the sensor's frame, and the distances in m at which they begin and end."""
 
-    @property
-    def directions(self) -> NDArray[np.float64]:
-        """Return the directions."""
-
-    @property
-    def min_range(self) -> float:
-        """Return the distance at which rays begin."""
-
-    @property
-    def max_range(self) -> float:
-        """Return the distance at which rays end."""
+    directions: NDArray[np.float64]
+    min_range: float
+    max_range: float
 
 
-class SensorPlugin(ModelPlugin):
-    """A plugin of a sensor: :meth:`sense` is called at the sensor's rate, or at ``self.rate`` if ``load`` sets it.
+class PeriodicPlugin(ModelPlugin):
+    """A plugin of a model whose :meth:`sense` is called ``rate`` times a second of simulated time, or before each step for 0."""
+
+    rate = 0.0
+
+    def __init__(self, loop: SimulationLoop, plugin: Plugin, model: SimModel) -> None:
+        super().__init__(loop, plugin, model)
+        self._timer: Timer | None = None
+        self._has_other_work = type(self).update is not PeriodicPlugin.update
+        self._outputs: list[rospy.Publisher[Any]] = []
+
+    def output_to(
+        self, topic: str, kind: type[rospy.Message], *, latch: bool = False
+    ) -> rospy.Publisher[Any]:
+        """Return a publisher in the plugin's namespace. While none of these has a subscriber, the plugin is not needed."""
+        publisher = self.publish_to(topic, kind, latch=latch)
+        self._outputs.append(publisher)
+        return publisher
+
+    def is_needed(self) -> bool:
+        """Return whether anything uses the data: a subscriber, or another plugin if there are no outputs."""
+        return not self._outputs or any(each.get_num_connections() for each in self._outputs)
+
+    def sense(self) -> None:
+        """Measure and publish."""
+
+    def update(self) -> None:
+        """Call :meth:`sense` if it is due."""
+        if self._timer is None:
+            self._timer = Timer(self.rate)
+        if self._timer.is_due(self.simulation.time_ns):
+            if not self._has_other_work:
+                self.due_ns = self._timer.next_ns
+            if self.is_needed():
+                self.sense()
+
+    def reset(self) -> None:
+        """Begin the period again."""
+        self._timer = None
+        self.due_ns = 0
+
+
+class SensorPlugin(PeriodicPlugin):
+    """A plugin of a sensor. Its rate is the sensor's unless ``load`` sets ``self.rate``.
 
     If ``load`` sets ``self.shown_rays``, the simulation's window can show them.
     """
@@ -278,30 +337,11 @@ class SensorPlugin(ModelPlugin):
         self.sensor_link = link
         self.rate = sensor.update_rate
         self.shown_rays: RayFan | None = None
-        self._timer: Timer | None = None
 
     @property
     def sensor_pose(self) -> Pose:
         """Return the sensor's pose in the world."""
         return compose(self.sensor_link.pose, self.sensor.pose)
-
-    def is_needed(self) -> bool:
-        """Return whether anything uses the sensor's data, such as a subscriber."""
-        return True
-
-    def sense(self) -> None:
-        """Measure and publish."""
-
-    def update(self) -> None:
-        """Call :meth:`sense` if it is due."""
-        if self._timer is None:
-            self._timer = Timer(self.rate)
-        if self._timer.is_due(self.simulation.time_ns) and self.is_needed():
-            self.sense()
-
-    def reset(self) -> None:
-        """Start the sensor's period again."""
-        self._timer = None
 
 
 class PluginHost:
@@ -345,8 +385,11 @@ class PluginHost:
         self._list()
 
     def update(self) -> None:
-        """Run all plugins before a step. A plugin that fails is closed and named."""
+        """Run all plugins before a step, unless they are not due. A plugin that fails is closed and named."""
+        now_ns = self._loop.simulation.time_ns
         for plugin in self._running:
+            if now_ns < plugin.due_ns:
+                continue
             try:
                 plugin.update()
             except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's

@@ -1,56 +1,85 @@
-"""Offer services whose work is done in the simulation's thread, between two steps."""
+"""Offer services whose work is done in the simulation's thread, between two steps.
+
+A handler returns the response, or only its status message if it has done what was asked for. It raises :class:`Refused` if it
+has not: then the response has ``success`` false and the error's text.
+"""
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
 from minirospy import client as rospy
+from minirospy.ros.gazebo_ros.frames import find_joint, find_link
 from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
-from minirospy.ros.gazebo_ros.physics import SimulationError
+from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, Simulation, SimulationError
 
-__all__ = ["apply", "offer", "offer_directly"]
+__all__ = ["Refused", "apply", "offer", "offer_directly", "require_joint", "require_link"]
+
+Handler = Callable[[Any], Any]
 
 
-def offer(loop: SimulationLoop, name: str, kind: Any, handler: Callable[[Any], Any]) -> None:
+class Refused(Exception):
+    """Raised by a handler if a request cannot be served; ``str()`` is the status message."""
+
+
+def offer(loop: SimulationLoop, name: str, kind: Any, handler: Handler) -> None:
     """Offer the service ``~name``; the handler runs in the simulation's thread.
 
-    If the handler raises SimulationError, the response has ``success`` false and the error's text.
+    If it raises SimulationError, such as for a force that is NaN, the error is logged, and the request refused.
     """
 
     def run(request: object) -> object:
         try:
-            return _until_closed(lambda each: loop.call(lambda: handler(each)), request)
-        except SimulationError as error:  # such as a force that is NaN
+            return loop.call(lambda: handler(request))
+        except SimulationError as error:
             rospy.logerr("%s", error)
-            response = kind._response_class()
-            if not hasattr(response, "success"):
+            if not hasattr(kind._response_class, "success"):
                 raise rospy.ServiceException(str(error)) from None
-            response.success, response.status_message = False, str(error)
-            return response
+            raise Refused(str(error)) from None
+
+    offer_directly(name, kind, run)
+
+
+def offer_directly(name: str, kind: Any, handler: Handler) -> None:
+    """Offer the service ``~name``; the handler runs in the service's own thread, and calls the simulation's itself."""
+
+    def run(request: object) -> object:
+        is_served = True
+        try:
+            answer = handler(request)
+        except Refused as refusal:
+            is_served, answer = False, str(refusal)
+        except LoopClosed as error:  # the simulation has ended meanwhile
+            raise rospy.ServiceException(str(error)) from None
+        if answer is None:
+            return kind._response_class()
+        if isinstance(answer, str):
+            return kind._response_class(success=is_served, status_message=answer)
+        return answer
 
     rospy.Service(f"~{name}", kind, run)
 
 
-def offer_directly(name: str, kind: Any, handler: Callable[[Any], Any]) -> None:
-    """Offer the service ``~name``; the handler runs in the service's own thread, and calls the simulation's itself."""
-    rospy.Service(f"~{name}", kind, functools.partial(_until_closed, handler))
-
-
-def apply(loop: SimulationLoop, handler: Callable[[Any], object], request: object) -> None:
+def apply(loop: SimulationLoop, handler: Handler, request: object) -> None:
     """Do in the simulation's thread what a message asks for."""
     try:
         loop.call(lambda: handler(request))
-    except LoopClosed:
+    except (LoopClosed, Refused):
         pass
     except SimulationError as error:
         rospy.logerr("%s", error)
 
 
-def _until_closed(handler: Callable[[Any], Any], request: object) -> object:
-    """Call a handler; refuse the request in one line if the simulation ends meanwhile."""
-    try:
-        return handler(request)
-    except LoopClosed as error:
-        raise rospy.ServiceException(str(error)) from None
+def require_link(simulation: Simulation, name: str, service: str) -> SimLink:
+    """Return a link. Raise Refused with the service's text if it does not exist."""
+    if (link := find_link(simulation, name)) is None:
+        raise Refused(f"{service}: link not found, did you forget to scope the link by model name?")
+    return link
+
+
+def require_joint(simulation: Simulation, name: str, service: str) -> SimJoint:
+    """Return a joint. Raise Refused with the service's text if it does not exist."""
+    if (joint := find_joint(simulation, name)) is None:
+        raise Refused(f"{service}: joint not found")
+    return joint

@@ -250,6 +250,13 @@ def test_markers_show_the_world(master: str, start: Start) -> None:
         box = message.markers[2]
         assert (box.type, box.scale.x, box.pose.position.z) == (box.CUBE, 1.0, 5.0)
 
+        # A third model: the box has moved meanwhile, the plane has not.
+        await call(node, "set_model_state", SetModelState, ModelState("box", at(z=7), Twist(), ""))
+        await spawn(node, BOX, "other", at(x=3, z=5))
+        message = await until(node, "/gazebo/world_markers", MarkerArray, lambda each: len(each.markers) == 4)
+        heights = [marker.pose.position.z for marker in message.markers[1:]]
+        assert heights == [0.0, 7.0, 5.0]
+
     run(body)
 
 

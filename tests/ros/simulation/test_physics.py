@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("mujoco", reason="the simulation needs mujoco-core")
 
 from minirospy.core.sdf.model import (
+    IDENTITY,
     Axis,
     Box,
     Cylinder,
@@ -238,6 +239,68 @@ def test_of_two_directions_the_smoother_counts(mu: float, mu2: float, expected: 
     simulation.step(500)
 
     assert box.state.linear[0] == pytest.approx(4.0 - 0.5 * expected * G, rel=0.03)
+
+
+def grained(mu: float, mu2: float, direction: Vector, pose: Pose = IDENTITY, *, still: bool = False) -> Model:
+    """Return a box of which ``mu`` is the friction along a direction of its collision."""
+    shape = Box((20, 20, 0.1)) if still else Box((0.3, 0.3, 0.1))
+    surface = Surface(mu, mu2, fdir1=direction)
+    return Model("box", {"link": body("link", shape, surface=surface)}, pose=pose, is_static=still)
+
+
+@pytest.mark.parametrize(("direction", "yaw"), [((1, 0, 0), 0.0), ((0, 2, 0), math.pi / 2), ((1, 0, 0), 2.5)])
+def test_a_box_slips_along_the_smooth_direction_and_rests_along_the_other(
+    direction: Vector, yaw: float
+) -> None:
+    """The plane is level, and gravity is tilted: along the direction with 0.2, then across it with 0.8."""
+    turned = rotate(at(yaw=yaw).orientation, direction)
+    along = turned[0] / math.hypot(*turned), turned[1] / math.hypot(*turned)
+    pull = 4.0  # m/s^2, of a weight of 9.8: more than 0.2, less than 0.8
+    for (x, y), acceleration in ((along, pull - 0.2 * G), ((-along[1], along[0]), 0.0)):
+        gravity = (pull * x, pull * y, -G)
+        ground = replace(grained(100.0, 100.0, (0, 0, 0), at(z=-0.05), still=True), name="floor")
+        box = grained(0.2, 0.8, direction, at(z=0.05, yaw=yaw))
+        simulation = Simulation(World(models=(ground, box), physics=Physics(gravity=gravity)))
+        simulation.step(500)
+        before = simulation.model("box").state.linear
+
+        simulation.step(1000)
+
+        vx, vy, _ = (b - a for a, b in zip(before, simulation.model("box").state.linear, strict=True))
+        assert vx * x + vy * y == pytest.approx(acceleration, abs=0.02)
+        assert abs(vy * x - vx * y) < 0.01
+
+
+def test_the_ground_has_two_directions_of_friction_too() -> None:
+    """A box with one coefficient slides on a floor that is smooth along y: of each direction, the smaller friction counts."""
+    floor = replace(grained(0.9, 0.1, (1, 0, 0), at(z=-0.05), still=True), name="floor")
+    simulation = Simulation(
+        World(models=(floor, single("box", Box((0.3, 0.3, 0.1)), pose=at(z=0.05), mu=0.5)))
+    )
+    box = simulation.model("box")
+    for velocity, mu in (((3.0, 0.0, 0.0), 0.5), ((0.0, 3.0, 0.0), 0.1)):
+        simulation.reset_models()
+        simulation.step(100)
+        box.set_velocity(velocity, (0.0, 0.0, 0.0))
+
+        simulation.step(300)
+
+        assert math.hypot(*box.state.linear) == pytest.approx(3.0 - 0.3 * mu * G, rel=0.01)
+
+
+def test_a_direction_of_friction_along_the_normal_is_none() -> None:
+    """The smaller coefficient counts, as without a direction. A model of the same name without one follows."""
+    for direction in ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)):
+        simulation = Simulation(World(models=(GROUND,)))
+        for mu, mu2, chosen in ((0.8, 0.1, (1.0, 0.0, 0.0)), (1.5, 0.3, direction)):
+            box = simulation.add_model(grained(mu, mu2, chosen, at(z=0.05)))
+            simulation.step(100)
+            box.set_velocity((4.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            simulation.step(500)
+            speed = box.state.linear[0]
+            simulation.remove_model("box")
+
+        assert speed == pytest.approx(4.0 - 0.5 * 0.3 * G, rel=0.03)
 
 
 def test_a_plane_that_hangs_on_a_wall_ends() -> None:

@@ -18,14 +18,13 @@ from minirospy.core.sdf.model import (
     Physics,
     Plane,
     Pose,
-    Quaternion,
     Vector,
     World,
 )
 from minirospy.core.sdf.poses import compose, inverse, relative, rotate, transform
 from minirospy.ros.gazebo_ros.physics.inertias import principal_inertia
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
-from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, SOLREF, Shapes
+from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL, SOLREF, Shapes, to_wxyz
 from minirospy.ros.gazebo_ros.physics.tree import WORLD, LinkTree, plan_tree
 
 __all__ = [
@@ -189,7 +188,7 @@ class Builder:
             body = built.bodies[joint.parent].add_body(name=scoped)
             local = relative(model.links[joint.parent].pose, link.pose)
         built.bodies[link.name] = body
-        body.pos, body.quat = local.position, _wxyz(local.orientation)
+        body.pos, body.quat = local.position, to_wxyz(local.orientation)
 
         if not model.is_static:
             body.explicitinertial = True
@@ -275,7 +274,7 @@ class Builder:
             pose = relative(child, parent)  # of the parent in the child
             data = [0.0] * 11
             data[3:6] = pose.position
-            data[6:10] = _wxyz(pose.orientation)
+            data[6:10] = to_wxyz(pose.orientation)
             data[10] = 1.0
             self._add_equality(built, equality.mjEQ_WELD, first, second, data)
             return
@@ -317,7 +316,7 @@ def set_inertial(body: Any, inertial: Inertial) -> None:
     """Set the mass and the inertia of one of MuJoCo's bodies."""
     inertia = principal_inertia(inertial)
     body.mass, body.inertia = inertia.mass, inertia.moments
-    body.ipos, body.iquat = inertia.pose.position, _wxyz(inertia.pose.orientation)
+    body.ipos, body.iquat = inertia.pose.position, to_wxyz(inertia.pose.orientation)
 
 
 def count_substeps(step: float) -> int:
@@ -403,11 +402,6 @@ def _set_first(row: Any, name: str, value: float) -> None:
         setattr(row, name, value)
     else:
         getattr(row, name)[0] = value
-
-
-def _wxyz(rotation: Quaternion) -> Quaternion:
-    x, y, z, w = rotation
-    return w, x, y, z
 
 
 def _first_line(error: BaseException) -> str:

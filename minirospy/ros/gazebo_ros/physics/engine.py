@@ -22,6 +22,8 @@ __all__ = ["Engine"]
 
 RAY_GROUPS = np.array([each in (GROUP_COLLISION, GROUP_RAY_ONLY) for each in range(6)], np.uint8)
 MIN_SWING = 0.5  # rad/s; Coriolis forces of slower joints need no correction
+MIN_GRAIN = 0.1  # sine of the angle to the normal; a direction of friction that is nearer to it is none: bodies tilt a little
+MIN_FRICTION = 1e-5  # MuJoCo's own
 MAX_FORCE = 1e9  # N or N m; a motor without a limit
 MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster targets of motors would make contacts explode
 
@@ -75,6 +77,7 @@ class Engine:
         self.position_of_dof[dofs] = positions
         self._swinging = self._find_swinging()
         self._ray_counts = self._count_ray_geoms()
+        self._find_grains()
         self._set_friction_rows()
 
     def _set_friction_rows(self) -> None:
@@ -117,7 +120,7 @@ class Engine:
         """Compute the positions, contacts and velocities of bodies if the state has changed."""
         if self.is_stale:
             self.is_stale = False
-            self.mujoco.mj_step1(self.model, self.data)
+            self._begin()
             self._forget_details()
 
     def advance(self, left: int = 1) -> None:
@@ -145,7 +148,57 @@ class Engine:
             self._limit_damped()
         if self.records_details and left == 1:
             self._record()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Compute the first half of a substep."""
+        model, data, mujoco = self.model, self.data, self.mujoco
         mujoco.mj_step1(model, data)
+        if self._has_grains and data.ncon and self._turn_friction():
+            for compute in (
+                mujoco.mj_makeConstraint,
+                mujoco.mj_island,
+                mujoco.mj_projectConstraint,
+                mujoco.mj_referenceConstraint,
+            ):
+                compute(model, data)
+
+    def _find_grains(self) -> None:
+        """Read the two directions of friction of each geom that has them, and both coefficients of all geoms."""
+        model, grains = self.model, self._builder.shapes.grains
+        self._grain_directions: NDArray[np.float64] = np.zeros((model.ngeom, 3))
+        self._frictions: NDArray[np.float64] = np.repeat(model.geom_friction[:, :1], 2, axis=1)
+        for index in range(model.ngeom) if grains else ():
+            if (found := grains.get(model.geom(index).name)) is not None:
+                self._grain_directions[index] = found.direction
+                self._frictions[index] = (found.mu, found.mu2)
+        self._has_grain: NDArray[np.bool_] = (self._grain_directions != 0).any(axis=1)
+        self._has_grains = bool(self._has_grain.any())
+
+    def _turn_friction(self) -> bool:
+        """Turn the tangents of contacts to the directions of friction, and set both coefficients. Return whether any changed.
+
+        As in ODE, the smaller ``mu`` and the smaller ``mu2`` of the two geoms count. If both have a direction, that of the geom
+        with the smaller ``mu`` does. A direction along the normal is none: then the contact keeps one coefficient.
+        """
+        contact = self.data.contact
+        first, second = contact.geom.T
+        uses_second = self._has_grain[second] & (
+            ~self._has_grain[first] | (self._frictions[second, 0] < self._frictions[first, 0])
+        )
+        geoms = np.where(uses_second, second, first)
+        axes = self.data.xmat[self.model.geom_bodyid[geoms]].reshape(-1, 3, 3)
+        directions = np.einsum("nij,nj->ni", axes, self._grain_directions[geoms])
+        normals = contact.frame[:, :3]
+        tangents = directions - np.einsum("ni,ni->n", directions, normals)[:, None] * normals
+        lengths = np.linalg.norm(tangents, axis=1)
+        rows = np.flatnonzero(lengths > MIN_GRAIN)
+        tangents = tangents[rows] / lengths[rows, None]
+        contact.frame[rows, 3:6] = tangents
+        contact.frame[rows, 6:9] = np.cross(normals[rows], tangents)
+        both = np.minimum(self._frictions[first[rows]], self._frictions[second[rows]])
+        contact.friction[rows, :2] = np.maximum(both, MIN_FRICTION)
+        return bool(rows.size)
 
     def cast(
         self,
@@ -224,11 +277,9 @@ class Engine:
         """Return the degrees of freedom of joints whose links are not balanced like wheels."""
         model = self.model
         result: list[int] = []
-        for joint in range(model.njnt):
+        for joint in np.flatnonzero(model.jnt_type == self.mujoco.mjtJoint.mjJNT_HINGE).tolist():
             body = int(model.jnt_bodyid[joint])
             dof = int(model.jnt_dofadr[joint])
-            if model.jnt_type[joint] != self.mujoco.mjtJoint.mjJNT_HINGE:
-                continue
             offset = model.body_ipos[body] - model.jnt_pos[joint]
             distance = np.linalg.norm(np.cross(offset, model.jnt_axis[joint]))
             if distance > 1e-3 or model.body_subtreemass[body] > 1.001 * model.body_mass[body]:

@@ -11,9 +11,20 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from minirospy.core.sdf.model import Axis, Inertial, Joint, Link, Model, Pose, Vector
-from minirospy.core.sdf.poses import compose, inverse, normalized, rotate, rotate_back, transform
+from minirospy.core.sdf.poses import (
+    add,
+    compose,
+    cross,
+    difference,
+    inverse,
+    normalized,
+    rotate,
+    rotate_back,
+    transform,
+)
 from minirospy.ros.gazebo_ros.physics.builder import BuiltModel, axis_names, set_inertial
 from minirospy.ros.gazebo_ros.physics.engine import MAX_FORCE, MAX_MOTOR_SPEED, Engine
 from minirospy.ros.gazebo_ros.physics.library import SimulationError
@@ -25,6 +36,7 @@ __all__ = ["Owner", "SimJoint", "SimLink", "SimModel"]
 class Owner(Protocol):
     """The part of the simulation that a model uses."""
 
+    engine: Engine
     forced: dict[str, None]
 
     @property
@@ -80,9 +92,7 @@ class SimLink:
         """Return the pose in the world."""
         self.engine.refresh()
         data = self.engine.data
-        x, y, z = data.xpos[self.id].tolist()
-        w, qx, qy, qz = data.xquat[self.id].tolist()
-        return Pose((x, y, z), (qx, qy, qz, w))
+        return _pose(data.xpos[self.id], data.xquat[self.id])
 
     @property
     def state(self) -> State:
@@ -98,8 +108,7 @@ class SimLink:
     def set_state(self, state: State) -> None:
         """Move the whole model so that this link has the state, with joint angles kept and joint velocities zero."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
-        change = compose(state.pose, inverse(self.pose))
-        self.model.move(change, state.linear, state.angular, state.pose.position)
+        self.model.move(self.pose, state)
 
     @property
     def center_of_mass(self) -> Vector:
@@ -120,7 +129,7 @@ class SimLink:
             self.engine.model.body_gravcomp[self.id] = 0.0 if value else 1.0
             self.engine.is_stale = True
         else:
-            self.model.recompile()
+            self.model.simulation.recompile()
 
     def set_inertial(self, inertial: Inertial) -> None:
         """Change the mass and the inertia; the world is compiled again. A static model has none."""
@@ -130,7 +139,7 @@ class SimLink:
         self.record = replace(self.record, inertial=inertial)
         if not self.model.is_static:
             set_inertial(self.model.built.bodies[self.name], inertial)
-            self.model.recompile()
+            self.model.simulation.recompile()
 
     def add_wrench(
         self,
@@ -146,17 +155,13 @@ class SimLink:
         ``start``: time of the simulation in seconds; a time in the past means now. A negative duration means for ever.
         """
         _check(self, *force, *torque, *point)
-        start = max(start, self.model.time())
-        end = start + duration if duration >= 0 else math.inf
+        start, end = self.model.force_changes(start, duration)
         self.wrenches.append(TimedWrench(force, torque, point, start, end))
-        self.model.forces_changed()
 
     def push(self, force: Vector = ZERO, torque: Vector = ZERO, *, point: Vector = ZERO) -> None:
         """Apply a force and a torque in world axes at a point of the link's frame for the next step."""
         _check(self, *force, *torque, *point)
-        now = self.model.time()
-        self.wrenches.append(TimedWrench(force, torque, point, now, now))
-        self.model.forces_changed()
+        self.wrenches.append(TimedWrench(force, torque, point, *self.model.force_changes(0.0, 0.0)))
 
     def clear_wrenches(self) -> None:
         """Remove all wrenches of :meth:`add_wrench`."""
@@ -170,10 +175,9 @@ class SimLink:
         center = self.center_of_mass
         for each in self.wrenches:
             if each.start <= now + 0.5 * step:
-                arm = rotate(orientation, each.point)
-                arm = _sum(arm, _difference(position, center))
+                arm = add(rotate(orientation, each.point), difference(position, center))
                 row[:3] += each.force
-                row[3:] += _sum(each.torque, _cross(arm, each.force))
+                row[3:] += add(each.torque, cross(arm, each.force))
         self.wrenches = [each for each in self.wrenches if each.end > now + 1.5 * step]
         if self.has_damping:
             # As in ODE, a share of the velocity is lost in each step.
@@ -253,7 +257,7 @@ class SimJoint:
             raise SimulationError(f"{name}: the limit NaN is not finite")
         self.axis = axis._replace(xyz=self.axis.xyz, initial_position=self.axis.initial_position)
         if self.dof >= 0:
-            self.model.set_axis(self.scoped, self.record.kind, self.axis)
+            self.model.simulation.set_axis(self.scoped, self.record.kind, self.axis)
 
     def set_velocity_now(self, velocity: float) -> None:
         """Set the velocity at once."""
@@ -265,21 +269,18 @@ class SimJoint:
         """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
         _check(self, force)
         self._force = force
-        self.model.forces_changed()
+        self.model.force_changes()
 
     def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
         """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: for ever)."""
         _check(self, force)
-        start = max(start, self.model.time())
-        end = start + duration if duration >= 0 else math.inf
-        self._timed.append(TimedForce(force, start, end))
-        self.model.forces_changed()
+        self._timed.append(TimedForce(force, *self.model.force_changes(start, duration)))
 
     def clear_forces(self) -> None:
         """Remove the forces of :meth:`set_force` and :meth:`add_force`."""
         self._force = 0.0
         self._timed.clear()
-        self.model.forces_changed()
+        self.model.force_changes()
 
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
         """Start or change a motor that holds a velocity with at most a force."""
@@ -380,8 +381,8 @@ class SimJoint:
         reference = engine.data.subtree_com[root].tolist()
         pose = link.pose
         anchor = transform(pose, self.record.pose.position)
-        arm = _difference((reference[0], reference[1], reference[2]), anchor)
-        torque = _sum((torque_x, torque_y, torque_z), _cross(arm, force))
+        arm = difference((reference[0], reference[1], reference[2]), anchor)
+        torque = add((torque_x, torque_y, torque_z), cross(arm, force))
         fx, fy, fz = rotate_back(pose.orientation, force)
         tx, ty, tz = rotate_back(pose.orientation, torque)
         return Wrench((-fx, -fy, -fz), (-tx, -ty, -tz))
@@ -390,11 +391,9 @@ class SimJoint:
 class SimModel:
     """A model in the simulation: its links and joints by name."""
 
-    def __init__(
-        self, engine: Engine, name: str, record: Model, start: Pose, built: BuiltModel, owner: Owner
-    ) -> None:
-        self.engine = engine
-        self._owner = owner
+    def __init__(self, simulation: Owner, name: str, record: Model, start: Pose, built: BuiltModel) -> None:
+        self.simulation = simulation
+        self.engine = engine = simulation.engine
         self.name = name
         self.record = record
         self.built = built
@@ -433,42 +432,36 @@ class SimModel:
         link = self.canonical_link
         state = link.state
         pose = compose(state.pose, inverse(link.record.pose))
-        arm = _difference(pose.position, state.pose.position)
-        return State(pose, _sum(state.linear, _cross(state.angular, arm)), state.angular)
+        arm = difference(pose.position, state.pose.position)
+        return State(pose, add(state.linear, cross(state.angular, arm)), state.angular)
 
     def set_state(self, state: State) -> None:
         """Move the model; joint angles are kept, joint velocities become zero."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
-        change = compose(state.pose, inverse(self.pose))
-        self.move(change, state.linear, state.angular, state.pose.position)
+        self.move(self.pose, state)
 
     def set_velocity(self, linear: Vector, angular: Vector) -> None:
         """Set the velocity of the model's origin in world axes; the pose and the joints stay as they are."""
         _check(self, *linear, *angular)
         origin = self.pose.position
-        for name in self.built.free:
-            self._set_free_velocity(self.links[name], linear, angular, origin)
-        self.engine.is_stale = True
+        self._set_free_velocities(linear, angular, origin)
 
-    def move(self, change: Pose, linear: Vector, angular: Vector, origin: Vector) -> None:
-        """Apply a change of pose in the world, and set the velocity of a rigid motion with ``linear`` at ``origin``."""
+    def move(self, base: Pose, state: State) -> None:
+        """Move the model as a rigid body, so that its frame at the pose ``base`` gets the state. Joints stop."""
         self.engine.refresh()
+        change = compose(state.pose, inverse(base))
         for joint in self.all_joints():
             joint.set_velocity_now(0.0)
         for name in self.built.roots:
-            base = self.links[name].pose if name in self.built.free else self._rest_pose(name)
-            self._place(name, compose(change, base))
+            before = self.links[name].pose if name in self.built.free else self._rest_pose(name)
+            self._place(name, compose(change, before))
         self.engine.is_stale = True
-        for name in self.built.free:
-            self._set_free_velocity(self.links[name], linear, angular, origin)
-        self.engine.is_stale = True
+        self._set_free_velocities(state.linear, state.angular, state.pose.position)
 
     def _rest_pose(self, root: str) -> Pose:
         """Return the pose in the world of a root body that is not free, with its joint at position 0."""
         model, body = self.engine.model, self.links[root].id
-        x, y, z = model.body_pos[body].tolist()
-        w, qx, qy, qz = model.body_quat[body].tolist()
-        return Pose((x, y, z), (qx, qy, qz, w))
+        return _pose(model.body_pos[body], model.body_quat[body])
 
     def _place(self, root: str, pose: Pose) -> None:
         """Set a root body's pose, with its joint at position 0 if it has one."""
@@ -484,14 +477,15 @@ class SimModel:
         engine.model.body_pos[body] = pose.position
         engine.model.body_quat[body] = (w, x, y, z)
 
-    def _set_free_velocity(self, link: SimLink, linear: Vector, angular: Vector, origin: Vector) -> None:
-        """Set a free body's velocity; MuJoCo's angular part is in the body's axes."""
+    def _set_free_velocities(self, linear: Vector, angular: Vector, origin: Vector) -> None:
+        """Set the velocities of free bodies, as of one rigid body; MuJoCo's angular part is in the body's axes."""
         engine = self.engine
-        pose = link.pose
-        dof = int(engine.model.body_dofadr[link.id])
-        moved = _sum(linear, _cross(angular, _difference(pose.position, origin)))
-        engine.data.qvel[dof : dof + 3] = moved
-        engine.data.qvel[dof + 3 : dof + 6] = rotate_back(pose.orientation, angular)
+        for link in map(self.links.__getitem__, self.built.free):
+            pose = link.pose
+            dof = int(engine.model.body_dofadr[link.id])
+            engine.data.qvel[dof : dof + 3] = add(linear, cross(angular, difference(pose.position, origin)))
+            engine.data.qvel[dof + 3 : dof + 6] = rotate_back(pose.orientation, angular)
+        engine.is_stale = True
 
     def all_joints(self) -> Iterator[SimJoint]:
         """Yield each axis."""
@@ -528,21 +522,11 @@ class SimModel:
             remains = joint.apply_forces(now) or remains
         return remains
 
-    def time(self) -> float:
-        """Return the time of the simulation in seconds."""
-        return self._owner.time
-
-    def recompile(self) -> None:
-        """Compile the world again."""
-        self._owner.recompile()
-
-    def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
-        """Change one of MuJoCo's joints."""
-        self._owner.set_axis(scoped, kind, axis)
-
-    def forces_changed(self) -> None:
-        """Tell the simulation that a force acts on this model."""
-        self._owner.forced[self.name] = None
+    def force_changes(self, start: float = 0.0, duration: float = 0.0) -> tuple[float, float]:
+        """Tell the simulation that a force acts on this model. Return its start, which is not in the past, and its end (s)."""
+        self.simulation.forced[self.name] = None
+        start = max(start, self.simulation.time)
+        return start, start + duration if duration >= 0 else math.inf
 
 
 def _check(owner: SimLink | SimJoint | SimModel, *values: float) -> None:
@@ -552,15 +536,7 @@ def _check(owner: SimLink | SimJoint | SimModel, *values: float) -> None:
         raise SimulationError(f"{name}: a force, position or velocity is not finite")
 
 
-def _sum(left: Vector, right: Vector) -> Vector:
-    return left[0] + right[0], left[1] + right[1], left[2] + right[2]
-
-
-def _difference(left: Vector, right: Vector) -> Vector:
-    return left[0] - right[0], left[1] - right[1], left[2] - right[2]
-
-
-def _cross(left: Vector, right: Vector) -> Vector:
-    ax, ay, az = left
-    bx, by, bz = right
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+def _pose(position: NDArray[np.float64], wxyz: NDArray[np.float64]) -> Pose:
+    x, y, z = position.tolist()
+    w, qx, qy, qz = wxyz.tolist()
+    return Pose((x, y, z), (qx, qy, qz, w))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,10 @@ from minirospy.core.sdf.model import (
     Quaternion,
     Sphere,
     Surface,
+    Vector,
     Visual,
 )
-from minirospy.core.sdf.poses import compose, rotate
+from minirospy.core.sdf.poses import compose, rotate, unit
 from minirospy.ros.gazebo_ros.physics.decomposition import Decomposition
 from minirospy.ros.gazebo_ros.physics.library import SimulationError, load_mujoco
 from minirospy.ros.gazebo_ros.physics.textures import Textures
@@ -42,8 +43,11 @@ __all__ = [
     "GROUP_VISUAL",
     "PART",
     "SOLREF",
+    "Grain",
     "Shapes",
     "friction",
+    "grain",
+    "to_wxyz",
 ]
 
 # MuJoCo's groups of geoms, of which a ray or a camera selects some.
@@ -70,17 +74,38 @@ _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 
 
+class Grain(NamedTuple):
+    """A surface whose friction has two directions: that of ``mu``, in the body's axes, and the coefficients."""
+
+    direction: Vector
+    mu: float
+    mu2: float
+
+
+def grain(collision: Collision) -> Grain | None:
+    """Return the two directions of a collision's friction, or None if ``fdir1`` is missing or both coefficients are equal."""
+    surface = collision.surface
+    direction = unit(rotate(collision.pose.orientation, surface.fdir1))
+    mu, mu2 = _coefficients(surface)
+    return None if direction is None or mu == mu2 else Grain(direction, mu, mu2)
+
+
 def friction(surface: Surface) -> tuple[float, int]:
     """Return a geom's coefficient and its priority.
 
-    The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo has one
-    coefficient for both directions. The smaller one of ``mu`` and ``mu2`` is used: with a larger one, wheels that must slip
-    sideways, as those of a robot with four of them, do not turn it. If one is zero, as of a wheel that rolls sideways, the
+    The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo's geoms
+    have one coefficient for both directions. The smaller one of ``mu`` and ``mu2`` is used: with a larger one, wheels that must
+    slip sideways, as those of a robot with four of them, do not turn it. If one is zero, as of a wheel that rolls sideways, the
     mean is used: the wheel must drive.
     """
-    mu, mu2 = (min(max(value, 0.0), MAX_FRICTION) for value in (surface.mu, surface.mu2))
+    mu, mu2 = _coefficients(surface)
     value = min(mu, mu2) or (mu + mu2) / 2
     return value, round((MAX_FRICTION - value) * 1e6)
+
+
+def _coefficients(surface: Surface) -> tuple[float, float]:
+    mu, mu2 = (min(max(value, 0.0), MAX_FRICTION) for value in (surface.mu, surface.mu2))
+    return mu, mu2
 
 
 @dataclass(frozen=True)
@@ -98,11 +123,15 @@ class _Piece:
 
 
 class Shapes:
-    """Adds geoms to bodies of an MjSpec, and shares the meshes among them."""
+    """Adds geoms to bodies of an MjSpec, and shares the meshes among them.
+
+    grains: by the names of geoms that have or had one; a later geom of the same name replaces it.
+    """
 
     def __init__(self, spec: Any) -> None:
         self._mujoco = load_mujoco()
         self._spec = spec
+        self.grains: dict[str, Grain | None] = {}
         self.warnings: list[str] = []  # about textures and moving meshes
         self._textures = Textures(spec, self.warnings)
         self._decomposition = Decomposition(self.warnings)
@@ -142,7 +171,7 @@ class Shapes:
         ``is_wall``: it is a plane that is not level.
         """
         mu, priority = friction(collision.surface)
-        pose = collision.pose
+        pose, directions = collision.pose, grain(collision)
         if is_wheel and isinstance(collision.geometry, Cylinder):
             pieces = _wheel(collision.geometry)
         elif is_wall and isinstance(collision.geometry, Plane):
@@ -153,6 +182,8 @@ class Shapes:
             geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, pose)
             geom.group = piece.group
             geom.friction = [mu, 0.0, 0.0]
+            if directions is not None or geom.name in self.grains:
+                self.grains[geom.name] = directions
             geom.priority = priority
             geom.solref, geom.solimp = SOLREF, SOLIMP_WHEEL if turns else SOLIMP
             if piece.group == GROUP_RAY_ONLY:
@@ -183,7 +214,7 @@ class Shapes:
             geom.hfieldname = piece.asset
         whole = compose(pose, piece.pose)
         geom.pos = whole.position
-        geom.quat = _wxyz(whole.orientation)
+        geom.quat = to_wxyz(whole.orientation)
         return geom
 
     def _pieces(self, geometry: Geometry, *, is_static: bool) -> list[_Piece]:
@@ -332,9 +363,8 @@ def _wall(shape: Plane) -> _Piece:
 
 def _area(mesh: Mesh) -> float:
     # MuJoCo has the vertices in single precision.
-    corners = mesh.vertices.astype(np.float32)[mesh.triangles].astype(np.float64)
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(crosses, axis=1).sum()) / 2
+    rounded = Mesh(mesh.vertices.astype(np.float32).astype(np.float64), mesh.triangles)
+    return float(np.linalg.norm(rounded.crosses, axis=1).sum()) / 2
 
 
 def _meshes(geometry: Geometry) -> list[Mesh]:
@@ -364,6 +394,7 @@ def _turn_to(normal: tuple[float, float, float]) -> Quaternion:
     return -y / scale, x / scale, 0.0, scale / 2
 
 
-def _wxyz(rotation: Quaternion) -> tuple[float, float, float, float]:
+def to_wxyz(rotation: Quaternion) -> Quaternion:
+    """Return a quaternion in MuJoCo's order."""
     x, y, z, w = rotation
     return w, x, y, z

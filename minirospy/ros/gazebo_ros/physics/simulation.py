@@ -247,7 +247,7 @@ class Simulation:
         self.warnings += self._builder.take_warnings(name)
         if self._builder.has_visuals:
             self.warnings += self._builder.add_visuals(built, model, name)
-        added = SimModel(self.engine, name, model, pose, built, self)
+        added = SimModel(self, name, model, pose, built)
         self._models[name] = added
         return added
 
@@ -277,9 +277,8 @@ class Simulation:
             model.bind()
         model = self.engine.model
         self._geom_names = [model.geom(index).name.partition(PART)[0] for index in range(model.ngeom)]
-        bodies = [model.body(index).name for index in range(model.nbody)]
         owners = {link.id: name for name, each in self._models.items() for link in each.links.values()}
-        assert len(owners) == len(bodies) - 1
+        assert len(owners) == model.nbody - 1
         self._model_of_dof = [owners[int(body)] for body in model.dof_bodyid]
         joints = [owners[int(body)] for body in model.jnt_bodyid]
         self._farthest = np.full(model.nq, np.inf)
