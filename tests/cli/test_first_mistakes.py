@@ -192,6 +192,14 @@ def test_launch_file_that_is_no_xml(text: str, answer: str, tmp_path: Path) -> N
     assert done.stderr.splitlines()[-1].endswith(f"Invalid roslaunch XML syntax: {answer}")
 
 
+def test_include_with_the_dollar_outside_of_the_parentheses(tmp_path: Path) -> None:
+    file = tmp_path / "a.launch"
+    file.write_text("<launch><include file='$find(rpi_feros_bringup)/launch/x.launch'/></launch>")
+    done = typed("roslaunch", file)
+    assert done.returncode == 1
+    assert done.stderr.endswith(": $find(rpi_feros_bringup) is written $(find rpi_feros_bringup)\n")
+
+
 @pytest.mark.parametrize(
     ("value", "answer"),
     [
@@ -376,6 +384,18 @@ TYPED = [
     ("roslaunch rpi_led.launch", "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?"),
     ("roslaunch rpi_feros rpi_led.launch", "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`"),
     ("roslaunch nope.launch", "[nope.launch] is not a launch file name"),
+    (
+        "roslaunch rpi_led.launch rpi_feros_bringup",
+        "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?",
+    ),
+    (
+        "roslaunch rpi_feros_bringup/rpi_led.launch",
+        "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?",
+    ),
+    ("roslaunch rpi_feros_bringup rpi_led.lauch", "did you mean rpi_led.launch?"),
+    ("roslaunch rpi_feros_bringup rpi_lde", "did you mean rpi_led.launch?"),
+    ("rosrun led_actuator.py rpi_feros", "the package comes first: `rosrun rpi_feros led_actuator.py`"),
+    ("rostopic pub std_msgs/Bool /a True", "the topic comes first: rostopic pub /a std_msgs/Bool"),
     ("minirospy launch", "specify what to launch"),
     ("rostopic ehco /a", "did you mean echo?"),
     ("rostopic pub /a std_msgs/Int32", "please specify message values: data"),
