@@ -101,6 +101,25 @@ def test_each_text_of_the_course_is_translated_and_each_german_page_is_current()
     assert not left, "\n".join(left)
 
 
+def test_german_texts_use_the_terms_of_the_glossary() -> None:
+    glossary = read_catalogue(GERMAN / "index.po").header
+    refused = re.findall(r"\bnot (\w+)", glossary)
+    assert {"Knoten", "Dienst"} <= set(refused)
+    word = re.compile(rf"\b(?:{'|'.join(refused)})(?:e|en|er|n|s)?\b")
+    for path in sorted(GERMAN.glob("*.po")):
+        found = [entry.msgstr for entry in read_catalogue(path) if word.search(entry.msgstr)]
+        assert not found, f"{path.name}: see the glossary at the head of index.po: {found}"
+
+
+def test_comment_at_the_head_of_a_catalogue_is_kept(course: Path) -> None:
+    path = course / "de" / "topics.po"
+    catalogue = read_catalogue(path)
+    catalogue.header = "The glossary.\n\nnode: Node"
+    path.write_text(f"{catalogue}\n", encoding="utf-8")
+    assert translate(course, write=True) == []
+    assert read_catalogue(path).header == "The glossary.\n\nnode: Node"
+
+
 @pytest.mark.parametrize("page", english_pages())
 def test_both_pages_have_the_same_code_and_the_same_headings(page: str) -> None:
     english, german = ((folder / page).read_text(encoding="utf-8") for folder in (COURSE, GERMAN))

@@ -9,6 +9,8 @@ sentence has changed, its entry keeps the old translation and is marked "fuzzy",
 mark is removed. New text that another page has, too, or the catalogue ``--compendium FILE.po``, takes the translation from
 there. The exit status is 1, and each place to translate is printed, until all is translated; the German page shows the
 English text until then. ``--check`` only prints; a test does that, too.
+
+The comment at the head of docs/workshop/de/index.po is the glossary: one German term for each English one.
 """
 
 from __future__ import annotations
@@ -142,7 +144,7 @@ def updated(catalogue: polib.POFile, page: list[Piece], compendium: Mapping[str,
     known = {entry.msgid: entry for entry in catalogue if not entry.obsolete}
     stale = {text: entry for text, entry in known.items() if text not in texts and entry.msgstr}
     new = polib.POFile(wrapwidth=WRAP_WIDTH)
-    new.metadata = dict(METADATA)
+    new.metadata, new.header = dict(METADATA), catalogue.header
     for text in texts:
         entry = known.get(text) or polib.POEntry(msgid=text)
         if not entry.msgstr and text in compendium:

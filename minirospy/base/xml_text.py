@@ -21,8 +21,15 @@ MAX_LEVELS = 100  # maximum depth of nested tags; parsers and libraries recurse 
 # maximum tags per document; even a tag of 4 characters uses about 500 bytes of memory
 _MAX_ELEMENTS = 1_000_000
 _UNQUOTED = re.compile(rb"""<[^<"'>]*(?:"[^"]*"[^<"'>]*|'[^']*'[^<"'>]*)*?\s([\w:-]+)\s*=\s*([^\s"'<>/=]+)""")
-_MAX_ADVISED = (
-    1000  # bytes of a line that are searched for a value without quotes; the search takes quadratic time
+_MAX_ADVISED = 1000  # bytes of a line that are searched for a mistake; the searches take quadratic time
+_TYPOGRAPHIC_QUOTE = re.compile(rb"=\s*(?:\xe2\x80[\x98-\x9f]|\xc2[\xab\xbb])")
+_UNCLOSED = re.compile(rb"""\s([\w:-]+)\s*=\s*(["'])[^"'<>]*=\2""")
+# Patterns in a line that is not well-formed, and what to write instead.
+_MISTAKES = (
+    (re.compile(rb"&(?!#?\w+;)"), "& is written &amp;"),
+    (re.compile(rb"""=\s*(?:"[^"<]*<[^"]*"|'[^'<]*<[^']*')"""), "< in a value is written &lt;"),
+    # The second part is for a comment that starts in another line.
+    (re.compile(rb"<!--(?:(?!-->).)*?--(?!>)|\A[^<=]*--(?!>)"), "a comment contains no --"),
 )
 
 
@@ -142,18 +149,26 @@ def check_xml(text: str | bytes) -> None:
 
 
 def _advice(error: XmlSyntaxError, opened: list[XmlElement], text: str | bytes) -> str:
-    """Return a hint for the usual mistakes: an element that is not closed, a value without quotes, no text at all."""
+    """Return a hint for the usual mistakes: an element that is not closed, wrong quotes, a bare & or <, no text at all."""
     if not text.strip():
         return ": the file is empty"
     if error.why.startswith(("mismatched tag", "no element found")) and opened:
         last = opened[-1]
         return f": <{last.tag}> of line {last.line} is not closed, by /> or </{last.tag}>"
+    if error.why.startswith("junk after document element"):
+        return ": a file has one outermost tag"
     lines = text.split(b"\n") if isinstance(text, bytes) else text.encode("utf-8", "replace").split(b"\n")
     line = lines[error.line - 1][:_MAX_ADVISED] if 0 < error.line <= len(lines) else b""
+    if _TYPOGRAPHIC_QUOTE.search(line):
+        return ": a value is written in straight quotes, \" or '"
     if found := _UNQUOTED.search(line):
         name, value = (part.decode("utf-8", "replace") for part in found.groups())
         return f': a value is written in quotes: {name}="{value}"'
-    return ""
+    if not error.why.startswith("not well-formed"):
+        return ""
+    if found := _UNCLOSED.search(line):
+        return f": the value of {found[1].decode('utf-8', 'replace')} has no closing quote"
+    return next((f": {advice}" for pattern, advice in _MISTAKES if pattern.search(line)), "")
 
 
 def _check(line: int, level: int, left: int) -> None:

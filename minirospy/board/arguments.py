@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 
+from minirospy.base.notes import noted
 from minirospy.board.events import Detector, Slope
 
 __all__ = ["NO_BOUNCETIME", "channels_of", "detector_of", "level_of"]
@@ -16,7 +17,8 @@ def channels_of(channel: object) -> list[int]:
     if isinstance(channel, int):
         return [channel]
     if not isinstance(channel, (list, tuple)):
-        raise ValueError("Channel must be an integer or list/tuple of integers")
+        error = ValueError("Channel must be an integer or list/tuple of integers")
+        raise noted(error, f"it is {channel!r}; write the number without quotes")
     if not all(isinstance(one, int) for one in channel):
         raise ValueError("Channel must be an integer")
     return list(channel)

@@ -158,7 +158,11 @@ class Gpio:
         self, channel: int | Sequence[int], direction: int, pull_up_down: int = PUD_OFF, initial: int = -1
     ) -> None:
         """Configure one or several channels as input or output."""
-        direction, pull_up_down, initial = map(operator.index, (direction, pull_up_down, initial))
+        try:
+            direction, pull_up_down, initial = map(operator.index, (direction, pull_up_down, initial))
+        except TypeError as error:
+            noted(error, "the directions are GPIO.IN and GPIO.OUT, without quotes")
+            raise
         if direction not in {IN, OUT}:
             raise ValueError("An invalid direction was passed to setup()")
         if direction == OUT and pull_up_down != PUD_OFF:
@@ -323,7 +327,8 @@ class Gpio:
         if pin in self._waves:
             raise RuntimeError("A PWM object already exists for this GPIO channel")
         if self._directions.get(pin) != OUT:
-            raise RuntimeError("You must setup() the GPIO channel as an output first")
+            error = RuntimeError("You must setup() the GPIO channel as an output first")
+            raise noted(error, f"channel {channel}: call GPIO.setup({channel}, GPIO.OUT) before")
         return pin
 
     def register_wave(self, wave: Wave) -> None:
@@ -416,10 +421,13 @@ class Gpio:
         try:
             levels = [level_of(one) for one in values]
         except TypeError:
-            raise ValueError(
+            wrong_value = ValueError(
                 "Value must be an integer or boolean"
                 if several
                 else "Value must be an integer/boolean or a list/tuple of integers/booleans"
+            )
+            raise noted(
+                wrong_value, f"it is {value!r}; write GPIO.HIGH or GPIO.LOW, without quotes"
             ) from None
 
         pins = [self._pin(one) for one in channels]

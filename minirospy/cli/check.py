@@ -72,8 +72,12 @@ def _parser() -> Parser:
     add("--name", metavar="NAME", help="your name in the teacher's table, from now on", completer="nothing")
     add(
         "--one-master",
-        action="store_true",
-        help='with --join: print the variables for a class with one master: eval "$(minirospy check --join URI --one-master)"',
+        nargs="?",
+        const="",
+        metavar="SHELL",
+        help='with --join: print the variables for a class with one master: eval "$(minirospy check --join URI --one-master)"; '
+        "SHELL as for `minirospy shell`, such as powershell",
+        completer="shells",
     )
     add(
         "--snapshot",
@@ -101,7 +105,7 @@ def _check(
     patience: float,
     join: str | None,
     name: str | None,
-    one_master: bool,
+    one_master: str | None,
     snapshot: str | None,
     share: bool,
     shows_class: bool,
@@ -113,18 +117,22 @@ def _check(
 
     environment = Environment.read()
     record = Record.read(environment)
-    if one_master and join is None:
+    if one_master is not None and join is None:
         raise Misuse("--one-master needs --join URI")
     if join == "":
         raise Misuse("--join takes the URI of a master, such as http://192.168.65.50:11311")
+    if one_master is not None:
+        from minirospy.cli.completion.shell import shell_name
+
+        one_master = shell_name(one_master, default="sh")
     if join is not None or name is not None:
         from minirospy.course.results import class_master
         from minirospy.course.results import join as join_class
 
         join_class(record, join or "", name or "")
         record.write()
-        if one_master:
-            _print_exports(record)
+        if one_master is not None:
+            _print_variables(record, one_master)
             return 0
         uri = class_master(record, environment)
         where = (
@@ -190,21 +198,19 @@ def _run(word: str, work: list[str], patience: float, record: Record, master_uri
     return 0 if report.passed else NOT_PASSED
 
 
-def _print_exports(record: Record) -> None:
-    """Print the commands for a shell that make this terminal use the class's master, in the student's own namespace."""
-    import shlex
-
+def _print_variables(record: Record, shell: str) -> None:
+    """Print the lines that make a shell use the class's master, in the student's own namespace."""
     from minirospy.base.environment import split_uri
     from minirospy.introspect.doctor.reach import own_address_towards
+    from minirospy.workspace.setup_files import assignments
 
-    values = {
+    variables = {
         "ROS_MASTER_URI": record.master,
         # The master has just answered, so there is a route to it.
         "ROS_IP": own_address_towards(split_uri(record.master)[0]),
         "ROS_NAMESPACE": record.class_parameter.rpartition("/")[2],
     }
-    for name, value in values.items():
-        print(f"export {name}={shlex.quote(value)}")
+    sys.stdout.write(assignments(shell, variables))
 
 
 def _write_snapshot(name: str, environment: Environment) -> int:

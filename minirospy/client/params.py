@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
 
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, RpcRefused
+from minirospy.base.notes import noted
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import current_session
 from minirospy.core.graph.parameter_cache import NOT_SET
@@ -60,7 +61,9 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     if value is not NOT_SET:
         return as_xmlrpc_client(value)
     if default is UNSPECIFIED:
-        raise KeyError(param_name)
+        raise noted(
+            KeyError(param_name), f"it is not set; a default: rospy.get_param({param_name!r}, DEFAULT)"
+        )
     return default
 
 

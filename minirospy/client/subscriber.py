@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import time
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -33,6 +34,7 @@ _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
+_SILENT_SECONDS = 5.0  # a wait for a message that takes longer is logged, as one for a service
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 """Topics that are not counted: /statistics itself, and /clock, from which the times come."""
 
@@ -73,6 +75,13 @@ class Subscriber(Topic[_M_co]):
             raise ROSException("buffer size must be an integer")
         if buff_size <= 0:
             raise ROSException("buffer size must be a positive integer")
+        if callback is not None and not callable(callback):
+            # rospy reports this only when a message arrives.
+            warnings.warn(
+                f"the callback {callback!r} for {self.resolved_name} is not a function: pass its name, without quotes "
+                "and parentheses",
+                stacklevel=2,
+            )
         self._newest = max(0, queue_size or 0)
 
         with self._session.lock:
@@ -121,7 +130,14 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
     with session.lifecycle.interrupting(arrived.set):
         subscriber = Subscriber(topic, topic_type, on_message)
         try:
-            wait_for_event(arrived, timeout)
+            patience = _SILENT_SECONDS if timeout is None else min(timeout, _SILENT_SECONDS)
+            is_longer = timeout is None or timeout > _SILENT_SECONDS
+            if not wait_for_event(arrived, patience) and is_longer:
+                # rospy logs nothing here, so users would not notice a misspelled name.
+                peers = subscriber.get_num_connections()
+                why = "no message yet" if peers else "nothing publishes it"
+                _log.info("wait_for_message(%s): %s, waiting...", subscriber.resolved_name, why)
+                wait_for_event(arrived, None if timeout is None else timeout - patience)
         finally:
             subscriber.unregister()
     if got:

@@ -103,7 +103,11 @@ def sleep(duration: float | times.Duration) -> None:
     If the node shuts down during the sleep, raise ROSInterruptException, or return early in a thread that polls is_shutdown().
     Raise ROSTimeMovedBackwardsException if simulated time jumps back to before the sleep started.
     """
-    nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
+    try:
+        nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
+    except TypeError as error:
+        noted(error, "a duration is a number of seconds: rospy.sleep(0.5)")
+        raise
     _sleep(nanoseconds)
 
 
@@ -121,7 +125,7 @@ class Rate:
         self.last_time = get_rostime()
         try:
             self.sleep_dur = Duration(0, int(1e9 / hz))
-        except ZeroDivisionError as error:
+        except (ZeroDivisionError, TypeError) as error:
             noted(error, "a rate is a number of times per second: rospy.Rate(10)")
             raise
         self._reset = reset

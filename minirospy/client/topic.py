@@ -63,7 +63,8 @@ class Topic(Generic[_M_co]):
 
     def __init__(self, name: str, data_class: type[_M_co], reg_type: str) -> None:
         if not name or not isinstance(name, str):
-            raise ValueError("topic name is not a non-empty string")
+            error = ValueError("topic name is not a non-empty string")
+            raise noted(error, "the first argument is the topic's name, the second one its type")
         if data_class is None:
             error = ValueError("topic parameter 'data_class' is not initialized")
             raise noted(error, "the second argument is the type, as std_msgs.msg.String")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-__all__ = ["powershell_base", "powershell_setup", "quoted"]
+__all__ = ["assignment", "powershell_base", "powershell_setup", "quoted"]
 
 _HEAD = "# Made by minirospy: `. setup.ps1` to work with the packages of this workspace.\n"
 
@@ -56,6 +56,11 @@ _OTHERS = """if ($args[0] -ne '--extend') {
 def quoted(path: object) -> str:
     """Quote a path as one PowerShell word, in single quotes; double any quote inside."""
     return "'" + str(path).replace("'", "''") + "'"
+
+
+def assignment(name: str, value: str) -> str:
+    """Return the statement that sets an environment variable."""
+    return f"$env:{name} = {quoted(value)}"
 
 
 def powershell_base(base: Mapping[str, str], programs: Path) -> str:

@@ -7,13 +7,15 @@ Source: http://wiki.ros.org/catkin/workspaces, http://wiki.ros.org/ROS/Environme
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.workspace import powershell
 from minirospy.workspace.plan import DIST_PACKAGES
 
-__all__ = ["SHELLS", "SetUp", "setup_files", "shell_text"]
+__all__ = ["SHELLS", "SetUp", "assignments", "setup_files", "shell_text"]
 
 SHELLS = ("bash", "zsh", "sh", "fish", "powershell", "bat")
 
@@ -68,6 +70,14 @@ def shell_text(shell: str, setup: SetUp) -> str:
         return _bat_base(setup) + f'call "{setup.functions / "ros.bat"}"\n'
     functions = "" if shell == "sh" else f". {_quoted(setup.functions / 'ros.bash')}\n"
     return _posix_base(setup) + functions
+
+
+def assignments(shell: str, variables: Mapping[str, str]) -> str:
+    """Return the lines that set environment variables in a shell of ``SHELLS``, for the programs started from it."""
+    line = {"fish": _fish_assignment, "powershell": powershell.assignment, "bat": _bat_assignment}.get(
+        shell, _posix_assignment
+    )
+    return "".join(f"{line(name, value)}\n" for name, value in variables.items())
 
 
 # --- bash, zsh, sh
@@ -218,6 +228,10 @@ _BASE = {
 }
 
 
+def _posix_assignment(name: str, value: str) -> str:
+    return f"export {name}={shlex.quote(value)}"
+
+
 def _quoted(path: Path) -> str:
     """Quote a path as one word for a POSIX shell."""
     return "'" + str(path).replace("'", "'\\''") + "'"
@@ -295,7 +309,11 @@ def _fish_base(setup: SetUp) -> str:
     )
 
 
-def _fish_quoted(path: Path) -> str:
+def _fish_assignment(name: str, value: str) -> str:
+    return f"set -gx {name} {_fish_quoted(value)}"
+
+
+def _fish_quoted(path: Path | str) -> str:
     """Quote a path as one word for fish, in whose single quotes, unlike other shells', two escapes work."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
@@ -311,6 +329,11 @@ def _ps1(setup: SetUp, *, extends: bool) -> str:
 
 
 # --- cmd.exe
+
+
+def _bat_assignment(name: str, value: str) -> str:
+    # In a batch file a single % starts a variable's name. The quotes keep & and | from ending the command.
+    return '@set "{}={}"'.format(name, value.replace("%", "%%"))
 
 
 def _others_make_way_bat(setup: SetUp) -> str:

@@ -117,3 +117,33 @@ def test_xacro_refuses_expanding_entities(tmp_path: Path, included: bool) -> Non
     assert "the entity &a0; is declared" in done.stderr
     assert "Traceback" not in done.stderr
     assert not done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "advice"),
+    [
+        ("<l><!-- a -- b --></l>", "a comment contains no --"),
+        ("<l>\n<!-- a\n  -- b -->\n</l>", "a comment contains no --"),
+        ("<l><!-- a ---></l>", "a comment contains no --"),
+        ("<l a='1 & 2'/>", "& is written &amp;"),
+        ("<l>1 &amp; 2 & 3</l>", "& is written &amp;"),
+        ("<l a='a<b'/>", "< in a value is written &lt;"),
+        ('<l b="&lt;" a="a<b"/>', "< in a value is written &lt;"),
+        ("<l a='x b='1'/>", "the value of a has no closing quote"),
+        ("<l a=\u201cx\u201d/>", "a value is written in straight quotes, \" or '"),
+        ("<l a=x b='1 & 2'/>", 'a value is written in quotes: a="x"'),
+        ("<l/><l/>", "a file has one outermost tag"),
+        ("<l/>text", "a file has one outermost tag"),
+    ],
+)
+def test_usual_mistake_is_named(text: str, advice: str) -> None:
+    with pytest.raises(XmlSyntaxError) as error:
+        parse_xml(text)
+    assert error.value.why.endswith(f"): {advice}")
+
+
+@pytest.mark.parametrize("text", ["<l a='1'b='2'/>", "<l>\x01</l>", "<l><!-- a --><b a='--x'/>\x01</l>"])
+def test_other_mistakes_get_no_advice(text: str) -> None:
+    with pytest.raises(XmlSyntaxError) as error:
+        parse_xml(text)
+    assert error.value.why.endswith(")")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import time
 from pathlib import Path
 
@@ -146,7 +147,9 @@ def test_master_on_another_computer_gets_the_results(
     assert [student.name for student in gather(master)] == ["Anna"]
 
 
-def test_one_master_is_one_command(command: Command, master: str) -> None:
+def test_one_master_is_one_command(command: Command, master: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A shell for which there is no other syntax gets that of sh.
+    monkeypatch.setenv("SHELL", "/bin/dash")
     result = command("check", "--join", master, "--name", "Jörg", "--one-master")
     assert result.status == 0
     names = dict(line.removeprefix("export ").split("=", 1) for line in result.out.splitlines())
@@ -156,6 +159,43 @@ def test_one_master_is_one_command(command: Command, master: str) -> None:
     assert names["ROS_NAMESPACE"].startswith("J_rg_")
     assert names["ROS_NAMESPACE"].replace("_", "a").isalnum()
     assert command("check", "--one-master").status == 2
+
+
+ASSIGNMENTS = {
+    "bash": r"export {}='?(.+?)'?",
+    "fish": r"set -gx {} '(.+)'",
+    "powershell": r"\$env:{} = '(.+)'",
+    "pwsh": r"\$env:{} = '(.+)'",
+    "bat": r'@set "{}=(.+)"',
+}
+
+
+@pytest.mark.parametrize("shell", ASSIGNMENTS)
+@pytest.mark.parametrize("is_typed", [True, False])
+def test_one_master_prints_for_the_shell(
+    shell: str, is_typed: bool, command: Command, master: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SHELL", "/bin/zsh" if is_typed else f"/usr/bin/{shell}")
+    result = command(
+        "check", "--join", master, "--name", "anna", "--one-master", *([shell] if is_typed else [])
+    )
+    assert (result.status, result.err) == (0, "")
+    values = []
+    for name, line in zip(
+        ("ROS_MASTER_URI", "ROS_IP", "ROS_NAMESPACE"), result.out.splitlines(), strict=True
+    ):
+        found = re.fullmatch(ASSIGNMENTS[shell].format(name), line)
+        assert found, line
+        values.append(found[1])
+    assert values[0] == master
+    assert values[2].startswith("anna")
+
+
+def test_one_master_for_an_unknown_shell(command: Command, master: str) -> None:
+    result = command("check", "--join", master, "--name", "anna", "--one-master", "tcsh")
+    assert result.status == 2
+    assert "there is nothing for the shell [tcsh], only for bash" in result.err
+    assert not gather(master)
 
 
 def test_class_has_another_master_than_the_robot(

@@ -192,6 +192,14 @@ def test_launch_file_that_is_no_xml(text: str, answer: str, tmp_path: Path) -> N
     assert done.stderr.splitlines()[-1].endswith(f"Invalid roslaunch XML syntax: {answer}")
 
 
+def test_include_with_the_dollar_outside_of_the_parentheses(tmp_path: Path) -> None:
+    file = tmp_path / "a.launch"
+    file.write_text("<launch><include file='$find(rpi_feros_bringup)/launch/x.launch'/></launch>")
+    done = typed("roslaunch", file)
+    assert done.returncode == 1
+    assert done.stderr.endswith(": $find(rpi_feros_bringup) is written $(find rpi_feros_bringup)\n")
+
+
 @pytest.mark.parametrize(
     ("value", "answer"),
     [
@@ -358,13 +366,61 @@ def test_message_that_does_not_fit_and_that_nobody_gets(value: str, master: str)
             "import RPi.GPIO as GPIO; GPIO.setmode('BCM')",
             "the modes are GPIO.BCM and GPIO.BOARD, without quotes",
         ),
+        ("import rospy; rospy.init_node('x'); rospy.Rate('10')", "rospy.Rate(10)"),
+        ("import rospy; rospy.init_node('x'); rospy.sleep('1')", "rospy.sleep(0.5)"),
+        (
+            "import rospy; rospy.init_node('x'); rospy.get_param('~led')",
+            "it is not set; a default: rospy.get_param('~led', DEFAULT)",
+        ),
+        (
+            "import rospy; from std_msgs.msg import Bool; rospy.Subscriber(Bool, '/a', print)",
+            "the first argument is the topic's name, the second one its type",
+        ),
+        ("from std_msgs.msg import Bool; Bool(dat=True)", "a std_msgs/Bool has the fields data"),
     ],
 )
 def test_wrong_number_or_mode(code: str, note: str, master: str) -> None:
     assert typed("python", "-c", code).stderr.splitlines()[-1].endswith(note)
 
 
-# Forty mistakes that are typed without a running node, and a part of the last line of the answer.
+@pytest.mark.skipif(not HAS_NOTES, reason="Python 3.10 has no notes")
+@pytest.mark.parametrize(
+    ("call", "note"),
+    [
+        ("setup(11, 'IN')", "the directions are GPIO.IN and GPIO.OUT, without quotes"),
+        ("setup('7', GPIO.OUT)", "it is '7'; write the number without quotes"),
+        ("output(7, 'on')", "it is 'on'; write GPIO.HIGH or GPIO.LOW, without quotes"),
+        ("PWM(5, 50)", "channel 5: call GPIO.setup(5, GPIO.OUT) before"),
+    ],
+)
+def test_wrong_argument_of_a_pin(call: str, note: str) -> None:
+    code = "import RPi.GPIO as GPIO; GPIO.setmode(GPIO.BCM); GPIO.setup(7, GPIO.OUT)\n"
+    done = typed("python", "-c", f"{code}GPIO.{call}")
+    assert done.stderr.splitlines()[-1] == f"minirospy: {note}"
+
+
+def test_callback_in_quotes(master: str) -> None:
+    code = "import rospy; from std_msgs.msg import Bool; rospy.init_node('x')\n"
+    done = typed("python", "-c", f"{code}rospy.Subscriber('/a', Bool, 'on_a')")
+    assert (
+        "UserWarning: the callback 'on_a' for /a is not a function: pass its name, without quotes"
+        in done.stderr
+    )
+    assert "UserWarning" not in typed("python", "-c", f"{code}rospy.Subscriber('/a', Bool, print)").stderr
+
+
+def test_wait_for_a_message_on_a_misspelled_topic(master: str) -> None:
+    code = (
+        "import rospy; from minirospy.client import subscriber; from std_msgs.msg import Bool\n"
+        "rospy.init_node('x'); setattr(subscriber, '_SILENT_SECONDS', 0.01)\n"
+        "rospy.wait_for_message('/nope', Bool, 1)\n"
+    )
+    done = typed("python", "-c", code)
+    assert done.stdout.count("wait_for_message(/nope): nothing publishes it, waiting...") == 1
+    assert "timeout exceeded while waiting for message on topic /nope" in done.stderr
+
+
+# Mistakes that are typed without a running node, and a part of the last line of the answer.
 TYPED = [
     ("rosrun", "type rosrun PACKAGE EXECUTABLE"),
     ("rosrun rpi_feros", "[rpi_feros] has button_publisher.py"),
@@ -375,6 +431,18 @@ TYPED = [
     ("roslaunch rpi_led.launch", "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?"),
     ("roslaunch rpi_feros rpi_led.launch", "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`"),
     ("roslaunch nope.launch", "[nope.launch] is not a launch file name"),
+    (
+        "roslaunch rpi_led.launch rpi_feros_bringup",
+        "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?",
+    ),
+    (
+        "roslaunch rpi_feros_bringup/rpi_led.launch",
+        "did you mean `roslaunch rpi_feros_bringup rpi_led.launch`?",
+    ),
+    ("roslaunch rpi_feros_bringup rpi_led.lauch", "did you mean rpi_led.launch?"),
+    ("roslaunch rpi_feros_bringup rpi_lde", "did you mean rpi_led.launch?"),
+    ("rosrun led_actuator.py rpi_feros", "the package comes first: `rosrun rpi_feros led_actuator.py`"),
+    ("rostopic pub std_msgs/Bool /a True", "the topic comes first: rostopic pub /a std_msgs/Bool"),
     ("minirospy launch", "specify what to launch"),
     ("rostopic ehco /a", "did you mean echo?"),
     ("rostopic pub /a std_msgs/Int32", "please specify message values: data"),

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from minirospy.workspace.setup_files import SetUp, setup_files
+from minirospy.workspace.setup_files import SetUp, assignments, setup_files
 
 ROS_BAT = Path(__file__).parents[2] / "minirospy" / "workspace" / "shell" / "ros.bat"
 W: Any = PureWindowsPath
@@ -65,3 +65,9 @@ def test_extended_workspaces_come_first_and_the_local_file_omits_them() -> None:
     assert text.index(below) < text.index("%~dp0.")
     assert below not in FILES["local_setup.bat"]
     assert 'call :minirospy_last ROS_PACKAGE_PATH "C:\\py\\share\\msgs"' in text
+
+
+def test_assignments_are_quoted_for_a_batch_file() -> None:
+    assert assignments("bat", {"ROS_IP": "1.2.3.4", "NAME": "a & 50%"}) == (
+        '@set "ROS_IP=1.2.3.4"\n@set "NAME=a & 50%%"\n'
+    )

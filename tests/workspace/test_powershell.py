@@ -13,7 +13,7 @@ import pytest
 
 from minirospy.cli.completion.words import POWERSHELL
 from minirospy.cli.registry import COMMANDS
-from minirospy.workspace.setup_files import SetUp, setup_files, shell_text
+from minirospy.workspace.setup_files import SetUp, assignments, setup_files, shell_text
 
 ROS_PS1 = Path(__file__).parents[2] / "minirospy" / "workspace" / "shell" / "ros.ps1"
 W: Any = PureWindowsPath
@@ -69,7 +69,16 @@ def test_brackets_are_closed(text: str) -> None:
         assert code.count(opened) == code.count(closed) > 0
 
 
-@pytest.mark.parametrize("text", [*FILES.values(), ROS_PS1.read_text(), shell_text("powershell", SETUP)])
+ASSIGNMENTS = assignments("powershell", {"ROS_IP": "1.2.3.4", "NAME": "it's $HOME"})
+
+
+def test_assignments_set_variables_of_the_environment() -> None:
+    assert ASSIGNMENTS == "$env:ROS_IP = '1.2.3.4'\n$env:NAME = 'it''s $HOME'\n"
+
+
+@pytest.mark.parametrize(
+    "text", [*FILES.values(), ROS_PS1.read_text(), shell_text("powershell", SETUP), ASSIGNMENTS]
+)
 def test_grammar_of_powershell_parses_the_text(text: str) -> None:
     parsing = pytest.importorskip("tree_sitter", reason="`make interop` installs the grammar")
     powershell = pytest.importorskip("tree_sitter_powershell", reason="`make interop` installs the grammar")

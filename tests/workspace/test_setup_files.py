@@ -13,7 +13,7 @@ import pytest
 
 from minirospy.workspace.build import write_set_up
 from minirospy.workspace.packages import built_in_roots
-from minirospy.workspace.setup_files import SetUp, setup_files
+from minirospy.workspace.setup_files import SetUp, assignments, setup_files
 
 if TYPE_CHECKING:
     from conftest import Scene
@@ -55,6 +55,15 @@ SHELLS = [
     pytest.param("sh", "sh", id="sh"),
     pytest.param("fish", "fish", id="fish"),
 ]
+
+
+@pytest.mark.parametrize(("shell", "ending"), SHELLS)
+def test_assignments_are_read_by_the_shell(shell: str, ending: str, tmp_path: Path) -> None:
+    values = {"ONE": "http://pi:11311", "TWO": "it's $HOME & \\ `id`", "THREE": ""}
+    code = assignments(ending, values)
+    # printenv shows what the programs started from the shell receive.
+    script = code + "printenv ONE\nprintenv TWO\nprintenv THREE\n"
+    assert run(shell, script, tmp_path).split("\n") == [*values.values(), ""]
 
 
 @pytest.mark.parametrize(("shell", "ending"), SHELLS)

@@ -13,7 +13,7 @@ from minirospy.command.verbs import Command
 from minirospy.workspace.build import own_set_up
 from minirospy.workspace.setup_files import SHELLS, shell_text
 
-__all__ = ["COMMAND", "main"]
+__all__ = ["COMMAND", "main", "shell_name"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -35,14 +35,24 @@ def _parser() -> Parser:
     return parser
 
 
-def _shell(shell: str | None) -> None:
-    default = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
-    name = shell or Path(default).stem
+def shell_name(word: str, default: str | None = None) -> str:
+    """Return a shell's name in ``SHELLS``: that of ``word`` or, if it is empty, that of the variable SHELL.
+
+    ``default`` replaces a shell that only SHELL names. Raise UsageError if there is nothing for the shell.
+    """
+    user_shell = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
+    name = word or Path(user_shell).stem
     # pwsh is the name of PowerShell's program on Linux and macOS and, from version 6 on, on Windows.
     name = "powershell" if name == "pwsh" else name
-    if name not in SHELLS:
-        raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")
-    sys.stdout.write(shell_text(name, own_set_up(Path(), (), ())))
+    if name in SHELLS:
+        return name
+    if default is not None and not word:
+        return default
+    raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")
+
+
+def _shell(shell: str | None) -> None:
+    sys.stdout.write(shell_text(shell_name(shell or ""), own_set_up(Path(), (), ())))
 
 
 COMMAND = Command("minirospy shell", _parser, _shell)

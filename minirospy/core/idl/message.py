@@ -18,6 +18,7 @@ from minirospy.base.errors import (
     MessageException,
     SerializationError,
 )
+from minirospy.base.notes import noted
 from minirospy.base.times import Duration, Time, TVal
 from minirospy.core.idl.protocols import is_message, is_stamped
 
@@ -92,7 +93,8 @@ class Message:
             return
         for name in kwds:
             if name not in names:
-                raise AttributeError(f"{name} is not an attribute of {type(self).__name__}")
+                error = AttributeError(f"{name} is not an attribute of {type(self).__name__}")
+                raise noted(error, f"a {self._type} has the fields {', '.join(names)}")
         for name in names:
             setattr(self, name, kwds.get(name))
 

@@ -129,12 +129,28 @@ def _parse(text: str, package: str, name: str, where: str, first_line: int) -> M
             fields.append(Field(rest, type_))
             declared = rest
         if not _NAME.match(declared):
-            raise DefinitionError(where, number, f"[{_cut(declared)}] is not a legal field name")
+            advice = _advice_for_field(match["type"], declared)
+            raise DefinitionError(where, number, f"[{_cut(declared)}] is not a legal field name{advice}")
         if declared in seen:
             raise DefinitionError(where, number, f"[{_cut(declared)}] is declared twice")
         seen.add(declared)
 
     return MessageSpec(package, name, tuple(fields), tuple(constants), text)
+
+
+def _advice_for_field(type_: str, declared: str) -> str:
+    """Return what is wrong with a field's name, for the habits of C, C++ and Python."""
+    if array := re.fullmatch(r"(\w+)\s*(\[\d*\])", declared):
+        return f": an array is written {_cut(type_)}{array[2]} {array[1]}"
+    if "//" in declared:
+        return ": a comment starts with #"
+    if declared.endswith(";"):
+        return ": a line has no ; at its end"
+    if "," in declared:
+        return ": each field has its own line"
+    if "-" in declared:
+        return ": letters, digits and _; no -"
+    return ""
 
 
 def _parse_type(text: str, package: str, where: str, line: int) -> FieldType:

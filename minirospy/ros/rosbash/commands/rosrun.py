@@ -100,6 +100,13 @@ def _what_there_is(words: list[str], packages: Packages) -> str:
     return f": [{words[0]}] has {', '.join(programs) or 'no programs'}"
 
 
+def _has(packages: Packages, package: str, program: str) -> bool:
+    try:
+        return program in packages.executables(package)
+    except NotFoundError:
+        return False
+
+
 def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
     """Return the commands that run a program.
 
@@ -109,6 +116,8 @@ def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
         folder = packages.find(package)
     except NotFoundError as error:
         ros = RosText(f"[rospack] Error: package '{package}' not found", _NO_PACKAGE)
+        if _has(packages, program, package):
+            error.hint = f"the package comes first: `rosrun {program} {package}`"
         raise WordedError(error, ros) from error
     try:
         return packages.find_executables(package, program)

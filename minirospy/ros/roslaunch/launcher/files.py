@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,6 +17,7 @@ __all__ = [
     "near_files",
     "read_bytes",
     "read_launch_file",
+    "wrong_substitution",
 ]
 
 # maximum size in bytes; a launch file for a hundred robots is about 100 kB
@@ -54,12 +56,17 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
         except NotFoundError as error:
             raise LaunchFileNotFoundError(
                 f"[{file}] is neither a launch file in package [{package}] nor is [{package}] a launch file name",
-                f"{error}{_package_with(file, packages)}",
+                f"{error}{_hint_for_package_and_file(package, file, packages, has_hint=bool(error.nearest))}",
             ) from error
 
     for file in what:
         if not Path(file).is_file():
-            hint = near_files(file) or _launch_files_of(file, packages) or _package_with(file, packages)
+            hint = (
+                near_files(file)
+                or _launch_files_of(file, packages)
+                or _package_with(file, packages)
+                or _in_one_word(file, packages)
+            )
             raise LaunchFileNotFoundError(
                 f"[{file}] is not a launch file name", f"type roslaunch PACKAGE FILE, or a path{hint}"
             )
@@ -116,6 +123,12 @@ def hidden_hint(file: str, packages: Packages) -> str:
     return ""
 
 
+def wrong_substitution(file: str) -> str:
+    """Return the hint for a file whose name has a substitution with the $ outside of the parentheses."""
+    found = re.search(r"\$(find|arg|dirname|env|optenv|anon|eval)\(([^)]*)\)", file)
+    return f": {found[0]} is written $({found[1]} {found[2]})" if found else ""
+
+
 def _package_of(file: Path) -> Path | None:
     return next((each for each in file.parents if (each / "package.xml").is_file()), None)
 
@@ -127,6 +140,42 @@ def _launch_files_of(package: str, packages: Packages) -> str:
     except NotFoundError:
         return ""
     return f"; package [{package}] has {', '.join(files) or 'no launch files'}"
+
+
+def _in_one_word(word: str, packages: Packages) -> str:
+    """Return the hint for a package and a file that are written as one path."""
+    package, _, file = word.partition("/")
+    return _command_hint(package, file.rpartition("/")[2], packages)
+
+
+def _hint_for_package_and_file(package: str, file: str, packages: Packages, *, has_hint: bool) -> str:
+    """Return the hint for a file that the package does not have; ``has_hint``: similar names have been suggested."""
+    return (
+        _command_hint(file, package, packages)
+        or _package_with(file, packages)
+        or ("" if has_hint else _near_file_of(package, file, packages))
+    )
+
+
+def _command_hint(package: str, file: str, packages: Packages) -> str:
+    """Return the command that launches a file of a package as a hint, or an empty string if there is no such file."""
+    try:
+        packages.find_resource(package, file)
+    except (MinirospyError, OSError, ValueError):
+        return ""
+    return f"; did you mean `roslaunch {package} {file}`?"
+
+
+def _near_file_of(package: str, file: str, packages: Packages) -> str:
+    """Return the hint for a misspelled launch file of a package."""
+    try:
+        folder = packages.find(package)
+    except NotFoundError:
+        return ""
+    # Compare names without suffixes, because all launch files have the same one.
+    known = {path.stem: path.name for path in folder.rglob("*.launch")}
+    near = [known[name] for name in nearest(file.partition(".")[0], known)]
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def _package_with(file: str, packages: Packages) -> str:

@@ -15,7 +15,13 @@ from minirospy.base import names
 from minirospy.base.errors import LaunchError
 from minirospy.base.suggestions import nearest
 from minirospy.ros.roslaunch.launcher.document import Tag, parse_document
-from minirospy.ros.roslaunch.launcher.files import hidden_hint, near_files, read_bytes, read_launch_file
+from minirospy.ros.roslaunch.launcher.files import (
+    hidden_hint,
+    near_files,
+    read_bytes,
+    read_launch_file,
+    wrong_substitution,
+)
 from minirospy.ros.roslaunch.launcher.parameters import param_value, rosparam_values
 from minirospy.ros.roslaunch.launcher.spec import (
     ArgDoc,
@@ -296,7 +302,9 @@ class _File:
             text = read_bytes(file)
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or error
-            hint = near_files(file) + hidden_hint(file, self._substitution.packages)
+            hint = (
+                near_files(file) + hidden_hint(file, self._substitution.packages) + wrong_substitution(file)
+            )
             raise tag.error(f"cannot include [{file}]: {why}{hint}") from None
 
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})

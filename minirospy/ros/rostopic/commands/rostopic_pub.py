@@ -164,7 +164,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     from minirospy.introspect.echo import fill_message
     from minirospy.introspect.publishing import publish_all, values_to_publish
 
-    cls = _message_class(options.type)
+    cls = _message_class(options.type, options.topic)
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
@@ -210,14 +210,16 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
         publish_all(node, publisher, messages, options.rate or _FILE_RATE, show)
 
 
-def _message_class(type_: str) -> type[Message]:
-    from minirospy.core.idl.load import message_class
+def _message_class(type_: str, topic: str) -> type[Message]:
+    from minirospy.core.idl.load import get_message_class, message_class
 
     try:
         return message_class(type_)
     except NotFoundError as error:
         package = type_.partition("/")[0]
         hint = f"If this is a valid message type, perhaps you need to type 'rosmake {package}'"
+        if "/" in topic.strip("/") and get_message_class(topic.strip("/")):
+            error.hint = f"the topic comes first: rostopic pub {type_} {topic}"
         raise WordedError(error, RosText(f"ERROR: invalid message type: {type_}.\n{hint}")) from error
 
 
