@@ -21,6 +21,7 @@ __all__ = ["Finding", "Report", "check", "words_of"]
 
 START_SECONDS = 15.0  # for a node to register, on a slow laptop with a virus scanner
 OWN_START_SECONDS = 60.0  # for a program of the exercise itself, without which it cannot be checked
+_EXIT_SECONDS = 1.0  # from the traceback to the end of a program that fails
 _LAST_LINES = 8  # lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # time for which `click` holds a button: longer than two polls of a node with 10 Hz
 _REPEAT_HERTZ = 10.0  # of published messages, unless an exercise says otherwise
@@ -112,6 +113,7 @@ def check(
         patience=patience,
         listens=_topics(exercise.steps),
         needs_graph=needs_graph or not exercise.live,
+        work_ends=exercise.ends,
     ) as world:
         _Run(exercise, list(programs), Trial(world, answers=list(answers), ask=ask), report, tell).run()
         world.stop_programs(only_work=True)
@@ -220,6 +222,9 @@ class _Run:
         is_fine = True
         ends_itself = self._exercise.ends
         for program in self._trial.work:
+            if program.status is None and program.name not in self._reported and program.fault():
+                # A traceback is printed before the exit.
+                self._trial.world.wait_until(partial(_has_ended, program), _EXIT_SECONDS)
             status = program.status
             if status is not None:
                 program.wait_for_output()
@@ -262,6 +267,11 @@ class _Run:
 def _has_started(world: World, before: set[str], program: Program) -> bool:
     """Return whether a new node is registered, or the program has already exited."""
     return bool(world.nodes() - before) or program.status is not None
+
+
+def _has_ended(program: Program) -> bool:
+    """Return whether a program has exited."""
+    return program.status is not None
 
 
 def _ended_finding(program: Program, status: int, fault: str, exercise: Exercise) -> Finding:

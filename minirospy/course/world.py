@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["Arrival", "World"]
 
 _POLL_SECONDS = 0.02
+_LAST_EFFECT_SECONDS = 1.0  # after this, nothing that a program did before its exit can still have an effect
 _KEPT_MESSAGES = 5000  # messages kept per topic: a minute of a topic with 80 Hz
 _STOP_SECONDS = 10.0  # wait for a program after Ctrl-C
 _LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
@@ -89,6 +90,7 @@ class _Repeat:
 class World:
     """Context manager for the surroundings of one check. ``patience`` multiplies all time limits.
 
+    With ``work_ends``, the student's programs are expected to exit by themselves.
     ``board`` is the virtual board, ``environment`` the programs' environment, ``programs`` all started programs, in order.
     """
 
@@ -99,12 +101,14 @@ class World:
         patience: float = 1.0,
         listens: Sequence[str] = (),
         needs_graph: bool = True,
+        work_ends: bool = False,
     ) -> None:
         self.live = live
         self.patience = patience
         self.programs: list[Program] = []
         self._listens = tuple(listens)
         self._needs_graph = needs_graph
+        self._work_ends = work_ends
         self._arrivals: dict[str, deque[Arrival]] = {}
         self._repeats: dict[str, _Repeat] = {}
         self._publishers: dict[str, TopicPublisher] = {}
@@ -150,14 +154,24 @@ class World:
                     self._tell_guardian(f"-{program.process.pid}")
 
     def wait_until(self, holds: Callable[[], bool], seconds: float) -> bool:
-        """Poll until ``holds()`` is true or ``seconds``, times the patience, have passed. Return whether it is true."""
+        """Poll until ``holds()`` is true or ``seconds``, times the patience, have passed. Return whether it is true.
+
+        Stop earlier if all of the student's programs have exited, unless they are expected to.
+        """
         end = time.monotonic() + seconds * self.patience
         while not holds():
+            if self._work_has_ended():
+                end = min(end, time.monotonic() + _LAST_EFFECT_SECONDS * self.patience)
             if time.monotonic() >= end:
                 # The last poll may have been long ago on a busy machine.
                 return holds()
             time.sleep(_POLL_SECONDS)
         return True
+
+    def _work_has_ended(self) -> bool:
+        """Return whether no program of the student's runs any more, although one should."""
+        work = [program for program in self.programs if program.is_work]
+        return bool(work) and not self._work_ends and all(each.status is not None for each in work)
 
     def nodes(self) -> set[str]:
         """Return the names of the nodes at the master, without those of the check itself."""

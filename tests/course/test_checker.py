@@ -111,8 +111,11 @@ def test_syntax_error_is_named_with_its_line(lamp: Exercise, tmp_path: Path) -> 
     assert "(lamp.py, line 2)" in str(report.findings[0])
 
 
-def test_program_that_ends_is_advised_to_spin(lamp: Exercise, tmp_path: Path) -> None:
-    report = run(lamp, tmp_path, "import rospy\nrospy.init_node('lamp')\nprint('done')\n")
+def test_program_that_ends_is_advised_to_spin_before_the_time_for_its_effects_has_passed(
+    tmp_path: Path,
+) -> None:
+    patient = parse_exercise(LAMP.replace("within: 5", "within: 3600"), "lamp.yaml")
+    report = run(patient, tmp_path, "import rospy\nrospy.init_node('lamp')\nprint('done')\n")
     assert "it ended by itself after" in str(report.findings[0])
     assert "rospy.spin()" in report.findings[0].hint
 

@@ -19,6 +19,7 @@ from minirospy.base.errors import BagCompressionError, BagFormatError
 from minirospy.base.installation import install_command
 from minirospy.core.bag.compression import BZ2, COMPRESSIONS, LZ4, check_compression, compress, decompress
 
+BOMB_SIZE = 96 << 20  # bytes; the tests share the bombs, because compressing one takes up to a second
 LARGE = os.urandom(700_000) + b"ros " * 700_000
 
 
@@ -104,13 +105,13 @@ def test_missing_lz4_library_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @cache
-def bomb(name: str, size: int) -> bytes:
+def bomb(name: str) -> bytes:
     """Return compressed zeros, made in pieces."""
     if name == BZ2:
         stream = bz2.BZ2Compressor()
-        return b"".join(stream.compress(bytes(1 << 20)) for _ in range(size >> 20)) + stream.flush()
+        return b"".join(stream.compress(bytes(1 << 20)) for _ in range(BOMB_SIZE >> 20)) + stream.flush()
     with lz4.frame.LZ4FrameCompressor() as frame:
-        parts = [frame.begin(), *(frame.compress(bytes(1 << 20)) for _ in range(size >> 20))]
+        parts = [frame.begin(), *(frame.compress(bytes(1 << 20)) for _ in range(BOMB_SIZE >> 20))]
         return b"".join((*parts, frame.flush()))
 
 
@@ -125,7 +126,7 @@ def test_more_than_the_limit_is_refused_before_anything_is_decompressed(name: st
 @pytest.mark.parametrize("announced", [96, 100, 40])
 def test_much_data_is_in_memory_once(name: str, announced: int, tmp_path: Path) -> None:
     file = tmp_path / "data"
-    file.write_bytes(bomb(name, 96 << 20))
+    file.write_bytes(bomb(name))
     program = f"""
 import resource, sys
 from minirospy.core.bag.compression import decompress
@@ -167,5 +168,5 @@ def test_unneeded_chunks_are_not_decompressed(name: str) -> None:
         return len(asked) > 2
 
     with pytest.raises(BagFormatError, match="not needed any more"):
-        decompress(name, bomb(name, 128 << 20), 128 << 20, is_cancelled)
+        decompress(name, bomb(name), BOMB_SIZE, is_cancelled)
     assert len(asked) == 3

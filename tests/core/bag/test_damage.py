@@ -108,9 +108,9 @@ def test_bag_that_is_cut_off_anywhere_is_unindexed_and_repaired(compression: str
 
 def test_uncompressed_bag_that_is_cut_off_keeps_every_whole_message() -> None:
     data = make_bag(GIVEN)
+    ends = [data.index(each.body) + len(each.body) for chunk in GIVEN for each in chunk]
     for end in range(4117, 9000, 7):
-        whole = sum(data.find(each.body, 0, end) >= 0 for chunk in GIVEN for each in chunk)
-        assert len(repaired(data[:end])) == whole
+        assert len(repaired(data[:end])) == sum(each <= end for each in ends)
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS[1:])
@@ -118,8 +118,8 @@ def test_uncompressed_bag_that_is_cut_off_keeps_every_whole_message() -> None:
 def test_flipped_byte_never_gives_another_message(
     compression: str, part: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    data = make_bag(GIVEN[:5], compression=compression)
-    expected = {tuple(each) for chunk in GIVEN[:5] for each in chunk}
+    data = make_bag(GIVEN[:2], compression=compression)
+    expected = {tuple(each) for chunk in GIVEN[:2] for each in chunk}
     # The header's record is padded to 4,096 bytes with spaces, which have no meaning.
     spaces = data.index(b" " * 100)
     start = [*range(spaces), *range(spaces, 4096, 64)]
@@ -135,7 +135,7 @@ def test_flipped_byte_never_gives_another_message(
 
 
 def test_flipped_byte_of_the_index_loses_no_message_without_an_error() -> None:
-    data = make_bag(GIVEN, compression="lz4")
+    data = make_bag(GIVEN[:4], compression="lz4")
     reader = open_bag(io.BytesIO(data))
     assert isinstance(reader, ChunkedReader)
     silent = []
@@ -144,7 +144,7 @@ def test_flipped_byte_of_the_index_loses_no_message_without_an_error() -> None:
             damaged = data[:at] + bytes((data[at] ^ flip,)) + data[at + 1 :]
             try:
                 opened = open_bag(io.BytesIO(damaged))
-                if len(list(opened.messages())) != len(EVERY):
+                if len(list(opened.messages())) != 80:
                     silent.append(at)
             except BagError:
                 continue

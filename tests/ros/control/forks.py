@@ -20,7 +20,7 @@ _TIMEOUT_SECONDS = 100  # of one program, where it is started as usual; else pyt
 _ROOT = Path(__file__).parents[3]
 
 _SERVER = """
-import json, os, sys
+import gc, json, os, sys
 import rospy, actionlib, dynamic_reconfigure.client, rospy_message_converter.message_converter
 import ackermann_steering_controller, controller_interface, diff_drive_controller, effort_controllers
 import force_torque_sensor_controller, gripper_action_controller, imu_sensor_controller, joint_state_controller
@@ -29,6 +29,9 @@ import controller_manager.controller_manager_interface, controller_manager_msgs.
 import nav_msgs.msg, diagnostic_msgs.msg, rosgraph_msgs.msg, tf.msg
 import minirospy.core.control.loopback, minirospy.core.urdf.read
 
+# A program's garbage collection, above all the one at its end, would otherwise visit all objects of these modules.
+gc.collect()
+gc.freeze()
 while True:
     line = sys.stdin.readline()
     if not line:
