@@ -1,4 +1,4 @@
-"""libgazebo_ros_diff_drive.so: drives two wheels by /cmd_vel, and publishes /odom and its transform."""
+"""libgazebo_ros_diff_drive.so: drives two wheels as commanded on /cmd_vel, and publishes /odom and its transform."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class DiffDrive(ModelPlugin):
     """The plugin."""
 
     def load(self) -> None:
-        """Start the wheels' motors."""
+        """Start the wheel motors."""
         self.default_namespace = self.model.name
         self._joints = (
             self.joint(self.text("leftJoint", "left_joint")),
@@ -78,7 +78,7 @@ class DiffDrive(ModelPlugin):
         self._speed, self._turn = message.linear.x, message.angular.z
 
     def update(self) -> None:
-        """Publish, and set the motors."""
+        """Publish the odometry, and set the motors."""
         now_ns = self.simulation.time_ns
         if self._uses_encoders:
             self._read_encoders(now_ns)

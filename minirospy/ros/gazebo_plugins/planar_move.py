@@ -1,4 +1,4 @@
-"""libgazebo_ros_planar_move.so: moves a whole model over the ground by /cmd_vel, and publishes /odom."""
+"""libgazebo_ros_planar_move.so: moves a whole model over the ground as commanded on /cmd_vel, and publishes /odom."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class PlanarMove(ModelPlugin):
         self._commanded_ns = self.simulation.time_ns
 
     def update(self) -> None:
-        """Set the model's velocity, and publish."""
+        """Set the model's velocity, and publish odometry."""
         now_ns = self.simulation.time_ns
         if 0 <= self._timeout < (now_ns - self._commanded_ns) / 1e9:
             self._command = (0.0, 0.0, 0.0)
@@ -66,7 +66,7 @@ class PlanarMove(ModelPlugin):
             self._odometry.publish(to_odometry(self.now, self._frames, flat, velocity, _VARIANCES))
 
     def _mean_velocity(self, now_ns: int, pose: Pose, yaw: float) -> tuple[float, float, float]:
-        """Return the velocity forwards, to the left and the turn rate since the last message, as in Gazebo."""
+        """Return the mean velocity forwards and to the left, and the mean turn rate, since the last message, as in Gazebo."""
         last, self._last = self._last, (now_ns, pose, yaw)
         if last is None or now_ns <= last[0]:
             return 0.0, 0.0, 0.0
