@@ -191,7 +191,7 @@ def _run(word: str, work: list[str], patience: float, record: Record, master_uri
 
 
 def _print_exports(record: Record) -> None:
-    """Print the shell commands that connect this terminal to the class's master, in the student's own namespace."""
+    """Print the commands for a shell that make this terminal use the class's master, in the student's own namespace."""
     import shlex
 
     from minirospy.base.environment import split_uri

@@ -37,11 +37,11 @@ __all__ = [
 ]
 
 CLASS_PARAMETER = "/minirospy_class"
-_MAX_FAILURES = 5  # failed sentences of a check that the teacher's page shows
-_MAX_LETTERS = 300  # characters per sentence
-_MAX_NAME = 60  # characters in a student's name
-_MAX_TIME = 4e9  # seconds since 1970 (the year 2096); time.localtime fails for far larger values
-_SECONDS = 3.0  # timeout for calls to the class's master: a check must not wait long for an unreachable one
+_MAX_FAILURES = 5  # sentences of a failed check that the teacher sees
+_MAX_LETTERS = 300  # characters of such a sentence
+_MAX_NAME = 60  # characters of a student's name
+_MAX_TIME = 4e9  # seconds since 1970, in the year 2096: time.localtime refuses far larger values
+_SECONDS = 3.0  # timeout for the class's master: a check must not wait for a computer that has left
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def send(record: Record, uri: str) -> None:
 def parameter_key(name: str) -> str:
     """Convert a name to the last part of a parameter's name: letters, digits and underscores, starting with a letter.
 
-    A checksum distinguishes names that differ only in other characters, such as Jörg and Jürg.
+    A checksum keeps names apart that differ only in other characters, such as Jörg and Jürg.
     """
     text = re.sub(r"\W", "_", name, flags=re.ASCII)[:_MAX_NAME]
     if text != name:

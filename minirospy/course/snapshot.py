@@ -35,16 +35,16 @@ _DOCTOR_SECONDS = 60.0
 
 
 def write_snapshot(file: Path, environment: Environment) -> tuple[int, list[str]]:
-    """Write the snapshot; return the number of workspace files in it, and the files that are left out.
+    """Write the snapshot; return the number of the workspace's files in it, and the files that are left out.
 
-    The workspace consists of the folders in ROS_PACKAGE_PATH. A file is left out if it is too large, or if the total would be.
-    Hidden files, which may contain keys or passwords, and build folders are left out, too. Raise MinirospyError if there is no
-    workspace, or if the file exists or cannot be written. An unfinished file is removed.
+    A file is left out if it, or all files together, would be too large. The workspace is the folders of ROS_PACKAGE_PATH. Hidden
+    files, which may be keys and passwords, and build folders are left out. Raise MinirospyError if there is no workspace, or if
+    the file exists or cannot be written; an unfinished file is removed.
     """
     roots = [root for root in environment.package_path if root.is_dir() and os.access(root, os.W_OK)]
     if not roots:
         raise MinirospyError("no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`")
-    # List all files before creating the snapshot, because it may be in the workspace itself.
+    # Each list is complete before the snapshot exists, which may be in the workspace itself.
     listed = [(root, _files(root)) for root in roots]
     try:
         # A zip file cannot store dates before 1980: use 1980-01-01 instead.
@@ -91,7 +91,7 @@ def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]]) -> tu
 
 
 def _files(root: Path) -> list[Path]:
-    """Return the files below a folder, sorted, without links that lead out of it."""
+    """Return the files below a folder, sorted, without links out of it."""
     found = []
     for folder, inner, names in os.walk(root):
         inner[:] = sorted(each for each in inner if each not in _LEFT_OUT and not each.startswith("."))

@@ -239,7 +239,7 @@ class Timer:
         self._next = 0
 
     def is_due(self, now_ns: int) -> bool:
-        """Return whether the next period starts."""
+        """Return whether the next period begins."""
         if now_ns < self._next - self._period:  # the time was reset
             self._next = now_ns
         if now_ns < self._next:
@@ -345,7 +345,7 @@ class PluginHost:
         self._list()
 
     def update(self) -> None:
-        """Run all plugins before a step. If a plugin fails, close it and log its name."""
+        """Run all plugins before a step. A plugin that fails is closed and named."""
         for plugin in self._running:
             try:
                 plugin.update()

@@ -137,7 +137,7 @@ class SharedRing:
         self._is_off = False
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
-        self._is_watched = False  # whether the timer is running or about to run
+        self._is_watched = False  # whether the timer runs, or is about to
 
     @property
     def memory_bytes(self) -> int:
@@ -302,12 +302,12 @@ class RingSender:
 
     def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
         self.step = Step.NEW
-        self.announced = 0  # number of messages sent through the ring
+        self.announced = 0  # number of messages that went through the ring
         self._ring = shared
         self._sock = sock
-        self.memory: _Memory | None = None  # the memory last offered to the subscriber
-        self._counter = -1  # eventfd of the last offer, which counts the subscriber's releases
-        self._is_releasing = True  # whether the subscriber released a place during the last wait
+        self.memory: _Memory | None = None  # the memory that was offered last
+        self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
+        self._is_releasing = True  # whether the last wait for a release was successful
 
     def announce(self, sharing: Sharing, *, may_wait: bool) -> bool:
         """Announce a message in the ring. Return False if the message must be sent through the socket.
@@ -354,7 +354,7 @@ class RingSender:
             self.step = Step.OFF
 
     def close(self) -> None:
-        """Remove the connection. If its subscriber still holds places, it may be reading them, so the ring is replaced."""
+        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced."""
         with self._ring.lock:
             self.collect()
             memory, self.memory = self.memory, None
