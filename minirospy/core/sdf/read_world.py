@@ -80,7 +80,7 @@ class _Reader:
     names: set[str] = field(default_factory=set)
     numbers: dict[str, Iterator[int]] = field(
         default_factory=dict
-    )  # numbers to append next to names that already exist
+    )  # next numbers to append to names already in use
     ambient: Color = World.ambient
     background: Color = World.background
     camera: Pose | None = None
