@@ -109,8 +109,8 @@ def points(
 ) -> Iterator[tuple[int, Point]]:
     """Yield the numbers at these paths in time order, each with its path's index.
 
-    ``start`` and ``end``: seconds since the start of the bag, inclusive. ``on_time`` is called with the current time after each
-    chunk. Raise BagFormatError if the bag is damaged or a message cannot be deserialized.
+    ``start`` and ``end``: seconds since the start of the bag, inclusive. ``on_time`` is called after each chunk, with the time
+    reached. Raise BagFormatError if the bag is damaged or a message cannot be deserialized.
     """
     origin = bag_span(reader)[0]
     of_topic: dict[str, list[int]] = {}
