@@ -122,7 +122,7 @@ def _of_file(file: Path, folder: Path) -> Iterator[Plugin]:
 
 
 def _find_module(module: str, folder: Path) -> None:
-    """Make a module importable whose package was not built or sourced, by its folder ``src`` or the package's folder."""
+    """Make a module of an unbuilt or unsourced package importable, from the package's folder or its folder ``src``."""
     spec = importlib.util.find_spec(module)
     if spec is None or spec.origin is None:  # a folder without code
         for place in (folder / "src", folder):

@@ -139,7 +139,7 @@ def filter_by_resources(
     hardware_interface: str | None = None,
     match_any: bool = False,
 ) -> list[ControllerState]:
-    """Return the controllers that claim these resources, all through one hardware interface, or through the given one.
+    """Return the controllers that claim all these resources through one hardware interface, which may be specified.
 
     ``match_any``: one matching resource is enough.
     """
