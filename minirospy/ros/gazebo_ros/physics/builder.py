@@ -398,7 +398,7 @@ def _direction(joint: Joint, axis: Axis) -> Vector:
 
 
 def _set_first(row: Any, name: str, value: float) -> None:
-    """Set a coefficient, which is a number before MuJoCo 4 and the first of a polynomial since then."""
+    """Set a coefficient: a plain number before MuJoCo 4, the first coefficient of a polynomial since then."""
     if isinstance(getattr(row, name), float):
         setattr(row, name, value)
     else:
