@@ -55,7 +55,7 @@ class WorldMarkers:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._publisher = rospy.Publisher(TOPIC, MarkerArray, queue_size=2, latch=True)
-        self._published: NDArray[np.float64] = np.zeros((0, 7))  # the poses of all links in the last message
+        self._published: NDArray[np.float64] = np.zeros((0, 7))  # the poses of all links
         self._next_ns = 0
 
     def publish_all(self) -> None:

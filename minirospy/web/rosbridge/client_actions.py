@@ -43,7 +43,7 @@ _STATUSES = {
 
 @dataclass
 class _Running:
-    """A goal without a result. ``goal``: set once the goal can be sent. ``is_cancelled``: set by a cancellation before that."""
+    """A goal without a result. ``goal``: set once it can be sent. ``is_cancelled``: whether a cancellation was requested."""
 
     goal: ClientGoal[Message, Message] | None = None
     is_cancelled: bool = False
