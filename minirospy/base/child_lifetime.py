@@ -98,7 +98,7 @@ class ChildLifetime:
 def guard_children() -> ChildLifetime:
     """On Windows, make child processes started from now on terminate when this process does.
 
-    Closing the returned object ends this.
+    Close the returned object to undo this.
     """
     return ChildLifetime(_process_job())
 

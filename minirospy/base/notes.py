@@ -1,4 +1,4 @@
-"""Add advice to an exception whose text is that of another library, so that programs can still compare the text."""
+"""Add advice to an exception that another library raised, without changing its text, which programs may compare."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _E = TypeVar("_E", bound=BaseException)
 
 
 def noted(error: _E, note: str) -> _E:
-    """Return an error whose traceback ends with a note (PEP 678). Python 3.10 shows no notes."""
+    """Return the error with a note (PEP 678) that its traceback shows last. Python 3.10 does not show notes."""
     if sys.version_info >= (3, 11):
         error.add_note(f"minirospy: {note}")
     return error

@@ -1,7 +1,7 @@
 """Read XML as leniently as TinyXML, the parser of ROS's and Gazebo's C++ programs. Pure.
 
-A text that is not well-formed XML, but that TinyXML reads, is rewritten into one that is. Each kind of change has one note.
-Lines keep their numbers. Behaviour: Debian's `check_urdf` (liburdfdom with TinyXML 2.6.2).
+Text that TinyXML accepts although it is not well-formed is rewritten as well-formed XML. Each kind of change adds one note. Line
+numbers are preserved. Reference: Debian's `check_urdf` (liburdfdom with TinyXML 2.6.2).
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ _FALLBACK = "Latin-1"  # every byte is a character in it
 
 
 class Note(NamedTuple):
-    """A fault that was passed over: its first line, and a sentence without a period."""
+    """A tolerated fault: the line of its first occurrence, and a sentence without the final period."""
 
     line: int
     text: str
 
 
 class Parsed(NamedTuple):
-    """The root element, and a note for each kind of fault."""
+    """The root element, and one note for each kind of tolerated fault."""
 
     root: XmlElement
     notes: tuple[Note, ...]
 
 
 def parse_lenient(text: str | bytes) -> Parsed:
-    """Parse an XML text that may have the faults that TinyXML accepts.
+    """Parse XML text, tolerating the faults that TinyXML tolerates.
 
     Raise XmlSyntaxError for other faults, XmlError if the text is rejected.
     """
@@ -69,7 +69,7 @@ def parse_lenient(text: str | bytes) -> Parsed:
 
 
 def decode_xml(data: bytes) -> tuple[str, str]:
-    """Return the text, and its encoding: UTF-8, or else the declared one, or else Latin-1."""
+    """Return the text and its encoding: UTF-8 if the data is valid UTF-8, else the declared encoding, else Latin-1."""
     declared = _ENCODING.match(data)
     for encoding in ("UTF-8", *([declared[1].decode("ascii")] if declared else [])):
         try:
@@ -80,7 +80,7 @@ def decode_xml(data: bytes) -> tuple[str, str]:
 
 
 class _Rewriting:
-    """Rewrites one text. ``notes``: by kind, in the order in which they were found."""
+    """Rewrites one text as well-formed XML. ``notes``: one per kind of fault, in the order of first occurrence."""
 
     def __init__(self) -> None:
         self.notes: dict[str, Note] = {}
@@ -103,7 +103,7 @@ class _Rewriting:
                 self._note(f"everything after the end of <{root}> is ignored")
                 break
             if token == "<":
-                # No parser accepts this. Searching on would take quadratic time for many of them.
+                # No parser accepts this. Continuing the search would take quadratic time if the text has many of them.
                 parts.append(text[match.start() :])
                 break
             parts.append(self._token(match, is_first=match.start() == 0))
@@ -170,7 +170,7 @@ class _Rewriting:
         return "".join(parts) + text[at:]
 
     def _ampersands(self, text: str) -> str:
-        """Return the text without lone ampersands: TinyXML drops them."""
+        """Return the text without unescaped ampersands, which TinyXML drops."""
         if not _AMPERSAND.search(text):
             return text
         self._note("'&' is not allowed alone, and was ignored: write &amp;")

@@ -118,7 +118,7 @@ class Gpio:
         self._lock = threading.RLock()
         self._mode: int | None = None
         self._warns = True
-        self._reported: set[int] = set()  # channels whose wiring a warning has named
+        self._reported: set[int] = set()  # channels that a wiring warning has already named
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
@@ -186,7 +186,7 @@ class Gpio:
         else:
             self._linked().write(((pin, level),))
             return
-        # Outside of the handler, so that an error has no KeyError before it.
+        # Call this outside the except block, so that an error is not shown as raised while handling a KeyError.
         self._output_several(channel, value)
 
     def input(self, channel: int) -> int:
@@ -458,9 +458,9 @@ class Gpio:
                 callbacks.schedule(detector)
 
     def _check_wiring(self, channel: int, pin: int, direction: int) -> None:
-        """Warn once for each channel that is set up in a way in which nothing can happen on the virtual board.
+        """Warn once per channel whose setup has no effect on the virtual board.
 
-        ``setwarnings(False)`` does not suppress it: listings start with that line.
+        ``setwarnings(False)`` does not suppress the warning, because most listings start with that call.
         """
         fault = wiring_fault(channel, pin, direction, is_board=self._mode == BOARD)
         if fault and channel not in self._reported:

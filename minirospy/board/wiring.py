@@ -1,4 +1,4 @@
-"""The parts on the virtual board, and the faults of a program that expects others."""
+"""Explain why a program's GPIO pin has no effect: the virtual board has no part, or a different one, at that pin."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ _PARTS = f"its LEDs are at {min(LEDS)} to {max(LEDS)}, its buttons at {' and '.j
 
 
 def wiring_fault(channel: int, pin: int, direction: int, *, is_board: bool) -> str:
-    """Return why nothing happens at BCM ``pin`` in this direction; an empty string if something does.
+    """Return why using BCM ``pin`` in this direction has no effect; an empty string if it has one.
 
-    ``channel`` is the number that the program uses, ``is_board``: a number of GPIO.BOARD.
+    ``channel`` is the number that the program uses; ``is_board`` means that it is a GPIO.BOARD number.
     """
     is_output = direction == Function.OUT
     if pin in LEDS or (pin in BUTTONS and not is_output):

@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set the variable for the nodes, which read it, too: they and the verbs must open the same board.
+        # Set the variable, which the nodes also read, so that the nodes and the verbs open the same board.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:

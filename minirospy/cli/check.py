@@ -30,7 +30,7 @@ the exercise's file), 130 interrupted."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 if the exercise is passed, 1 if not, 2 for usage errors, 3 if it could not be checked."""
+    """Run the command; return 0 if the exercise is passed, 1 if not, 2 for a usage error, 3 if the check itself failed."""
     return COMMAND.main(argv)
 
 
@@ -235,7 +235,7 @@ def _ask(question: str) -> str:
 def _tell(finding: Finding) -> None:
     from minirospy.base.escape import escaped
 
-    # A finding may quote what the student's program has printed.
+    # A finding may contain output of the student's program.
     print(escaped(str(finding)), flush=True)
 
 

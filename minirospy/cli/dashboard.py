@@ -26,7 +26,7 @@ Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
 
 class Serving(NamedTuple):
-    """The options of all commands that open the page: where it is served, and for whom."""
+    """Options of all commands that open the page: the address and port of the page, and the clients that may connect."""
 
     port: int | None
     no_browser: bool
@@ -40,7 +40,7 @@ class Serving(NamedTuple):
 
     @property
     def bound(self) -> str:
-        """Return the address to listen at."""
+        """Return the address to listen on."""
         return self.address or ("0.0.0.0" if self.listen else "127.0.0.1")
 
 
@@ -320,7 +320,7 @@ def _serve(
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
 
     ``node_name`` is set by joint_state_publisher_gui, which publishes joints; the default is the dashboard's usual name.
-    ``embeds``: notebooks may embed the page, and the end of the standard input ends the dashboard.
+    ``embeds``: notebooks may embed the page, and the dashboard exits when its standard input closes.
     """
     from minirospy.web.serve import require_libraries
 
@@ -371,7 +371,7 @@ def _serve(
             self._opened: list[Dashboard] = []
 
         async def wait(self) -> None:
-            """Serve the page if nothing listens at the master's address; return before there is a master."""
+            """If nothing listens at the master's address, serve the page without data. Return without waiting for a master."""
             if await _is_reachable(self._node.master_uri):
                 return
             for each in ports:
@@ -484,7 +484,7 @@ def end_with_stdin() -> None:
 def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
     """Return this user's tokens. Unless ``must_be_kept`` is set, return new ones if they cannot be stored in ROS_HOME.
 
-    ``must_be_new``: return tokens for this process only, because a notebook that is saved contains the token.
+    ``must_be_new``: return tokens that only this process uses, because a saved notebook contains its token.
 
     Even on loopback, the page needs the token to start programs and open files, because other users of the machine can
     connect.

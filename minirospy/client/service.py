@@ -43,7 +43,7 @@ _S_co = TypeVar("_S_co", bound=Any, covariant=True)
 
 
 class Service(Generic[_S_co]):
-    """Offers a service: ``handler(request)`` returns the response.
+    """Offers a service. ``handler(request)`` returns the response.
 
     The handler may return a response, a dictionary of some of its fields, a list or tuple of all its field values, or
     the value of its only field. If the handler raises, the client's call fails with that error, and
@@ -96,7 +96,7 @@ class Service(Generic[_S_co]):
 
     @property
     def is_new(self) -> bool:
-        """Return whether the service was offered a moment ago and has not been called since."""
+        """Return whether the service was registered only a moment ago and has not been called yet."""
         return not self.seq and time.monotonic() - self._since < NEW_SECONDS
 
     @property
@@ -159,7 +159,7 @@ class Service(Generic[_S_co]):
             buffer = BytesIO()
             response.serialize(buffer)
             return buffer.getvalue()
-        except CallFailed as error:  # the program's own _handle_request() sent an error response
+        except CallFailed as error:  # the program's _handle_request() sent an error response
             raise ServiceException(str(error)) from None
         except ServiceException as error:
             raise ServiceException(f"service cannot process request: {error}") from error
@@ -168,7 +168,7 @@ class Service(Generic[_S_co]):
             raise ServiceException(f"error processing request: {error}") from error
 
     def _handle_by_program(self, request: Message, header: Header) -> bytes:
-        """Call a program's own ``_handle_request``, and return the response that it sends.
+        """Call the ``_handle_request`` that the program defines, and return the response that it sends.
 
         Raise CallFailed if the response is an error.
         """
@@ -187,7 +187,8 @@ class Service(Generic[_S_co]):
     def _handle_request(self, transport: TCPROSTransport, request: Message) -> None:
         """Call the handler and send its response, or its error, through ``transport``.
 
-        This method exists for programs that replace it, in a subclass or in the class itself. Otherwise it is not called.
+        This method exists only so that a program can replace it, in a subclass or on the class. It is called only if it is
+        replaced.
         """
         try:
             response = to_response(self.response_class, self.handler(request))

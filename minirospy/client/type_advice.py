@@ -1,4 +1,4 @@
-"""Advice for a topic or service that gets a class of the wrong kind: a service's class, a module, an instance."""
+"""Advice for a topic or service whose class argument has the wrong kind, such as a service class, a module or an instance."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["advice_for_callback", "advice_for_message_class", "advice_for_servic
 def advice_for_callback(
     error: BaseException, function: Callable[..., object], message: Any, *, has_args: bool
 ) -> str:
-    """Return what is wrong with a callback: its parameters, or the use of a message in place of a field of it.
+    """Return why a callback failed, if it has the wrong parameters or uses a message in place of one of its fields.
 
     Return an empty string if the error has another cause.
     """
@@ -37,7 +37,7 @@ def advice_for_callback(
 
 
 def advice_for_message_class(given: object) -> str:
-    """Return what is wrong with an argument that is no message class."""
+    """Return what is wrong with an argument that is not a message class."""
     if hasattr(given, "_request_class"):
         return (
             f"{getattr(given, '_type', given)} is a service type; a topic needs a message type (rosmsg list)"
@@ -53,7 +53,7 @@ def advice_for_message_class(given: object) -> str:
 
 
 def advice_for_service_class(given: object) -> str:
-    """Return what is wrong with an argument that is no service class."""
+    """Return what is wrong with an argument that is not a service class."""
     name = getattr(given, "__name__", "")
     if isinstance(given, ModuleType):
         return f"{name} is a module; name a class of it: from {name} import SetBool"

@@ -1,4 +1,4 @@
-"""Perform an exercise's steps in order, and judge the student's programs: do they start, do they crash, do they stop?"""
+"""Perform an exercise's steps in order, and check that the student's programs start, do not crash, and stop."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ START_SECONDS = 15.0  # for a node to register, on a slow laptop with a virus sc
 OWN_START_SECONDS = 60.0  # for a program of the exercise itself, without which it cannot be checked
 _EXIT_SECONDS = 1.0  # from the traceback to the end of a program that fails
 _LAST_LINES = 8  # lines of a program's output in a report
-_PRESS_SECONDS = 0.25  # time for which `click` holds a button: longer than two polls of a node with 10 Hz
-_REPEAT_HERTZ = 10.0  # of published messages, unless an exercise says otherwise
+_PRESS_SECONDS = 0.25  # for which `click` holds a button; longer than two periods of 10 Hz polling
+_REPEAT_HERTZ = 10.0  # rate of published messages, unless the exercise specifies one
 
 
 class Finding(NamedTuple):
-    """One line of a report. ``holds`` is None if the step was not tried."""
+    """One line of a report. ``holds`` is None if the step was skipped."""
 
     sentence: str
     holds: bool | None
@@ -49,7 +49,7 @@ class Finding(NamedTuple):
 
 @dataclass
 class Report:
-    """The result of a check. ``output`` are the last lines of programs that failed, by the program's name."""
+    """The result of a check. ``output``: the last lines of each program that failed, by the program's name."""
 
     exercise: Exercise
     findings: list[Finding] = field(default_factory=list)
@@ -67,9 +67,9 @@ class Report:
 
 
 def words_of(exercise: Exercise, words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Split the words after an exercise's name into (programs, answers). Without programs, take those that the page names.
+    """Split the words after an exercise's name into (programs, answers). The default programs are those that the page names.
 
-    Raise UsageError if there are too many, or none and the page names none.
+    Raise UsageError if there are too many words, or if there is no program and the page names none.
     """
     if not exercise.work:
         if len(words) > exercise.questions:
@@ -99,9 +99,10 @@ def check(
     patience: float = 1.0,
     tell: Callable[[Finding], object] = lambda _: None,
 ) -> Report:
-    """Run the student's programs through an exercise and return the report. ``tell`` receives each finding as it is made.
+    """Run the student's programs through an exercise and return the report. Pass each finding to ``tell`` immediately.
 
-    ``patience`` multiplies all time limits. Raise NotFoundError or UsageError if a program does not exist or cannot be run.
+    All time limits are multiplied by ``patience``. Raise NotFoundError if a program does not exist, UsageError if it cannot be
+    run.
     """
     report = Report(exercise)
     kinds = {step.kind for step in exercise.steps}
@@ -138,7 +139,7 @@ class _Run:
         self._report = report
         self._tell = tell
         self._after = ""
-        self._reported: set[str] = set()  # names of programs whose end or errors are in the report
+        self._reported: set[str] = set()  # programs whose exit or errors are already in the report
 
     def run(self) -> None:
         steps = list(self._exercise.steps)
@@ -153,7 +154,7 @@ class _Run:
         self._judge_programs()
 
     def _expect(self, step: Step) -> bool:
-        """Add the finding for an expectation. Return False, without a finding, if it fails because a program has ended."""
+        """Add the finding for an expectation. If it fails because a program has exited, add none and return False."""
         text = sentence(step, self._after, self._trial.world.patience)
         outcome = expect(self._trial, step)
         if not outcome.holds and not self._judge_programs():
@@ -194,7 +195,7 @@ class _Run:
         for word in words:
             before = world.nodes()
             program = world.start(word, is_work=step.subject == "work" or isinstance(step.subject, int))
-            # A short patience is for the student's program: the exercise needs its own programs in any case.
+            # A small ``patience`` applies to the student's program only: the exercise needs its own programs in any case.
             seconds = START_SECONDS if program.is_work else OWN_START_SECONDS / min(1.0, world.patience)
             runs = world.wait_until(partial(_has_started, world, before, program), seconds)
             if not program.is_work:
@@ -218,7 +219,7 @@ class _Run:
         return True
 
     def _judge_programs(self) -> bool:
-        """Report student's programs that have ended, or printed a traceback. Return False if one has ended too early."""
+        """Report the student's programs that have exited or printed a traceback. Return False if one has exited too early."""
         is_fine = True
         ends_itself = self._exercise.ends
         for program in self._trial.work:
@@ -301,7 +302,7 @@ def _ended_finding(program: Program, status: int, fault: str, exercise: Exercise
 
 
 def _judge_stop(world: World, report: Report, tell: Callable[[Finding], object]) -> bool:
-    """Report student's programs that had to be killed. Return whether there are none."""
+    """Report the student's programs that had to be killed. Return True if there are none."""
     stubborn = [each for each in world.programs if each.is_work and each.ignored_interrupt]
     for program in stubborn:
         finding = Finding(
@@ -326,7 +327,7 @@ def _programs(exercise: Exercise) -> str:
 
 
 def _topics(steps: Iterable[Step]) -> list[str]:
-    """Return the topics to which a check subscribes from its start on."""
+    """Return the topics that the check subscribes to from its start."""
     found = [step.subject for step in steps if step.kind in ("message", "rate", "span")]
     found += [
         step.options[key]

@@ -1,7 +1,7 @@
 """Exercises: read and check the YAML file of an exercise. Pure, except for the functions that read files.
 
-An exercise has the student's programs (``work``) and steps. Each step is one action or one expectation, named by its only key
-that is not an option of all steps: ``{press: 11}``, ``{led: 7, is: on, within: 1, hint: Is the pin an output?}``.
+An exercise lists the student's programs (``work``) and the steps. Each step is an action or an expectation. Its kind is the only
+key that is not an option common to all steps: ``{press: 11}``, ``{led: 7, is: on, within: 1, hint: Is the pin an output?}``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = [
 
 FOLDER = Path(__file__).parent / "exercises"
 
-# Kinds of steps that need a master.
+# Kinds of steps that need a ROS master.
 GRAPH_KINDS = frozenset(
     {
         "node",
@@ -49,12 +49,12 @@ GRAPH_KINDS = frozenset(
         "log",
     }
 )
-_NAMED_KINDS = GRAPH_KINDS - {"log"} | {"package"}  # kinds whose subject is a name
+_NAMED_KINDS = GRAPH_KINDS - {"log"} | {"package"}  # kinds whose subject is a ROS name
 
-# Time limit of an expectation without `within`: a program starts within this time on a slow laptop.
+# Default time limit of an expectation: a program starts within this time on a slow laptop.
 DEFAULT_SECONDS = 10.0
-MAX_HERTZ = 1000.0  # the largest rate of published messages
-MAX_SECONDS = 3600.0  # the largest accepted time limit
+MAX_HERTZ = 1000.0  # maximum rate of published messages
+MAX_SECONDS = 3600.0  # maximum time limit
 
 # Each kind of step, with the options that only this kind accepts.
 ACTIONS: Mapping[str, frozenset[str]] = {
@@ -93,7 +93,7 @@ EXPECTATIONS: Mapping[str, frozenset[str]] = {
     "rostest": frozenset(),
 }
 _PARAMETER_RANGES = ("message", "runs_along")  # kinds that accept `between: {param: /name}`
-_NAMES = {"type": "std_msgs/Int32", "field": "data", "rate": "/scan", "host_of": "/scan"}  # as in errors
+_NAMES = {"type": "std_msgs/Int32", "field": "data", "rate": "/scan", "host_of": "/scan"}  # shown in errors
 _LEVELS = ("debug", "info", "warn", "error", "fatal")
 _OPTIONS = frozenset({"within", "hint", "says"})
 _TOP = frozenset({"name", "title", "page", "task", "work", "solution", "live", "ends", "steps"})
@@ -111,15 +111,16 @@ _REQUIRED = {
 
 
 class ExerciseError(SourceError):
-    """An exercise's file that cannot be read; ``file`` is its path."""
+    """Raised if an exercise's file cannot be read; ``file`` is its path."""
 
 
 @dataclass(frozen=True)
 class Step:
     """One action or expectation.
 
-    ``kind`` is a key of ACTIONS or EXPECTATIONS, ``subject`` its value, ``options`` the other options of this kind. ``within`` is
-    the time limit in seconds, ``hint`` the advice if the expectation does not hold, and ``says`` replaces the automatic sentence.
+    ``kind`` is a key of ACTIONS or EXPECTATIONS, and ``subject`` is its value. ``options`` are the step's other options.
+    ``within`` is the time limit in seconds. ``hint`` is printed if the expectation fails. ``says`` replaces the generated
+    sentence.
     """
 
     kind: str
@@ -131,13 +132,13 @@ class Step:
 
     @property
     def is_expectation(self) -> bool:
-        """Return whether this step can hold or not; otherwise it is an action."""
+        """Return whether this step is an expectation; otherwise it is an action."""
         return self.kind in EXPECTATIONS
 
 
 @dataclass(frozen=True)
 class Work:
-    """A program or launch file that the student writes. ``default`` is PACKAGE/PROGRAM as the page names it, or empty."""
+    """A program or launch file that the student writes. ``default``: PACKAGE/PROGRAM as on the course's page, or empty."""
 
     about: str
     default: str = ""
@@ -145,9 +146,9 @@ class Work:
 
 @dataclass(frozen=True)
 class Exercise:
-    """An exercise. ``page`` is the page of the course.
+    """An exercise. ``page``: the page of the course that describes it.
 
-    ``live``: watch the student's own master and board, and start nothing. ``ends``: the programs may end by themselves.
+    ``live``: watch the student's own master and board, and start nothing. ``ends``: the programs may exit by themselves.
     """
 
     name: str
@@ -162,19 +163,19 @@ class Exercise:
 
     @property
     def questions(self) -> int:
-        """Return how many answers the student gives."""
+        """Return the number of answers that the student must give."""
         return sum(step.kind == "answer" for step in self.steps)
 
 
 def built_in_names() -> list[str]:
-    """Return the names of the course's exercises, in the order of the course."""
+    """Return the names of the built-in exercises, in course order."""
     return (FOLDER / "order.txt").read_text(encoding="utf-8").split()
 
 
 def find_exercise(word: str) -> Exercise:
-    """Return an exercise by its name, or by the path of its file.
+    """Return an exercise, given its name or the path of its file.
 
-    Raise NotFoundError, with similar names, if it does not exist, or ExerciseError if its file cannot be read.
+    Raise NotFoundError, with similar names, if it does not exist. Raise ExerciseError if its file cannot be read.
     """
     names = built_in_names()
     if word in names:
@@ -201,7 +202,7 @@ def read_exercise(path: Path) -> Exercise:
 
 
 def parse_exercise(text: str, file: str) -> Exercise:
-    """Return the exercise that a YAML text describes. Raise ExerciseError, with what is wrong and how to write it."""
+    """Return the exercise in a YAML text. Raise ExerciseError, which states the fault and the correct form."""
     import yaml
 
     try:
@@ -214,7 +215,7 @@ def parse_exercise(text: str, file: str) -> Exercise:
 
 
 class _Reader:
-    """Converts YAML values to an exercise; every error names the file and the place in it."""
+    """Converts YAML values to an exercise. Each error names the file and the location in it."""
 
     def __init__(self, file: str) -> None:
         self._file = file
@@ -267,11 +268,11 @@ class _Reader:
             raise self._error(
                 f"{place}: a step is as {{press: 11}} or {{led: 7, is: on, within: 1}}, not [{found}]"
             )
-        # YAML 1.1 reads the key `on` and the values on, off, yes and no as booleans.
+        # YAML 1.1 parses the key `on` and the values on, off, yes and no as booleans.
         words = {str(key): value for key, value in found.items()}
         known = {**ACTIONS, **EXPECTATIONS}
         kinds = [key for key in words if key in known]
-        # `rate` and `message` are kinds, and options of other kinds.
+        # `rate` and `message` are kinds of steps, but also options of other kinds.
         if len(kinds) > 1:
             kinds = [
                 kind for kind in kinds if not any(kind in known[other] for other in kinds if other != kind)
@@ -301,7 +302,7 @@ class _Reader:
         )
 
     def _check(self, kind: str, words: Mapping[str, Any], place: str) -> None:
-        """Check the values whose mistakes would otherwise surface while a student's program runs."""
+        """Check values whose faults would otherwise be found only while the student's program is running."""
         subject = words[kind]
         if kind in ("press", "release", "click", "led") and not _is_pin(subject):
             raise self._error(f"{place}: [{subject}] is not a pin: BCM numbers are 0 to 53")

@@ -1,4 +1,4 @@
-"""The expectations of exercises: each waits until it holds or its time limit has passed, and returns an Outcome."""
+"""The expectations of exercises. Each waits until it holds or its time limit has passed, and returns an Outcome."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from minirospy.workspace.packages import Packages
 __all__ = ["EXPECTATIONS", "Outcome", "Trial", "expect"]
 
 _LOG_LINE = re.compile(r"\[ *(?:DEBUG|INFO|WARN|ERROR|FATAL)\] \[(?:WallTime: )?(\d+\.\d+)[^\]]*\]:? (.*)")
-_CLOSE = 0.01  # relative difference up to which two floating-point numbers are equal
-_RATE_SECONDS = 3.0  # time over which a rate is measured, if an exercise does not say
+_CLOSE = 0.01  # relative tolerance when floating-point numbers are compared
+_RATE_SECONDS = 3.0  # default time over which a rate is measured
 
 
 class Outcome(NamedTuple):
-    """The result of an expectation. If it does not hold, ``observed`` describes the observation instead."""
+    """The result of an expectation. If it does not hold, ``observed`` describes what was observed instead."""
 
     holds: bool
     observed: str = ""
@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
 
 @dataclass
 class Trial:
-    """The state of one check: its surroundings, when the last action started, and the student's remaining answers."""
+    """The state of a check: its surroundings, the time of the last action, and the student's answers not used yet."""
 
     world: World
     since: float = field(default_factory=time.monotonic)
@@ -58,7 +58,7 @@ class Trial:
 
 
 def expect(trial: Trial, step: Step) -> Outcome:
-    """Wait for an expectation. Errors of the graph, such as a node that has gone, count as not holding."""
+    """Wait for an expectation. An error of the graph, such as a node that has exited, counts as a failure."""
     try:
         return EXPECTATIONS[step.kind](trial, step)
     except BoardError:
@@ -89,7 +89,7 @@ def _lit(world: World) -> list[int]:
 
 
 def _why_dark(trial: Trial, pins: list[int]) -> str:
-    """Return an addition to a sentence about dark LEDs: pins that are not outputs, or that another pin was used instead."""
+    """Return an explanation for dark LEDs, such as a pin that is not an output, or another pin that was used instead."""
     states = trial.world.board.state().pins
     inputs = [pin for pin in pins if states[pin].function is Function.IN]
     if not inputs:
@@ -190,7 +190,7 @@ def _message(trial: Trial, step: Step) -> Outcome:
 
 
 def _values(world: World, arrival: Arrival, path: str) -> list[object]:
-    """Return the value of a message's field as a list, which is empty if an array in the path is too short."""
+    """Return the value of a message's field as a list; empty if an array on the path is too short."""
     try:
         return [world.value(arrival, path)]
     except IndexError:
@@ -198,9 +198,9 @@ def _values(world: World, arrival: Arrival, path: str) -> list[object]:
 
 
 def _with_parameters(world: World, options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Replace ``{param: /name}`` in an expectation: by the parameter's value or, in a range, by 70 to 140 % of it.
+    """Replace each ``{param: /name}`` in an expectation by the parameter's value, or for a range by 70 to 140 % of it.
 
-    Raise NotFoundError if the parameter is not set, or is not a number if one is needed.
+    Raise NotFoundError if the parameter is not set, or if it must be a number and is not.
     """
     found = dict(options)
     for key in ("equals", "between"):
@@ -233,7 +233,7 @@ def _rate(trial: Trial, step: Step) -> Outcome:
             each.time for each in world.arrivals(topic) if each.time >= max(start, time.monotonic() - seconds)
         ]
         found = (len(window) - 1) / (window[-1] - window[0]) if len(window) > 1 else 0.0
-        # Measure over the whole time, so that a burst does not count.
+        # Measure over the whole time, so that a short burst does not pass.
         return time.monotonic() - start >= seconds and len(window) > 2 and bool(low <= found <= high)
 
     if world.wait_until(fits, max(step.within, seconds + 1)):
@@ -270,7 +270,7 @@ def _service(trial: Trial, step: Step) -> Outcome:
         }
         return Outcome(False, f"no node does; the services are {_listed(known)}")
     found = service_type(world.graph, name)
-    # A student's own package may have the type.
+    # The type may be in the student's own package.
     accepted = type_ in (None, found) or ("/" not in str(type_) and found.partition("/")[2] == type_)
     return Outcome(True) if accepted else Outcome(False, f"its type is {found}")
 
@@ -337,7 +337,7 @@ def _log_entry(line: Line) -> tuple[float, str] | None:
 
 
 def _in_order(expected: list[str], texts: list[str]) -> list[int] | None:
-    """Return the indexes in ``texts`` of the expected texts, or None if ``texts`` does not have all of them in this order."""
+    """Return the indexes in ``texts`` at which the expected texts occur in this order, or None if they do not."""
     places: list[int] = []
     for each in expected:
         start = places[-1] + 1 if places else 0
@@ -380,7 +380,7 @@ def _exits(trial: Trial, step: Step) -> Outcome:
 
 
 def _package(trial: Trial, step: Step) -> Outcome:
-    # A new object each time: the look-up remembers folders.
+    # Create a new object each time, because the lookup caches folders.
     is_there = step.options["is"]
     holds = trial.world.wait_until(lambda: (step.subject in Packages().names()) == is_there, step.within)
     return Outcome(holds, f"it is {'still there' if not is_there else 'not there'}")
@@ -452,12 +452,12 @@ def _rostest(trial: Trial, step: Step) -> Outcome:
 
 
 def _printed(trial: Trial) -> list[Line]:
-    """Return the lines of the student's programs, in the order of their arrival."""
+    """Return the lines that the student's programs have printed, in order of arrival."""
     return sorted((line for program in trial.work for line in program.lines), key=lambda line: line.time)
 
 
 def _or_ended(trial: Trial, fits: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a condition that also becomes true when all the student's programs have exited and their output is complete."""
+    """Return a condition that is also true once all the student's programs have exited and their output is complete."""
 
     def holds() -> bool:
         has_ended = bool(trial.work) and all(each.status is not None for each in trial.work)

@@ -1,4 +1,4 @@
-"""Programs that a check starts: processes whose output is collected line by line, and that are ended by Ctrl-C."""
+"""Programs that a check starts: their output is collected line by line, and Ctrl-C stops them."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ __all__ = ["Line", "Program", "find_command"]
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_MAX_LINES = 20_000  # lines kept of a program that prints in a loop without pause
+_MAX_LINES = 20_000  # lines kept, for a program that prints in an endless loop
 _DIED = re.compile(r"\[([\w/.-]+?)(?:-\d+)?\] process has died \[pid \d+, exit code (-?\d+)")
 _LINE_OF_FILE = re.compile(r'^\s+File "(.+)", line (\d+)')
 _EXCEPTION = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Exit|Interrupt|Warning)?(:|$)")
-_KILL_SECONDS = 5.0  # wait for a killed process and for the end of its output
+_KILL_SECONDS = 5.0  # wait for a killed process, and for the end of its output
 
 
 class Line(NamedTuple):
-    """A line that a program printed, and when it arrived, in seconds of the monotonic clock."""
+    """A line of a program's output, and its time of arrival in seconds of the monotonic clock."""
 
     text: str
     time: float
 
 
 def find_command(word: str, packages: Packages) -> list[str]:
-    """Return the command that starts a FILE or a PACKAGE/PROGRAM; a launch file is started by roslaunch.
+    """Return the command line that starts a FILE or a PACKAGE/PROGRAM; launch files are started by roslaunch.
 
     Raise NotFoundError, with similar names, if it does not exist, or UsageError if it is not a program.
     """
@@ -56,9 +56,9 @@ def find_command(word: str, packages: Packages) -> list[str]:
 
 def _command_of(path: Path) -> list[str]:
     if path.name.endswith(_LAUNCH):
-        # Nodes without output="screen" print into files; the check reads what they print.
+        # Nodes without output="screen" print to files; the check needs their output.
         return [sys.executable, "-m", "minirospy.ros.roslaunch.commands.roslaunch", "--screen", str(path)]
-    # An empty file may be meant as a Python program, whose name tells that.
+    # An empty file without a shebang may still be meant as a Python program; its name shows that.
     if is_python(path):
         return [sys.executable, str(path.resolve())]
     if os.access(path, os.X_OK) and path.suffix not in (".txt", ".yaml", ".md"):
@@ -67,7 +67,7 @@ def _command_of(path: Path) -> list[str]:
 
 
 class Program:
-    """A running program. ``name`` is the file's name, ``is_work`` whether the student wrote it."""
+    """A running program. ``name``: its file's name. ``is_work``: whether the student wrote it."""
 
     def __init__(self, command: Sequence[str], environ: Mapping[str, str], *, is_work: bool) -> None:
         self.name = Path(command[-1]).name
@@ -108,7 +108,7 @@ class Program:
 
     @property
     def ended_after(self) -> float:
-        """Return how long a program that has exited ran, in seconds."""
+        """Return the run time of a program that has exited, in seconds."""
         return self._end - self.started
 
     def wait_for_output(self) -> None:
@@ -116,7 +116,7 @@ class Program:
         self._reader.join(_KILL_SECONDS)
 
     def stop(self, patience: float) -> None:
-        """Send Ctrl-C and wait; kill the program and its children if it does not exit in time. Idempotent."""
+        """Send Ctrl-C and wait. If the program does not exit in time, kill it and its children. Idempotent."""
         if self.status is None:
             windows = sys.platform == "win32"
             interrupt = signal.CTRL_BREAK_EVENT if windows else signal.SIGINT  # type: ignore[attr-defined,unused-ignore]
@@ -129,7 +129,7 @@ class Program:
         self._kill()
 
     def fault(self) -> str:
-        """Return a sentence about an error in the output of a program: a traceback, or a node of a launch file that died.
+        """Return a sentence about an error in a program's output: a traceback, or a node in a launch file that died.
 
         Return an empty string if there is none.
         """
@@ -143,11 +143,11 @@ class Program:
         return ""
 
     def last_lines(self, count: int) -> list[str]:
-        """Return the last lines of the output that are not empty."""
+        """Return the last non-empty lines of the output."""
         return [line.text for line in self.lines if line.text.strip()][-count:]
 
     def _kill(self) -> None:
-        """Kill the program if it runs, and all processes that it has left in its group."""
+        """Kill the program if it is still running, and all remaining processes in its group."""
         if sys.platform != "win32":
             with contextlib.suppress(OSError):
                 os.killpg(self.process.pid, signal.SIGKILL)
@@ -171,7 +171,7 @@ class Program:
 
 
 def exception_in(lines: Sequence[str]) -> str:
-    """Return the last exception in a program's output with its place, as ``NameError: ... (my_led.py, line 12)``.
+    """Return the last exception in a program's output with its location, as ``NameError: ... (my_led.py, line 12)``.
 
     Return an empty string if there is none.
     """
@@ -181,7 +181,7 @@ def exception_in(lines: Sequence[str]) -> str:
         if "Traceback (most recent call last)" in text:
             in_traceback, place = True, ""
         elif match := _LINE_OF_FILE.match(text):
-            # A SyntaxError has no line `Traceback`.
+            # Python prints a SyntaxError without the line `Traceback`.
             in_traceback = True
             if not _is_library(match[1]) or not place:
                 place = f"{Path(match[1]).name}, line {match[2]}"
@@ -192,7 +192,7 @@ def exception_in(lines: Sequence[str]) -> str:
 
 
 def _is_library(file: str) -> bool:
-    """Return whether a file in a traceback is minirospy's or Python's, and not the student's."""
+    """Return whether a file in a traceback belongs to minirospy or Python, not to the student."""
     parts = Path(file).parts
     return (
         "minirospy" in parts

@@ -1,7 +1,7 @@
-"""The results of a computer: a file in ROS_HOME, and a parameter at the master that the class shares.
+"""The results of this computer: a file in ROS_HOME, and a parameter on the class's master.
 
-The parameter ``/minirospy_class/STUDENT`` is a dictionary: the student's name, and the exercises. A parameter stays at the
-master after the check has ended, so that the teacher's page shows it whenever it is opened.
+The parameter ``/minirospy_class/STUDENT`` is a dictionary with the student's name and the exercises. It stays on the master after
+the check has exited, so that the teacher's page can show it later.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _SECONDS = 3.0  # timeout for the class's master: a check must not wait for a co
 class Result:
     """The last result of one exercise.
 
-    ``time`` is in seconds since 1970 (0: unknown), ``failures`` has the sentences that did not hold, ``ever`` is true once it
-    was passed.
+    ``time``: seconds since 1970 (0: unknown). ``failures``: the sentences of the expectations that failed. ``ever``: whether the
+    exercise has ever been passed.
     """
 
     passed: bool
@@ -71,7 +71,7 @@ class Record:
 
     @classmethod
     def read(cls, environment: Environment) -> Record:
-        """Read the record; an unreadable file counts as empty, because a check must not fail for it."""
+        """Read the record. An unreadable file counts as empty, because it must not make a check fail."""
         record = cls(environment.home / "minirospy_class.json")
         try:
             found = json.loads(record.path.read_text(encoding="utf-8"))
@@ -86,14 +86,14 @@ class Record:
 
     @property
     def class_parameter(self) -> str:
-        """Return the name of this computer's parameter at the class's master."""
+        """Return the name of this computer's parameter on the class's master."""
         return f"{CLASS_PARAMETER}/{parameter_key(self.student or default_name())}"
 
     def add(self, report: Report) -> None:
         """Add the result of a check."""
         name = report.exercise.name
         before = self.results.get(name)
-        # A student's program may print control characters, which XML-RPC cannot send.
+        # The output of a student's program may contain control characters, which XML-RPC cannot transmit.
         failures = tuple(
             escaped(f"{each.sentence}: {each.observed}")[:_MAX_LETTERS] for each in report.failures
         )
@@ -105,7 +105,7 @@ class Record:
         )
 
     def write(self) -> None:
-        """Write the file, completely or not at all. Raise MinirospyError if it cannot be written."""
+        """Write the file atomically. Raise MinirospyError if that fails."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name)
@@ -116,7 +116,7 @@ class Record:
             raise MinirospyError(f"{self.path} cannot be written: {error.strerror}") from error
 
     def to_parameter(self) -> dict[str, object]:
-        """Return the record as the value of a parameter. ``number`` is an exercise's place in the course."""
+        """Return the record as a parameter's value. ``number`` is an exercise's position in the course."""
         numbers = {name: number for number, name in enumerate(built_in_names())}
         return {
             "student": self.student or default_name(),
@@ -135,7 +135,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Student:
-    """A row of the class's table: the results of a computer. ``key`` is the last part of its parameter's name."""
+    """A row of the class's table: one computer's results. ``key``: the last part of its parameter's name."""
 
     key: str
     name: str
@@ -143,14 +143,14 @@ class Student:
 
 
 def default_name() -> str:
-    """Return the name in the class's table if the student has given none: that of the board or of the computer."""
+    """Return the name for the class's table if the student has not given one: the board's or the computer's."""
     return os.environ.get("MINIROSPY_BOARD") or socket.gethostname().partition(".")[0]
 
 
 def join(record: Record, uri: str, name: str) -> None:
-    """Store the class's master and the student's name for all later checks.
+    """Store the class's master and the student's name for later checks.
 
-    Raise UsageError if the URI is not one, MasterUnreachableError if no master responds there.
+    Raise UsageError if the URI is invalid, MasterUnreachableError if no master responds there.
     """
     if uri:
         if "://" not in uri:
@@ -169,10 +169,10 @@ def join(record: Record, uri: str, name: str) -> None:
 
 
 def class_master(record: Record, environment: Environment) -> str:
-    """Return the URI of the class's master: that of `--join`, or that of ROS_MASTER_URI if it is on another computer.
+    """Return the URI of the class's master: from `--join`, or from ROS_MASTER_URI if that is on another computer.
 
-    Return an empty string if there is none. A master on this computer is the student's own: the results would be extra
-    parameters in the output of `rosparam list`, which the pages of the course show.
+    Return an empty string if there is none. A master on this computer belongs to the student, and the results must not appear
+    there: `rosparam list` would show parameters that the pages of the course do not mention.
     """
     if record.master:
         return record.master
@@ -200,7 +200,7 @@ def send(record: Record, uri: str) -> None:
     """Send the record to a master. Raise MasterUnreachableError if it does not respond."""
     master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=_SECONDS)
     try:
-        # Set each part separately, which keeps the state that share.py stores under the same parameter.
+        # Set each part separately, to keep the state that share.py stores under the same parameter.
         for part, value in record.to_parameter().items():
             master.set_param(f"{record.class_parameter}/{part}", value)
     finally:
@@ -208,7 +208,7 @@ def send(record: Record, uri: str) -> None:
 
 
 def parameter_key(name: str) -> str:
-    """Return a name as the last part of a parameter's name: letters, digits and underscores, and a letter first.
+    """Convert a name to the last part of a parameter's name: letters, digits and underscores, starting with a letter.
 
     It has at most ``MAX_KEY`` characters. A checksum keeps names apart that differ only in other characters, such as Jörg
     and Jürg, or after the cut.
@@ -223,9 +223,9 @@ def parameter_key(name: str) -> str:
 
 
 def gather(uri: str) -> list[Student]:
-    """Return the students whose results a master has, sorted by name. Raise MasterUnreachableError if it does not respond.
+    """Return the students whose results are on a master, sorted by name. Raise MasterUnreachableError if it does not respond.
 
-    A value that is not a record, which any node may have set, is left out.
+    Values that are not records are skipped; any node may have set them.
     """
     master = MasterProxy(uri, f"/class_{os.getpid()}", timeout=_SECONDS)
     try:
@@ -245,7 +245,7 @@ def gather(uri: str) -> list[Student]:
 
 
 def class_table(students: list[Student], names: list[str]) -> list[list[str]]:
-    """Return the rows of the class's table, with its head: yes, no (not passed yet), or nothing (not tried)."""
+    """Return the class's table with its header. A cell is yes, no (not passed yet), or empty (not tried)."""
     used = [name for name in names if any(name in student.results for student in students)]
     used += sorted({name for student in students for name in student.results} - set(names))
     marks = {student.key: [_mark(student.results.get(name)) for name in used] for student in students}
@@ -269,5 +269,5 @@ def _result_of(found: Mapping[str, object]) -> Result:
 
 
 def _time_of(found: object) -> float:
-    """Return a time, or 0 (unknown) for values that are none, which any node may have set."""
+    """Return a time, or 0 (unknown) for an invalid value, which any node may have set."""
     return float(found) if isinstance(found, int | float) and 0 <= found < _MAX_TIME else 0.0

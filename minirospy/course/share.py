@@ -1,7 +1,7 @@
 """Show a student's board and nodes in the class's table: `minirospy check --share`.
 
-The state goes to the class's master as a parameter, in one direction only: the teacher's page cannot change anything on the
-student's computer.
+The state is sent one way, as a parameter on the class's master. The teacher's page cannot change anything on the student's
+computer.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["share"]
 
-_POLL_SECONDS = 0.2  # an LED that blinks faster than 2.5 Hz is shown at some of its states
-_BEAT_SECONDS = 3.0  # between heartbeats; the page shows a computer as gone after three missed ones
-_ASK_SECONDS = 2.0  # timeout of a call to a master
+_POLL_SECONDS = 0.2  # an LED that blinks faster than 2.5 Hz is not shown completely
+_BEAT_SECONDS = 3.0  # between heartbeats; after three missed ones, the page marks a computer as gone
+_ASK_SECONDS = 2.0  # timeout for calls to a master
 
 
 def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:
     """Send the state of the board and the number of nodes until ``ended()`` is true.
 
-    Raise MasterUnreachableError if the class's master does not respond at the start; later losses are retried.
+    Raise MasterUnreachableError if the class's master does not respond at the start; later failures are retried.
     """
     uri = record.master or environment.master_uri
     with (
@@ -47,7 +47,7 @@ def share(record: Record, environment: Environment, ended: Callable[[], bool] = 
                     "nodes": _nodes(environment),
                     "beat": beat,
                 }
-                # The teacher's computer may be away for a moment: the next beat tries again.
+                # The teacher's computer may be briefly unreachable: retry at the next heartbeat.
                 with contextlib.suppress(MasterUnreachableError, RpcError):
                     master.set_param(f"{record.class_parameter}/now", state)
                     sent = pins
@@ -56,7 +56,7 @@ def share(record: Record, environment: Environment, ended: Callable[[], bool] = 
 
 
 def _nodes(environment: Environment) -> list[str]:
-    """Return the names of the nodes at the student's own master, at most ten."""
+    """Return the names of at most ten nodes on the student's own master."""
     master = MasterProxy(environment.master_uri, "/check_share", timeout=_ASK_SECONDS)
     try:
         state = master.get_system_state()

@@ -1,4 +1,4 @@
-"""A snapshot of a student's workspace for help: sources, the output of `minirospy doctor`, and the results, in one zip file."""
+"""A snapshot of a student's workspace for a helper: sources, the output of `minirospy doctor` and the results, in a zip file."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from minirospy.course.results import Record
 
 __all__ = ["write_snapshot"]
 
-_MAX_FILE_BYTES = 1_000_000  # bags, models and videos are left out
+_MAX_FILE_BYTES = 1_000_000  # larger files, such as bags, models and videos, are left out
 _MAX_FILES = 2000
-MAX_BYTES = 50_000_000  # of all files before compression: a snapshot is sent by e-mail
+MAX_BYTES = 50_000_000  # total size of the files before compression, because a snapshot is sent by e-mail
 _LEFT_OUT = frozenset(
     {".git", "__pycache__", "node_modules", ".venv", "venv", "build", "devel", "install", "logs"}
 )
@@ -48,7 +48,7 @@ def write_snapshot(file: Path, environment: Environment) -> tuple[int, dict[str,
     left_out: dict[str, str] = {}
     listed = [(root, _files(root, left_out)) for root in roots]
     try:
-        # A file dated before 1980, which a zip file cannot express, gets the date 1980-01-01.
+        # A zip file cannot store dates before 1980: use 1980-01-01 instead.
         archive = zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED, strict_timestamps=False)
     except FileExistsError:
         raise MinirospyError(f"{file} exists: name another file") from None

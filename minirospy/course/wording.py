@@ -1,4 +1,4 @@
-"""The sentences of a check: each describes an expectation and the action before it. Pure."""
+"""The sentences in a report: each describes an expectation and the action before it. Pure."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def leds_text(pins: Sequence[int]) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value as YAML writes it, on one line and at most 80 characters long."""
+    """Return a value in YAML syntax, on one line, with at most 80 characters."""
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, dict):
@@ -85,7 +85,7 @@ def _untimed_sentence(step: Step) -> str:
     options = step.options
     of_type = f" with the type {options['type']}" if options.get("type") else ""
     between = options.get("between", (0, 0))
-    # The values of a range may be those of a parameter, which are known only during the check.
+    # A range may depend on a parameter, whose value is known only during the check.
     low, high = between if not isinstance(between, dict) else (0, 0)
     expected = f"between {low:g} and {high:g}" if "between" in options else shown(options.get("equals"))
     match step.kind:

@@ -1,4 +1,4 @@
-"""The surroundings of a check: a new master on a free port, a new virtual board, and the programs that run there.
+"""The surroundings of a check: a new master on a free port, a new virtual board, and the programs.
 
 A live check watches the student's own master and board instead, and starts nothing.
 """
@@ -44,18 +44,18 @@ _LAST_EFFECT_SECONDS = 1.0  # after this, nothing that a program did before its 
 _KEPT_MESSAGES = 5000  # messages kept per topic: a minute of a topic with 80 Hz
 _STOP_SECONDS = 10.0  # wait for a program after Ctrl-C
 _LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
-# ROS's variables that programs under test keep; the others describe the student's own master and network.
+# ROS variables that the tested programs inherit; all others describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (
     "2",
     "1",
-)  # the guardian's waits after SIGINT and SIGTERM, if the check itself was killed
+)  # the guardian's timeouts after SIGINT and SIGTERM, if the check itself was killed
 
 _numbers = itertools.count(1)
 
 
 class Arrival:
-    """A message and its arrival, in seconds of the monotonic clock."""
+    """A message and its time of arrival, in seconds of the monotonic clock."""
 
     __slots__ = ("received", "time")
 
@@ -88,7 +88,7 @@ class _Repeat:
 
 
 class World:
-    """Context manager for the surroundings of one check. ``patience`` multiplies all time limits.
+    """The surroundings of one check, as a context manager. All time limits are multiplied by ``patience``.
 
     With ``work_ends``, the student's programs are expected to exit by themselves.
     ``board`` is the virtual board, ``environment`` the programs' environment, ``programs`` all started programs, in order.
@@ -130,7 +130,7 @@ class World:
         self.close()
 
     def close(self) -> None:
-        """Stop the programs, the newest first, then everything else. Idempotent."""
+        """Stop the programs, newest first, then everything else. Idempotent."""
         for repeat in self._repeats.values():
             repeat.close()
         self.stop_programs()
@@ -145,7 +145,7 @@ class World:
         return program
 
     def stop_programs(self, *, only_work: bool = False) -> None:
-        """Stop the programs by Ctrl-C, the newest first."""
+        """Stop the programs with Ctrl-C, newest first."""
         for program in reversed(self.programs):
             if program.is_work or not only_work:
                 was_running = program.status is None
@@ -163,7 +163,7 @@ class World:
             if self._work_has_ended():
                 end = min(end, time.monotonic() + _LAST_EFFECT_SECONDS * self.patience)
             if time.monotonic() >= end:
-                # The last poll may have been long ago on a busy machine.
+                # On a busy machine the last poll may be long ago.
                 return holds()
             time.sleep(_POLL_SECONDS)
         return True
@@ -174,13 +174,13 @@ class World:
         return bool(work) and not self._work_ends and all(each.status is not None for each in work)
 
     def nodes(self) -> set[str]:
-        """Return the names of the nodes at the master, without those of the check itself."""
+        """Return the names of the nodes on the master, except the check's own."""
         state = self.graph.state()
         found = {node for table in state for nodes in table.values() for node in nodes}
         return found - {self.node.name, "/rosout"}
 
     def arrivals(self, topic: str) -> list[Arrival]:
-        """Return the messages received on one of the topics that the check listens to."""
+        """Return the messages received on one of the topics that the check subscribes to."""
         return list(self._arrivals.get(topic, ()))
 
     def value(self, arrival: Arrival, path: str) -> object:
@@ -193,7 +193,7 @@ class World:
         )
 
     def publish(self, topic: str, type_: str, values: object, rate: float) -> None:
-        """Publish a message at ``rate`` Hz until the next message on this topic, or once and latched if the rate is 0.
+        """Publish a message at ``rate`` Hz until the next one on this topic. If the rate is 0, publish once, latched.
 
         Raise NotFoundError if the type does not exist, MessageException if the values do not match it.
         """
@@ -236,7 +236,7 @@ class World:
             tempfile.TemporaryDirectory(prefix="minirospy-check-", ignore_cleanup_errors=True)
         )
         name = f"check-{os.getpid()}-{next(_numbers)}"
-        # The board's server ends with its last client. Its processes read the variable, too.
+        # The variable makes the board's server exit with its last client. It is set for the programs, too.
         os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
         self._stack.callback(os.environ.pop, "MINIROSPY_BOARD_TEMPORARY", None)
         environ = {
@@ -272,9 +272,9 @@ class World:
         self._stack.callback(lambda: loop.run(rosout.close(), 5.0))
 
     def _open_guardian(self) -> None:
-        """Start the script that ends the programs if this process is killed."""
+        """Start the guardian script, which stops the programs if this process is killed."""
         if sys.platform == "win32":
-            return  # guard_children() does it
+            return  # guard_children() covers this case
         words = [
             sys.executable,
             "-IS",

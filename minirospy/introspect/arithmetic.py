@@ -1,7 +1,7 @@
-"""Evaluate the expressions in YAML's angles, such as ``rad(pi/2)``.
+"""Evaluate the arithmetic in YAML angles, such as ``rad(pi/2)``.
 
-ROS passes them to Python's eval(), which may run anything. Here, an expression has numbers, ``pi``, Python's operators and
-some functions, and no step may take long or fill the memory.
+ROS passes these expressions to Python's eval(), which can run any code. Here, an expression may contain only numbers, ``pi``,
+Python's operators and some functions, and limits keep each step from taking long or filling the memory.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 __all__ = ["BRACKETS", "arithmetic", "degrees", "radians"]
 
-BRACKETS = r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)"  # a pattern: after `rad`, with brackets at most once inside
+BRACKETS = r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)"  # pattern for the text after `rad`, with at most one nested pair of brackets
 
 _MAX_LENGTH = (
-    200  # characters; longer strings may exceed limits of Python's parser, which then raises other errors
+    200  # characters; longer expressions may exceed Python's parser's limits, which raises other errors
 )
-_MAX_BITS = 1_100  # of an integer; a float has fewer, so a larger result is an error in ROS as well
-_MAX_PLACES = 400  # of round(); a float has fewer
+_MAX_BITS = 1_100  # bits of an integer; a float has fewer, so a larger result is an error in ROS, too
+_MAX_PLACES = 400  # argument of round(); a float has fewer decimal places
 
-_CONSTANTS = ("e", "inf", "nan", "tau")  # of math, beside pi
+_CONSTANTS = ("e", "inf", "nan", "tau")  # names from the math module; `pi` is handled separately
 _FUNCTIONS = (
     *(
         "acos",
@@ -56,16 +56,16 @@ _FUNCTIONS = (
         "sqrt",
     ),
     *("tan", "tanh", "trunc"),
-)  # of math
+)  # names from the math module
 _ALLOWED = "only numbers, pi, Python's operators, functions of math, abs, float, int, max, min, pow, round and brackets"
 
 Number = int | float
 
 
 def arithmetic(text: str) -> float:
-    """Evaluate an arithmetic expression over numbers and ``pi``.
+    """Evaluate an arithmetic expression of numbers and ``pi``.
 
-    A comparison is 1.0 or 0.0. Raise ValueError, SyntaxError or ArithmeticError if the expression is invalid.
+    A comparison returns 1.0 or 0.0. Raise ValueError, SyntaxError or ArithmeticError if the expression is invalid.
     """
     import ast
 
@@ -74,21 +74,21 @@ def arithmetic(text: str) -> float:
     try:
         return float(_Evaluator().value(ast.parse(text.strip(), mode="eval").body))
     except TypeError as error:
-        # Such as 1 << 0.5, or a function with the wrong number of arguments.
+        # For example 1 << 0.5, or a function call with the wrong number of arguments.
         raise ValueError(str(error)) from error
 
 
 def radians(text: str) -> float | str:
-    """Return the value of ``rad(pi/2)``, or of the expression in it alone.
+    """Return the value of ``rad(pi/2)``, or of the expression alone.
 
-    ROS reads brackets inside the brackets as a string; here they are evaluated, and a string if that fails. Raise the same
-    exceptions as :func:`arithmetic`.
+    ROS treats nested brackets as a string. Here they are evaluated, and the text remains a string only if that fails. Raise the
+    same exceptions as :func:`arithmetic`.
     """
     return _angle(text, "rad", arithmetic)
 
 
 def degrees(text: str) -> float | str:
-    """Return the value of ``deg(90)``, or of the expression in it alone, in radians. See :func:`radians`."""
+    """Return the value of ``deg(90)``, or of the expression alone, converted to radians. See :func:`radians`."""
 
     def value(expression: str) -> float:
         try:
@@ -111,7 +111,7 @@ def _angle(text: str, name: str, evaluate: Callable[[str], float]) -> float | st
 
 
 class _Evaluator:
-    """Evaluates nodes of Python's syntax tree. The operators are looked up by the type of their node."""
+    """Evaluates a syntax tree, and selects each operator by the type of its node."""
 
     def __init__(self) -> None:
         import ast
@@ -147,7 +147,7 @@ class _Evaluator:
         }
 
     def value(self, node: ast.expr) -> Number:
-        """Return a node's value. Raise ValueError, TypeError or ArithmeticError if it has none."""
+        """Return a node's value. Raise ValueError, TypeError or ArithmeticError if the node is invalid."""
         value = self._any_value(node)
         if isinstance(value, int) and value.bit_length() > _MAX_BITS:
             raise OverflowError("int too large to convert to float")
@@ -191,7 +191,7 @@ class _Evaluator:
         return True
 
     def _connected(self, values: Sequence[ast.expr], *, until: bool) -> Number:
-        """Return the first value whose truth is ``until``, or the last value."""
+        """Return the first value whose truth equals ``until``, or else the last value."""
         for node in values:
             value = self.value(node)
             if bool(value) is until:
@@ -220,7 +220,7 @@ def _inverted(number: Number) -> Number:
 
 def _power(base: Number, exponent: Number) -> Number:
     if not (isinstance(base, int) and isinstance(exponent, int) and exponent >= 0):
-        # Of floats, so that the result is never complex.
+        # Convert to floats, so that the result is never complex.
         return math.pow(base, exponent)
     if base.bit_length() * exponent > 2 * _MAX_BITS and abs(base) > 1:
         raise OverflowError("int too large to convert to float")

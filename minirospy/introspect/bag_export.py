@@ -1,8 +1,9 @@
 """Export a topic of a bag as a table: CSV, or Parquet with the library pyarrow.
 
-A table has one row for each message. Its columns are those of a notebook's data frames (``introspect/columns.py``), and each
-element of an array has a column: ``ranges[7]``, ``transforms[0].transform.translation.x``. Byte arrays, such as images, are
-left out. The bag is read in batches; twice if its messages have arrays, because the columns depend on their lengths.
+A table has one row for each message. Its columns are those of a notebook's data frames (``introspect/columns.py``), except that
+each element of an array has its own column: ``ranges[7]``, ``transforms[0].transform.translation.x``. Byte arrays, such as
+images, are left out. The bag is read in batches. If its messages contain arrays, it is read twice, because the columns depend on
+the arrays' lengths.
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ from minirospy.introspect.columns import MAX_COLUMNS, Column, Kind, columns, lea
 __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
-MAX_BATCH = 2_000  # messages
-MAX_CELLS = 8_000_000  # of a batch; a cell of a message is at least one byte of it
-_MAX_ELEMENTS = 10_000  # of an array that have columns
+MAX_BATCH = 2_000  # messages per batch
+MAX_CELLS = 8_000_000  # table cells per batch; each cell takes at least one byte in its message
+_MAX_ELEMENTS = 10_000  # elements of an array that get a column
 _SECOND = 10**9
 _MAX_INT64 = (1 << 63) - 1
 
 
 class Exported(NamedTuple):
-    """A written table: its file, the numbers of its rows and columns, and the fields that were left out."""
+    """An exported table: its file, its numbers of rows and columns, and the fields that were left out."""
 
     path: str
     rows: int
@@ -50,7 +51,7 @@ class _Batch(NamedTuple):
 
 
 def file_name(bag: str, topic: str, format_: str) -> str:
-    """Return the name of a topic's table: ``run_camera_info.csv`` for the topic /camera/info of run.bag."""
+    """Return the file name of a topic's table: ``run_camera_info.csv`` for the topic /camera/info of run.bag."""
     stem = os.path.splitext(os.path.basename(bag))[0]
     return f"{stem}_{re.sub(r'[^A-Za-z0-9]+', '_', topic).strip('_') or 'topic'}.{format_}"
 
@@ -65,11 +66,11 @@ def export(
     warn: Callable[[str], object] = lambda line: None,
     step: Callable[[int], object] = lambda done: None,
 ) -> list[Exported]:
-    """Write a table for each of these topics, or of all if there are none, into ``folder``; return the tables.
+    """Write a table for each of these topics into ``folder``, or for all topics if none is given; return the tables.
 
-    ``step`` is called with the number of message bytes read so far. ``force``: replace files. Raise UsageError if a file exists
-    or the format is unknown, NotFoundError if the bag does not have a topic, BagError if the bag is invalid or the library is
-    missing, OSError if a file cannot be read or written. An incomplete file is removed.
+    ``step`` is called with the number of message bytes read so far. ``force``: overwrite existing files. Raise UsageError if a
+    file exists or the format is unknown, NotFoundError if a topic is not in the bag, BagError if the bag is invalid or the
+    library is missing, OSError if a file cannot be read or written. An incomplete file is removed.
     """
     if format_ not in FORMATS:
         raise UsageError(f"the format is {' or '.join(FORMATS)}, not '{format_[:20]}'")
@@ -89,7 +90,7 @@ def export(
         targets = {
             topic: os.path.join(folder, file_name(bag, topic, format_)) for topic in dict.fromkeys(chosen)
         }
-        # Some file systems do not tell capital letters from small ones.
+        # Some file systems do not distinguish upper and lower case.
         if len({target.casefold() for target in targets.values()}) < len(targets):
             raise UsageError("two of these topics have the same file name: export them into two folders")
         for target in targets.values():
@@ -166,7 +167,7 @@ def _batches(
     times: list[int] = []
     messages: list[object] = []
     size = 0
-    largest = 0  # bytes of a message: each row of the batch may have as many cells
+    largest = 0  # bytes of the largest message so far: an upper limit for the cells of each row in the batch
     for stored in reader.messages([each.id for each in connections]):
         largest = max(largest, len(stored.body))
         if times and (len(times) == most or (len(times) + 1) * largest > MAX_CELLS):
@@ -202,12 +203,12 @@ def _check_width(topic: str, width: int) -> None:
 
 
 def _field_name(name: str) -> str:
-    """Return the name of a field's column: the column ``time`` has the times of receipt."""
+    """Return the column name of a field. The name ``time`` is reserved for the times of receipt."""
     return "message.time" if name == "time" else name
 
 
 def _flat(found: Sequence[Column], prefix: str = "") -> Iterator[tuple[str, Column]]:
-    """Yield columns by name, with a column for each element of arrays."""
+    """Yield columns by name, with one column per array element."""
     for column in found:
         name = prefix + column.name
         first = next((value for value in column.values if value is not None), None)
@@ -240,15 +241,15 @@ def _elements(name: str, arrays: Sequence[Sequence[object] | None]) -> Iterator[
 
 
 class _Cells:
-    """The kinds of a column's values in all batches."""
+    """The kinds of values that a column has, over all batches."""
 
     def __init__(self) -> None:
         self.kind = Kind.PLAIN
         self.types: set[type] = set()
-        self.is_large = False  # if a value does not fit into a signed integer of 64 bits
+        self.is_large = False  # set if a value exceeds a signed 64-bit integer
 
     def widen(self, column: Column) -> None:
-        """Include a batch's values."""
+        """Add the values of a batch."""
         self.kind = column.kind
         self.types |= {*map(type, column.values)} - {type(None)}
         if int in self.types and not self.is_large:
@@ -256,14 +257,14 @@ class _Cells:
 
 
 class _Schema:
-    """The columns of all batches, by name, in the order of their first appearance."""
+    """The columns of all batches by name, in the order of first appearance."""
 
     def __init__(self, topic: str) -> None:
         self.columns: dict[str, _Cells] = {}
         self._topic = topic
 
     def widen(self, batch: _Batch) -> None:
-        """Include a batch's columns."""
+        """Add the columns of a batch."""
         for name, column in batch.columns.items():
             self.columns.setdefault(name, _Cells()).widen(column)
             _check_width(self._topic, len(self.columns))
@@ -291,7 +292,7 @@ def _writer(format_: str, path: str, schema: _Schema) -> Iterator[_Writer]:
 
 
 class _CsvWriter(_Writer):
-    """Times are seconds with nine decimals, Booleans true and false; the cell of a missing value is empty."""
+    """Writes CSV. Times are seconds with nine decimals, booleans are true and false, and missing values are empty cells."""
 
     def __init__(self, stream: TextIO, schema: _Schema) -> None:
         self._names = list(schema.columns)
@@ -319,7 +320,7 @@ def _seconds(nanoseconds: int) -> str:
 
 
 class _ParquetWriter(_Writer):
-    """Times are timestamps in UTC and durations, with nanoseconds."""
+    """Writes Parquet. Times are UTC timestamps, and durations are durations, both with nanoseconds."""
 
     def __init__(self, pyarrow: Any, schema: Any, writer: Any) -> None:
         self._pyarrow = pyarrow

@@ -1,6 +1,7 @@
-"""Read the numbers of fields from a bag for a plot, without playing it: exact points, or the extremes of each column.
+"""Read numeric fields from a bag for a plot, without playing the bag: exact points, or the extremes per pixel column.
 
-A bag of any size is read chunk by chunk; memory is needed only for the result. Times are seconds since the bag's start.
+A bag of any size is read chunk by chunk, so that memory is needed only for the result. Times are seconds since the start of the
+bag.
 """
 
 from __future__ import annotations
@@ -33,15 +34,15 @@ __all__ = [
     "sample",
 ]
 
-MAX_EXACT = 20_000  # points of a series that are returned as they are; the page draws at most 6,000
+MAX_EXACT = 20_000  # points of a series that are returned unchanged; the page draws at most 6,000
 MAX_POINTS = 2_000_000  # exact points of all series in a request, 16 bytes each
-MAX_SERIES = 200  # in a request
-MAX_LABELS = 50  # series from one path; slices of slices could select more
+MAX_SERIES = 200  # series per request
+MAX_LABELS = 50  # series per path; nested slices could select more
 _SECOND = 10**9
 
 
 class BagTopic(NamedTuple):
-    """A topic in a bag, with its first connection's type and definition."""
+    """A topic in a bag, with the type and definition of its first connection."""
 
     name: str
     type: str
@@ -49,14 +50,14 @@ class BagTopic(NamedTuple):
 
 
 class FieldPath(NamedTuple):
-    """A plot's path in a bag: a topic, and the steps to a number in its messages."""
+    """A plot's path in a bag: the topic, and the steps that lead to a number in its messages."""
 
     topic: str
     steps: Sequence[Step]
 
 
 class Point(NamedTuple):
-    """A number from a message: its series' label, the time in seconds since the bag's start, and the value."""
+    """A number from a message: its series' label, its time in seconds since the start of the bag, and its value."""
 
     label: str
     time: float
@@ -64,12 +65,12 @@ class Point(NamedTuple):
 
 
 def bag_span(reader: BagReader) -> tuple[int, int]:
-    """Return the times of a bag's first and last message in nanoseconds, (0, 0) if it has none.
+    """Return the times of a bag's first and last messages in nanoseconds, (0, 0) if it has none.
 
     Chunks may be stored out of order. Raise BagFormatError if the bag is damaged.
     """
     if reader.chunks:
-        # A chunk without messages has the times 0. The counts of an MCAP file's chunks are not known.
+        # A chunk without messages has the times 0. The message counts of an MCAP file's chunks are unknown.
         starts = [chunk.start_time for chunk in reader.chunks if chunk.end_time]
         ends = [chunk.end_time for chunk in reader.chunks if chunk.end_time]
     else:
@@ -87,9 +88,9 @@ def bag_topics(reader: BagReader) -> list[BagTopic]:
 
 
 def field_path(path: str, topics: Iterable[str]) -> FieldPath:
-    """Split a plot's path, such as /joint_states/position[elbow], at the longest topic that it starts with.
+    """Split a plot's path, such as /joint_states/position[elbow], after the longest matching topic name.
 
-    Raise NotFoundError if it starts with none, UsageError if the rest has invalid syntax.
+    Raise NotFoundError if no topic matches, UsageError if the syntax of the rest is invalid.
     """
     known = sorted(topics)
     fitting = [each for each in known if path.startswith(each) and path[len(each) :][:1] in ("", *"/.[{")]
@@ -106,10 +107,10 @@ def points(
     end: float | None = None,
     on_time: Callable[[float], object] = lambda time: None,
 ) -> Iterator[tuple[int, Point]]:
-    """Yield the numbers at these paths in time order, each with the index of its path.
+    """Yield the numbers at these paths in time order, each with its path's index.
 
-    ``start`` and ``end``: seconds since the bag's start, inclusive. ``on_time`` is called with the time reached, after each
-    chunk. Raise BagFormatError if the bag is damaged, or if a message cannot be deserialized.
+    ``start`` and ``end``: seconds since the start of the bag, inclusive. ``on_time`` is called after each chunk, with the time
+    reached. Raise BagFormatError if the bag is damaged or a message cannot be deserialized.
     """
     origin = bag_span(reader)[0]
     of_topic: dict[str, list[int]] = {}
@@ -149,14 +150,14 @@ def _message(message_class: type[Message], body: bytes, connection: Connection) 
 
 
 def _ignore(_: str) -> None:
-    """Accept a connection whose definition does not match its md5sum: its messages are read as far as they can be."""
+    """Accept a connection whose definition does not match its md5sum: read as many of its messages as possible."""
 
 
 def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterator[Point]:
-    """Yield the first series minus the second one, which is interpolated linearly at the times of the first.
+    """Yield the first series minus the second one, which is linearly interpolated at the first one's times.
 
-    Both are in time order. Times before the first or after the last point of the second series are left out. Of paths with
-    several series, the first series is used.
+    Both must be in time order. Times outside the range of the second series are left out. If a path has several series, only the
+    first one is used.
     """
     others = _first_series(subtrahend)
     before = after = next(others, None)
@@ -168,7 +169,7 @@ def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterat
         if before.time > time:
             continue
         share = (time - before.time) / (after.time - before.time) if after.time > before.time else 1.0
-        # Use a point at exactly this time as it is: the one before it may be NaN.
+        # Use a point at exactly this time without interpolation, because the point before it may be NaN.
         other = after.value if share == 1.0 else before.value + share * (after.value - before.value)
         yield Point(f"{label} - {after.label}", time, value - other)
 
@@ -193,12 +194,12 @@ class Budget:
 class Sampler:
     """The points of one series from ``start`` to ``end`` (seconds), added in time order.
 
-    Up to MAX_EXACT points are kept as they are, as long as the budget has points. Of more, each of ``columns`` equal parts of the
-    time keeps its lowest and its highest point.
+    Up to MAX_EXACT points are kept unchanged, if the budget allows. Beyond that, the time is divided into ``columns`` equal
+    parts, and each part keeps only its lowest and its highest point.
     """
 
     def __init__(self, start: float, end: float, columns: int, budget: Budget | None = None) -> None:
-        self.count = 0  # all points that were added
+        self.count = 0  # number of points added
         self.times = array("d")
         self.values = array("d")
         self._start = start
@@ -208,7 +209,7 @@ class Sampler:
 
     @property
     def is_exact(self) -> bool:
-        """Return whether all points are kept."""
+        """Return whether all points have been kept."""
         return self._columns is None
 
     def add(self, time: float, value: float) -> None:
@@ -241,7 +242,7 @@ class Sampler:
             column[2:] = value, time
 
     def result(self) -> tuple[list[float], list[float | None]]:
-        """Return the times and the values; None for a value that is not a finite number."""
+        """Return the times and the values. A value that is not finite becomes None."""
         if self._columns is None:
             return list(self.times), [each if math.isfinite(each) else None for each in self.values]
         found = []
@@ -259,7 +260,7 @@ def sample(
     columns: int,
     budget: Budget | None = None,
 ) -> list[dict[str, Sampler]]:
-    """Return, for each of ``count`` paths, its series' samplers by label. Series above the budget are left out."""
+    """Return, for each of ``count`` paths, the samplers of its series by label. Series beyond the budget are left out."""
     budget = budget or Budget()
     samplers: list[dict[str, Sampler]] = [{} for _ in range(count)]
     for number, (label, time, value) in found:

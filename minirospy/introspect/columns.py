@@ -1,8 +1,8 @@
-"""Arrange the fields of messages of one type as columns. Pure.
+"""Arrange the fields of messages of one type in columns. Pure.
 
-A field's column has the path of the field as its name, such as ``pose.pose.position.x``. Arrays whose values belong to the
-names in a field ``name``, as in sensor_msgs/JointState, have one column for each name: ``position[elbow]``. In messages with
-another number of names, the array is the value of its field, ``position``.
+A column is named by the path of its field, such as ``pose.pose.position.x``. If the values of an array correspond to the names in
+a field ``name``, as in sensor_msgs/JointState, each name has a column: ``position[elbow]``. In messages with a different number
+of names and values, the whole array is in the column of its field, ``position``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from minirospy.base.errors import BagError
 
 __all__ = ["MAX_COLUMNS", "Column", "Kind", "columns", "leaves"]
 
-MAX_COLUMNS = 20_000  # of a table; a scan has some 3,000
+MAX_COLUMNS = 20_000  # columns per table; a laser scan has about 3,000
 _NUMBERS = {
     *("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"),
     *("float32", "float64", "bool", "char", "byte"),
@@ -25,15 +25,15 @@ _NO_BYTES = {"uint8", "char"}  # arrays of these types are bytes in Python, not 
 
 
 class Kind(Enum):
-    """The kind of a column's values."""
+    """The kind of values in a column."""
 
-    PLAIN = "plain"  # numbers, strings, bytes, lists, as they are in the message
+    PLAIN = "plain"  # numbers, strings, bytes or lists, unchanged from the message
     TIME = "time"  # nanoseconds since 1970
     DURATION = "duration"  # nanoseconds
 
 
 class Column(NamedTuple):
-    """A column: its name, the kind of its values, and one value for each message (None if it has none)."""
+    """A column: its name, its kind, and one value per message (None if the message has none)."""
 
     name: str
     kind: Kind
@@ -46,7 +46,7 @@ class _Leaf(NamedTuple):
 
 
 def leaves(message_class: Any, prefix: str = "") -> Iterator[_Leaf]:
-    """Yield the path and type of each field that is not a message itself; arrays of messages count as fields."""
+    """Yield the path and type of each field that is not itself a message; an array of messages is a single field."""
     for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
         path = f"{prefix}{name}"
         nested = None if type_.endswith("]") else _class_of(message_class, name, type_)
@@ -57,16 +57,16 @@ def leaves(message_class: Any, prefix: str = "") -> Iterator[_Leaf]:
 
 
 def _class_of(message_class: Any, name: str, type_: str) -> Any:
-    """Return the class of a field that is a message, or None if it is a primitive."""
+    """Return the message class of a field, or None if the field is a primitive."""
     if type_ in ("time", "duration", "string") or type_ in _NUMBERS:
         return None
     return type(getattr(message_class(), name))
 
 
 def columns(messages: Sequence[object]) -> list[Column]:
-    """Return the columns of messages, which must all be of the same type. No messages have no columns.
+    """Return the columns of messages, which must have the same type. Without messages there are no columns.
 
-    Raise BagError if an array has values for more than MAX_COLUMNS names.
+    Raise BagError if the values of an array have more than MAX_COLUMNS names.
     """
     if not messages:
         return []
@@ -99,7 +99,7 @@ def columns(messages: Sequence[object]) -> list[Column]:
 
 
 def _names_of(field: _Leaf) -> str:
-    """Return the path of the field ``name`` beside an array of numbers, or "" for another field."""
+    """Return the path of the field ``name`` next to an array of numbers, or "" for any other field."""
     element, bracket, _ = field.type.partition("[")
     if not bracket or element not in _NUMBERS - _NO_BYTES:
         return ""
@@ -108,7 +108,7 @@ def _names_of(field: _Leaf) -> str:
 
 
 def _belong(names: Sequence[Sequence[object]], values: Sequence[Sequence[object]]) -> list[bool]:
-    """Return for each array whether it has values, as many as there are names."""
+    """Return for each array whether it has values, and as many as there are names."""
     return [0 < len(array) == len(own) for own, array in zip(names, values, strict=True)]
 
 

@@ -84,9 +84,9 @@ class NodeQueries(Generic[_Key, _Found]):
             is_late = True
 
     def refresh(self, key: _Key) -> None:
-        """Query a key again, whose node may respond otherwise now. Its result is kept until the node has responded.
+        """Query a key again, because its node may now respond differently. Keep the old result until the node has responded.
 
-        ``arrived_late`` is called if the new result differs.
+        ``arrived_late`` is called if the new result differs from the old one.
         """
         if key in self.found and key not in self.tasks:
             task = asyncio.ensure_future(self._refresh(key))

@@ -113,7 +113,7 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
 
 
 def is_known_host(machine: str) -> bool:
-    """Return whether a machine's name or address has an IPv4 address."""
+    """Return whether a machine's name or address resolves to an IPv4 address."""
     return _ipv4_address(machine) is not None
 
 

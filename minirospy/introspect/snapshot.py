@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 def moved(before: Table, after: Table) -> list[str]:
-    """Return names in both tables that have moved behind others. The master appends what is registered again."""
+    """Return the names in both tables that moved back: the master appends a name that is registered again."""
     found: dict[str, None] = {}
     rest = iter(name for name in before if name in after)
     for name in after:

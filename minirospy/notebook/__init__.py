@@ -1,6 +1,6 @@
-"""ROS in Jupyter notebooks: bags as data frames, messages and images as cell output, the dashboard's views in cells.
+"""ROS in Jupyter notebooks: bags as data frames, messages and images as cell output, dashboard views in cells.
 
-``%load_ext minirospy.notebook`` in the first cell, then::
+Load the extension in the first cell with ``%load_ext minirospy.notebook``, then::
 
     from minirospy.notebook import frame, view
 
@@ -21,7 +21,7 @@ __all__ = ["frame", "load_ipython_extension", "unload_ipython_extension", "view"
 
 
 def load_ipython_extension(shell: Shell) -> None:
-    """Show messages as tables and images as pictures, and let an interrupt in ``rospy.spin()`` end only the cell."""
+    """Show messages as tables and images as pictures, and make an interrupt in ``rospy.spin()`` end only the cell."""
     from minirospy.client.session import current_session
     from minirospy.notebook.display import show_messages
 

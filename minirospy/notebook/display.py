@@ -1,4 +1,4 @@
-"""Show messages as tables, and images as pictures, when they are the output of a cell."""
+"""Show messages as tables, and images as pictures, if they are the output of a cell."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from minirospy.web.video.pictures import COMPRESSED, IMAGE, encoded
 __all__ = ["Shell", "hide_messages", "html_of", "show_messages"]
 
 _MAX_ROWS = 100
-_MAX_ITEMS = 8  # of an array
-_MAX_TEXT = 200  # characters of a value
-_MAX_WIDTH = 640  # pixels of a picture
+_MAX_ITEMS = 8  # array elements shown
+_MAX_TEXT = 200  # characters shown per value
+_MAX_WIDTH = 640  # pixels; the maximum width of a picture
 
 
 class _Formatter(Protocol):
@@ -32,23 +32,23 @@ class _Formatters(Protocol):
 
 
 class Shell(Protocol):
-    """The part of IPython's InteractiveShell that is used here."""
+    """The part of IPython's InteractiveShell that this module uses."""
 
     display_formatter: _Formatters
 
 
 def show_messages(shell: Shell) -> None:
-    """Let ``shell`` show messages as HTML."""
+    """Make ``shell`` show messages as HTML."""
     shell.display_formatter.formatters["text/html"].for_type(genpy.Message, html_of)
 
 
 def hide_messages(shell: Shell) -> None:
-    """Let ``shell`` show messages as text again."""
+    """Make ``shell`` show messages as text again."""
     shell.display_formatter.formatters["text/html"].pop(genpy.Message, None)
 
 
 def html_of(message: Any) -> str:
-    """Return a message as an HTML table of its fields; an image also has a picture above the table."""
+    """Return a message as an HTML table of its fields; for an image, with its picture above the table."""
     rows = []
     fields = list(leaves(type(message)))
     for path, type_ in fields[:_MAX_ROWS]:
@@ -81,7 +81,7 @@ def _text_of(value: Any) -> str:
 
 
 def _picture_of(message: Any) -> str:
-    """Return an image message's picture as an HTML element, the reason if it cannot be shown, or "" for other messages."""
+    """Return an image's picture as an HTML element, the reason if there is none, or "" for other messages."""
     if message._type not in (IMAGE, COMPRESSED):
         return ""
     body = _Buffer()
@@ -95,7 +95,7 @@ def _picture_of(message: Any) -> str:
 
 
 class _Buffer:
-    """A buffer for a message's ``serialize``."""
+    """An output buffer for a message's ``serialize``."""
 
     def __init__(self) -> None:
         self.data = bytearray()

@@ -1,4 +1,4 @@
-"""Read a topic of a bag into a data frame of pandas or polars."""
+"""Read a topic from a bag into a pandas or polars data frame."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def frame(
     end: Any = None,
     library: Literal["pandas", "polars"] = "pandas",
 ) -> pandas.DataFrame | polars.DataFrame:
-    """Return the messages of a topic of a bag, or of an MCAP file, as a data frame with one row for each message.
+    """Return a topic's messages in a bag or MCAP file as a data frame with one row per message.
 
-    The column ``time`` has the times of receipt (in pandas, it is the index); each other column is a field, such as
-    ``twist.twist.linear.x`` or ``position[elbow]``. Times are UTC with nanoseconds; arrays without names remain lists, and
+    The column ``time`` (in pandas, the index) contains the times of receipt. Each other column is a field, such as
+    ``twist.twist.linear.x`` or ``position[elbow]``. Times are in UTC with nanoseconds. Arrays without names remain lists, and
     bytes remain bytes. ``start`` and ``end``: times of receipt (rospy.Time), inclusive.
 
-    Raise NotFoundError if the bag does not have the topic, MinirospyError if the topic has several types, or the library
-    is not installed, ROSBagException if the file is damaged, OSError if it cannot be read.
+    Raise NotFoundError if the topic is not in the bag, MinirospyError if the topic has several types or the library is not
+    installed, ROSBagException if the file is damaged, OSError if it cannot be read.
     """
     from minirospy.ros.rosbag.rosbag.bag import Bag as OpenBag
 

@@ -1,7 +1,7 @@
-"""Show a view of the dashboard in a cell.
+"""Show a dashboard view in a notebook cell.
 
-The dashboard is a process of the kernel's user that listens on loopback only, and ends when its standard input ends: with the
-kernel, even if that is killed. A notebook's page may embed it (``minirospy dashboard --embed``).
+The dashboard is a child process of the kernel that listens only on loopback. It exits when its standard input is closed, and
+therefore also if the kernel is killed. A notebook page may embed it (``minirospy dashboard --embed``).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _HEIGHT = 420  # pixels
 
 
 class Frame:
-    """A view in a cell: IPython shows it by its HTML."""
+    """A view for a cell. IPython shows its HTML."""
 
     def __init__(self, url: str, height: int) -> None:
         self.url = url
@@ -43,7 +43,7 @@ class Frame:
 
 
 class _Dashboard:
-    """The dashboard's process, and the host, port and token of its page."""
+    """A dashboard process, and its page's host, port and token."""
 
     def __init__(self, process: subprocess.Popen[str], url: str) -> None:
         self.process = process
@@ -53,19 +53,19 @@ class _Dashboard:
 
 
 class _Dashboards:
-    """The dashboards of this process, by the master's URI."""
+    """The dashboard processes of this kernel, by master URI."""
 
     lock = threading.Lock()
     by_master: dict[str, _Dashboard] = {}
 
 
 def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterable[str]) -> Frame:
-    """Return a view of the dashboard, for the last line of a cell, or for ``display``.
+    """Return a dashboard view, to be the last expression of a cell or an argument of ``display``.
 
-    ``name``: plot, 3d, graph, image, console or another view; ``height``: pixels; ``fields``: the view's settings in its
-    link, as ``path="/odom/twist/twist/linear/x"`` of a plot or ``topic="/camera/image_raw"`` of an image. The first call
-    starts the dashboard; while there is no master, the view says how to start one. Raise MinirospyError if there is no such
-    view, or the dashboard does not start.
+    ``name``: plot, 3d, graph, image, console or another view. ``height``: pixels. ``fields``: the view's settings, as in its
+    link: for example ``path="/odom/twist/twist/linear/x"`` for a plot, or ``topic="/camera/image_raw"`` for an image. The first
+    call starts the dashboard. While there is no master, the view explains how to start one. Raise MinirospyError if the view does
+    not exist or the dashboard does not start.
     """
     if name not in VIEWS:
         known = ", ".join(VIEWS)
@@ -80,7 +80,7 @@ def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterabl
 
 
 def _start() -> _Dashboard:
-    # In a new process group: an interrupt of a cell goes to the kernel's whole group.
+    # Use a new process group, because interrupting a cell signals the kernel's whole group.
     group: dict[str, Any] = {"start_new_session": True}
     if sys.platform == "win32":
         group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -99,8 +99,8 @@ def _start() -> _Dashboard:
         said.append(line)
         url = next((word for word in line.split() if word.startswith("http") and "token=" in word), "")
         if url:
-            # Discard the rest, so that the process never waits for a reader.
+            # Discard all further output, so that the process never blocks on a full pipe.
             threading.Thread(target=deque, args=(process.stdout, 0), daemon=True).start()
             return _Dashboard(process, url)
-    said.append(process.communicate()[0])  # also closes the pipes
+    said.append(process.communicate()[0])  # closes the pipes, too
     raise MinirospyError(f"the dashboard did not start: {''.join(said).strip()}")

@@ -1,6 +1,6 @@
-"""Convert channels of ROS 2's MCAP files to ROS 1, from the definitions in the file. Pure.
+"""Convert channels of ROS 2 MCAP files to ROS 1, using the definitions in the file. Pure.
 
-Source: https://mcap.dev/spec/registry (encodings ``cdr`` and ``ros2msg``), and for the definitions' syntax
+Source: https://mcap.dev/spec/registry (encodings ``cdr`` and ``ros2msg``); for the syntax of definitions,
 https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html.
 """
 
@@ -31,7 +31,7 @@ _TIME = {"sec": "int32", "nanosec": "uint32"}
 
 
 class Ros1Channel(NamedTuple):
-    """A channel as in ROS 1: type, md5sum, definition, and the function that converts a message's bytes."""
+    """A channel converted to ROS 1: its type, md5sum and definition, and the function that converts a message's bytes."""
 
     type: str
     md5sum: str
@@ -40,9 +40,9 @@ class Ros1Channel(NamedTuple):
 
 
 def ros1_channel(type_: str, schema_encoding: str, schema: bytes, message_encoding: str) -> Ros1Channel:
-    """Return the conversion of a channel with the ROS 2 type ``pkg/msg/Name``.
+    """Return the conversion for a channel with the ROS 2 type ``pkg/msg/Name``.
 
-    Raise MinirospyError with the reason if its encoding, its type or its definition cannot be converted.
+    Raise MinirospyError, with the reason, if the encoding, type or definition cannot be converted.
     """
     if message_encoding != "cdr":
         raise TypesDiffer(f"its messages have the encoding '{message_encoding[:20]}', not cdr")
@@ -77,7 +77,7 @@ def _short(name: str) -> str:
 
 
 def _ros2_specs(name: str, text: str) -> dict[str, MessageSpec]:
-    """Return the specs in the text of a schema: the type's, and those of all types that it uses."""
+    """Return the specs in a schema's text: that of the type, and those of all types that it uses."""
     specs = {
         each: ros2_spec(each, _TIME) for each in ("builtin_interfaces/Time", "builtin_interfaces/Duration")
     }
@@ -95,7 +95,7 @@ def _ros2_specs(name: str, text: str) -> dict[str, MessageSpec]:
 
 
 def _fields(name: str, body: str) -> dict[str, str]:
-    """Return the fields of a definition with their types, as rclpy's classes have them."""
+    """Return a definition's fields with their types, in the form of rclpy's classes."""
     package = name.partition("/")[0]
     found: dict[str, str] = {}
     for number, line in enumerate(body.splitlines(), 1):

@@ -258,7 +258,7 @@ class SharedGraph:
         self._service_order: tuple[
             ServiceKey, ...
         ] = ()  # the services at the last refresh, in the master's order
-        self._check_after = 0.0  # time of the loop at which the type of another known service is checked
+        self._check_after = 0.0  # loop time at which the next known service's type is checked
         self._unchecked: list[ServiceKey] = []  # services whose types are still to be checked in this round
         self._service_types = NodeQueries(
             self._service_type,
@@ -361,10 +361,10 @@ class SharedGraph:
         await self._service_types.look(wanted, _QUERY_SECONDS)
 
     def _check_known_services(self, wanted: dict[ServiceKey, None]) -> None:
-        """Query types again that may have changed: a node can offer a service again with another type between two refreshes.
+        """Query again the types that may have changed: between two refreshes, a node can offer a service again with another type.
 
-        The master then appends the service to its list, which shows unless it is the last one. So one service is also
-        checked every few seconds, in turn.
+        The master then moves the service to the end of its list, which reveals the change unless the service was already last.
+        Therefore one service is also checked every few seconds, in turn.
         """
         for name in moved(dict(self._service_order), dict(wanted)):
             self._service_types.refresh((name, self.snapshot.services.get(name, ())))
@@ -376,7 +376,7 @@ class SharedGraph:
         self._check_after = now + CHECK_SECONDS
         self._unchecked = [key for key in self._unchecked if key in wanted] or [*wanted]
         if self._unchecked:
-            # The last service in the master's list first: a change of the others shows.
+            # Check the last service in the master's list first: the list reveals changes of all others.
             self._service_types.refresh(self._unchecked.pop())
 
     def check_service(self, service: str) -> None:

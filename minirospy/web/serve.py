@@ -37,7 +37,7 @@ LIBRARIES = (
     "websockets",
     "segno",
     "cbor2",
-)  # of the dashboard and the bridges, dependencies of minirospy
+)  # packages that the dashboard and the bridges need; minirospy depends on them
 
 _LARGE_BLOCK = 4 * 1024 * 1024
 """Minimum size, in bytes, of freed blocks that are returned to the system. It exceeds the size of camera images, because

@@ -1,4 +1,4 @@
-"""Files of a user that hide a ROS package or module from `import`, because they have its name and are found first."""
+"""User files that hide a ROS package or module from `import`, because they have the same name and are found first."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _OVERLAY = Path(minirospy.__file__).parent / "overlay"
 def hiding_files(folder: Path) -> list[Path]:
     """Return the Python files and packages in ``folder`` that have the name of one of minirospy's modules, sorted.
 
-    Python puts the folder of a program, or the current one, before all others.
+    Python searches the program's folder, or the current folder, before all others.
     """
     if folder.is_relative_to(_OVERLAY):
         return []
@@ -28,7 +28,7 @@ def hiding_files(folder: Path) -> list[Path]:
 
 
 def warning_of_hiding_file(program: Path) -> str:
-    """Return a warning if a file next to a program hides a module; an empty string if none does."""
+    """Return a warning if a file next to a program hides a module, else an empty string."""
     if program.suffix != ".py":
         return ""
     for file in hiding_files(program.parent):

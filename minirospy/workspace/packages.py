@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 _MANIFEST = "package.xml"
-ROSBUILD_MANIFEST = "manifest.xml"  # of packages for rosbuild, the build system before catkin
+ROSBUILD_MANIFEST = "manifest.xml"  # of rosbuild packages; rosbuild preceded catkin
 _IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"}
 _NO_SUBFOLDERS = "rospack_nosubdirs"
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
@@ -43,7 +43,7 @@ _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
 OF_THE_WORKSHOP = frozenset(
     ["rpi_msgs", "rpi_feros", "rpi_feros_bringup"]
-)  # its participants write packages of these names
+)  # packages that workshop participants write themselves
 _SHOWN = 12  # maximum number of programs to list in an error: about one line
 
 
@@ -223,7 +223,7 @@ def built_in_roots() -> tuple[Path, ...]:
 def crawl(root: Path, *, rosbuild: bool = False) -> Iterator[Path]:
     """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages.
 
-    ``rosbuild``: yield also packages for rosbuild, which have a manifest.xml and no package.xml; catkin ignores them.
+    ``rosbuild``: also yield rosbuild packages, which have a manifest.xml and no package.xml; catkin ignores them.
     """
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():

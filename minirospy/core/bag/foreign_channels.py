@@ -1,4 +1,4 @@
-"""Opens channels of MCAP files that are not of ROS 1. Only this module knows their converter, and imports it when needed."""
+"""Converts channels of MCAP files that are not ROS 1 channels. Only this module knows the converter, and imports it on demand."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from minirospy.base.errors import BagFormatError
 __all__ = ["Ros1Channel", "ros1_channel"]
 
 _CONVERTER = "minirospy.ros2.bag_channels"
-"""A module with ``ros1_channel``."""
+"""The module that defines ``ros1_channel``."""
 
 
 class Ros1Channel(Protocol):
-    """A channel as in ROS 1: type, md5sum, definition, and the function that converts a message's bytes."""
+    """A channel converted to ROS 1: its type, md5sum and definition, and the function that converts a message's bytes."""
 
     @property
     def type(self) -> str:
@@ -29,11 +29,11 @@ class Ros1Channel(Protocol):
         """The ROS 1 type's full text."""
 
     def to_ros1(self, data: bytes | memoryview, /) -> bytes:
-        """Convert a message. Raise DeserializationError if it does not match its definition."""
+        """Convert a serialized message. Raise DeserializationError if it does not match its definition."""
 
 
 def ros1_channel(type_: str, schema_encoding: str, schema: bytes, message_encoding: str) -> Ros1Channel:
-    """Return the conversion of a channel to ROS 1. Raise MinirospyError with the reason if there is none."""
+    """Return a channel's conversion to ROS 1. Raise MinirospyError, with the reason, if it cannot be converted."""
     try:
         module = importlib.import_module(_CONVERTER)
     except ModuleNotFoundError as error:

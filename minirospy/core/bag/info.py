@@ -131,10 +131,10 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
 
 
 def span_out_of_order(reader: BagReader) -> tuple[float, float] | None:
-    """Return the times of the first and the last message, if ROS's summary shows others; None if it shows these.
+    """Return the times of the first and last messages if ROS's summary shows different times, else None.
 
-    For bags, ROS takes the times from the first and the last chunk in the file. Chunks that overlap a little, as recorders
-    write them, are in order.
+    For bags, ROS takes the times from the first and last chunks in the file. Chunks that overlap slightly, as those of recorders
+    do, count as in order.
     """
     if not reader.chunks or not reader.version:
         return None

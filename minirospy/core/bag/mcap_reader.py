@@ -32,9 +32,7 @@ __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
 _TRANSIENT_LOCAL = re.compile(r"durability: *(1|transient_local)\b")  # ROS 2's latching, as rosbag2 stores it
-_MAX_SCHEMA = (
-    1_048_576  # characters, as of a full text of ROS 1; the largest of real packages have some 30,000
-)
+_MAX_SCHEMA = 1_048_576  # characters; a ROS 1 full text; the largest in real packages have about 30,000
 _MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
@@ -101,7 +99,7 @@ class McapReader(BagReader):
 
     @property
     def version_name(self) -> str:
-        """The name of the format, instead of a bag version, and the system if it is not ROS 1."""
+        """The name of the format in place of a bag version, followed by "of ROS 2" if the channels are converted."""
         return "MCAP 0 of ROS 2" if self._converters else "MCAP 0"
 
     def _add_foreign(self, channel: Channel, schema: Schema | None) -> None:
@@ -339,9 +337,9 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the mcap library, which may request any length.
+    """A stream for the mcap library, whose reads may request any length.
 
-    Returns the data that is there, without allocating that length.
+    A read returns the available data, without allocating the requested length.
     """
 
     def __init__(self, data: bytes) -> None:

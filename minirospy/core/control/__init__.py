@@ -1,4 +1,5 @@
-"""Control of robots' joints: hardware, controllers and the mathematics of both, without ROS's topics, threads or sockets.
+"""Joint control: hardware, controllers and their mathematics, without topics, threads or sockets.
 
-The shells are in `ros/controller_manager/` and in the packages of the controllers. Source: http://wiki.ros.org/ros_control.
+The code that connects it to ROS is in `ros/controller_manager/` and in the controllers' packages. Source:
+http://wiki.ros.org/ros_control.
 """

@@ -1,6 +1,6 @@
-"""The base class of controllers, and the view of the hardware that a controller gets.
+"""The base class of controllers, and the classes through which a controller accesses the hardware.
 
-A controller of the user's own is a subclass of :class:`Controller`. Source: http://wiki.ros.org/controller_interface.
+User-defined controllers subclass :class:`Controller`. Source: http://wiki.ros.org/controller_interface.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ __all__ = ["Controller", "ControllerContext", "ControllerError", "ControllerStat
 
 
 class ControllerError(MinirospyError):
-    """Raised by a controller's ``init`` with the line that the controller manager logs: what is wrong, and where."""
+    """Raised by a controller's ``init``. The controller manager logs the text, which names the fault and its location."""
 
 
 class ControllerState(Enum):
-    """A controller's state; the value is the text in the answer of ``list_controllers``."""
+    """A controller's state; the value is the text in a ``list_controllers`` response."""
 
     INITIALIZED = "initialized"
     RUNNING = "running"
@@ -45,11 +45,12 @@ class ControllerState(Enum):
 
 @dataclass(frozen=True)
 class ControllerContext:
-    """The surroundings of a controller.
+    """The environment that a controller's ``init`` receives.
 
-    ``namespace``: the controller's, such as ``/arm/gripper``, in which its topics and parameters are. ``root``: the
-    manager's, such as ``/arm``. ``name``: as it was loaded, such as ``gripper``. ``robot``: return the robot of
-    ``robot_description``, searched upwards from ``root``; raise ControllerError if there is none, or an invalid one.
+    ``namespace``: the controller's namespace, such as ``/arm/gripper``, which contains its topics and parameters. ``root``: the
+    manager's namespace, such as ``/arm``. ``name``: the name under which the controller was loaded, such as ``gripper``.
+    ``robot``: return the robot of the parameter ``robot_description``, searched upwards from ``root``; raise ControllerError if
+    the parameter is missing or invalid.
     """
 
     namespace: str
@@ -60,7 +61,7 @@ class ControllerContext:
 
 
 class Resources:
-    """The hardware as one controller sees it in ``init``. It records the joints that the controller claims."""
+    """The hardware as one controller sees it in ``init``. It records which joints the controller claims."""
 
     def __init__(self, hardware: RobotHardware) -> None:
         self._hardware = hardware
@@ -68,7 +69,7 @@ class Resources:
         self._claims: dict[Interface, set[str]] = {}
 
     def names(self, interface: Interface) -> Sequence[str]:
-        """Return the sorted names of the joints or sensors of an interface. Raise HardwareError if the robot lacks it."""
+        """Return the sorted names of an interface's joints or sensors. Raise HardwareError if the robot lacks the interface."""
         if interface not in self._resources:
             raise HardwareError(
                 f"This controller requires a hardware interface of type '{interface.value}'. "
@@ -77,16 +78,16 @@ class Resources:
         return self._resources[interface]
 
     def joint(self, name: str, interface: Interface) -> Joint:
-        """Return a joint to command through ``interface``, and claim it.
+        """Claim a joint, and return it, to be commanded through ``interface``.
 
-        Raise HardwareError if the robot does not have the joint there.
+        Raise HardwareError if the joint does not exist in this interface.
         """
         self._check(name, interface)
         self._claims.setdefault(interface, set()).add(name)
         return self._hardware.joints[name]
 
     def joint_state(self, name: str) -> Joint:
-        """Return a joint to read, without a claim. Raise HardwareError if the robot does not have it."""
+        """Return a joint for reading only, without claiming it. Raise HardwareError if the robot does not have the joint."""
         self._check(name, Interface.JOINT_STATE)
         return self._hardware.joints[name]
 
@@ -101,7 +102,7 @@ class Resources:
         return self._hardware.force_torque_sensors[name]
 
     def claimed(self, interfaces: Sequence[Interface]) -> tuple[InterfaceResources, ...]:
-        """Return the claims through each of these interfaces, those without a claim included, as ROS lists them."""
+        """Return the claims per interface; as in ROS, an interface without claims is listed, too."""
         ordered = dict.fromkeys((*interfaces, *self._claims))
         return tuple(
             InterfaceResources(interface.value, tuple(sorted(self._claims.get(interface, ()))))
@@ -114,40 +115,40 @@ class Resources:
 
 
 class Controller:
-    """A controller: the loop calls ``update`` in each cycle while it runs. A subclass overrides what it needs.
+    """A controller. While it runs, the loop calls ``update`` once per cycle. Subclasses override the methods that they need.
 
-    ``init`` runs in a service's thread, all other methods in the loop's thread: they must not wait, and not call services.
-    An exception in ``update`` stops this controller, and no other. Each controller has one object of its class, which
-    is created without arguments.
+    ``init`` runs in a service thread. All other methods run in the loop's thread, and must neither block nor call services. An
+    exception in ``update`` stops only this controller. Each controller is a separate instance of its class, created without
+    arguments.
     """
 
     interfaces: ClassVar[tuple[Interface, ...]] = ()
-    """The hardware interfaces that the controller uses; the robot must have them all."""
+    """The hardware interfaces that the controller uses. Loading fails if the robot lacks one of them."""
 
     @cached_property
     def opened(self) -> ExitStack:
-        """The stack of everything that ``init`` opens, for example ``self.opened.callback(subscriber.unregister)``."""
+        """An ExitStack for everything that ``init`` opens, for example ``self.opened.callback(subscriber.unregister)``."""
         return ExitStack()
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim joints, open topics. Raise ControllerError or HardwareError if that is impossible."""
+        """Read the parameters, claim joints, open topics. Raise ControllerError or HardwareError if one of these fails."""
 
     def starting(self, time: Time) -> None:
-        """Prepare to run, for example hold the present position. The first ``update`` is in the next cycle."""
+        """Prepare to run, for example hold the present position. The first ``update`` follows in the next cycle."""
 
     def update(self, time: Time, period: Duration) -> None:
         """Compute the joints' commands from their states. ``period``: ROS time since the last cycle."""
         raise NotImplementedError
 
     def stopping(self, time: Time) -> None:
-        """End a motion or a goal."""
+        """End the current motion or goal, because the controller is being stopped."""
 
     def waiting(self, time: Time) -> None:
-        """Note that the start waits for the hardware."""
+        """Handle a start that is delayed because the hardware is not ready."""
 
     def aborting(self, time: Time) -> None:
-        """Note that the hardware refused the start."""
+        """Handle a start that the hardware refused."""
 
     def close(self) -> None:
-        """Close what is in ``opened``, in reverse. It is called when the controller is unloaded, or if ``init`` raises."""
+        """Close everything in ``opened``, in reverse order. Called when the controller is unloaded, or if ``init`` raises."""
         self.opened.close()

@@ -1,4 +1,4 @@
-"""The goal of an action that a control loop follows: one of several threads decides its outcome."""
+"""The goal of an action that a control loop executes. Several threads may finish it; the first one decides its outcome."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["CANCELLED", "MonitoredGoal", "Outcome"]
 
 
 class Outcome(NamedTuple):
-    """The outcome of a goal. ``result``: the first fields of the result's message."""
+    """The outcome of a goal. ``result``: the first field values of the result message."""
 
     event: GoalEvent
     result: tuple[Any, ...] = ()
@@ -20,7 +20,7 @@ CANCELLED = Outcome(GoalEvent.CANCEL)
 
 
 class MonitoredGoal:
-    """An accepted goal. ``outcome`` is None while it is active; ``reached`` has a bit for each joint that is at its end."""
+    """An accepted goal. ``outcome``: None while active. ``reached``: one bit per joint, set when the joint has arrived."""
 
     def __init__(self) -> None:
         self.outcome: Outcome | None = None
@@ -28,5 +28,5 @@ class MonitoredGoal:
         self._decided: dict[None, Outcome] = {}
 
     def finish(self, outcome: Outcome) -> None:
-        """Decide the outcome, unless another one was decided before."""
+        """Set the outcome, unless it is already set."""
         self.outcome = self._decided.setdefault(None, outcome)  # atomic

@@ -1,6 +1,6 @@
-"""The decisions of a GripperActionController: what a gripper is commanded, and when a goal is reached or stalled.
+"""The decisions of a GripperActionController: the command for the gripper, and whether a goal is reached or stalled.
 
-Times are nanoseconds. Source: http://wiki.ros.org/gripper_action_controller.
+Times are in nanoseconds. Source: http://wiki.ros.org/gripper_action_controller.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ __all__ = ["Gripper", "GripperCommand", "GripperLimits"]
 
 
 class GripperLimits(NamedTuple):
-    """When a goal is reached, and when a gripper counts as stalled. The defaults are ROS's."""
+    """The conditions under which a goal is reached and a gripper counts as stalled. The defaults are ROS's."""
 
     goal_tolerance: float = 0.01  # rad or m
-    max_effort: float = 0.0  # N m or N, while no goal has another one
-    stall_velocity: float = 0.001  # rad/s or m/s; a slower gripper does not move
-    stall_timeout: int = 1_000_000_000  # ns without motion until the goal is aborted
+    max_effort: float = 0.0  # N m or N; used while no goal specifies an effort
+    stall_velocity: float = 0.001  # rad/s or m/s; a slower gripper counts as not moving
+    stall_timeout: int = 1_000_000_000  # ns without motion after which the goal is aborted
 
 
 class GripperCommand(NamedTuple):
-    """The position to hold, with at most this effort, and the goal that wants it, with the time at which it was received."""
+    """The position to hold, the maximum effort, and the goal that requested it, with its time of receipt."""
 
     position: float
     max_effort: float
@@ -38,14 +38,14 @@ class Gripper:
         self.limits = limits
         self.command = GripperCommand(0.0, limits.max_effort)
         self._checked: MonitoredGoal | None = None
-        self._moved = 0  # ns, when the gripper moved or got its goal
+        self._moved = 0  # ns; the time of the gripper's last motion, or of its goal's receipt
 
     def hold(self, position: float) -> None:
         """Command a position without a goal."""
         self.command = GripperCommand(position, self.limits.max_effort)
 
     def check(self, time: int, position: float, velocity: float, effort: float) -> GripperCommand:
-        """Finish the goal if it is reached or stalled; return the command of this cycle. ``effort``: of the last cycle."""
+        """Finish the goal if it is reached or stalled; return this cycle's command. ``effort``: the effort of the last cycle."""
         command = self.command
         goal = command.goal
         if goal is not self._checked:
@@ -53,7 +53,7 @@ class Gripper:
         if goal is None or goal.outcome is not None:
             return command
 
-        # The fields of the result: position, effort, stalled, reached_goal.
+        # The result's fields: position, effort, stalled, reached_goal.
         if abs(command.position - position) < self.limits.goal_tolerance:
             goal.finish(Outcome(GoalEvent.SUCCEED, (position, effort, False, True)))
         elif abs(velocity) > self.limits.stall_velocity or time < self._moved:

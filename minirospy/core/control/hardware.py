@@ -1,7 +1,7 @@
-"""The hardware side of ros_control: joints, sensors, and the robot that reads and writes them.
+"""The hardware side of ros_control: joints, sensors, and the robot hardware that reads and writes them.
 
-A hardware driver is a subclass of :class:`RobotHardware`. Positions are in radians or metres, velocities in rad/s or m/s,
-efforts in N m or N. Source: http://wiki.ros.org/hardware_interface.
+Hardware drivers subclass :class:`RobotHardware`. Positions are in radians or metres, velocities in rad/s or m/s, efforts in N m
+or N. Source: http://wiki.ros.org/hardware_interface.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ __all__ = [
 
 
 class HardwareError(MinirospyError):
-    """Raised if the hardware lacks a joint, a sensor or an interface, or if it cannot be read or written."""
+    """Raised if the hardware lacks a joint, sensor or interface, or if reading or writing it fails."""
 
 
 class Interface(Enum):
-    """A hardware interface; the value is the name of ROS's C++ class, which services and messages contain."""
+    """A hardware interface; the value is the name of ROS's C++ class, as used in services and messages."""
 
     JOINT_STATE = "hardware_interface::JointStateInterface"
     POSITION = "hardware_interface::PositionJointInterface"
@@ -50,9 +50,10 @@ class Interface(Enum):
 
     @classmethod
     def parse(cls, text: str) -> Interface:
-        """Return the interface of a name in a URDF, such as ``hardware_interface/EffortJointInterface``.
+        """Return the interface that a URDF names, such as ``hardware_interface/EffortJointInterface``.
 
-        The package may be missing, and ``::`` may separate it. Raise HardwareError if there is no such interface.
+        The package name may be missing, and ``::`` may stand in place of ``/``. Raise HardwareError if the interface does not
+        exist.
         """
         name = text.strip().replace("/", "::").rpartition("::")[2]
         for interface in cls:
@@ -64,22 +65,23 @@ class Interface(Enum):
 COMMAND_INTERFACES = frozenset(
     {Interface.POSITION, Interface.VELOCITY, Interface.EFFORT, Interface.POS_VEL, Interface.POS_VEL_ACC}
 )
-"""Interfaces through which a controller commands joints. Only one running controller may claim a joint."""
+"""The interfaces that command joints. At most one running controller may claim a joint."""
 
 COMMAND_FIELDS = {
     Interface.POSITION: "position_command",
     Interface.VELOCITY: "velocity_command",
     Interface.EFFORT: "effort_command",
 }
-"""The attribute of a joint that holds the command of an interface, for interfaces whose command is one number."""
+"""The attribute of a joint that holds an interface's command, for interfaces whose command is a single number."""
 
 
 @dataclass(slots=True, eq=False)
 class Joint:
     """A joint: its state, which the hardware sets in ``read()``, and its commands, which a controller sets in ``update()``.
 
-    ``interfaces``: those through which it can be commanded. ``active``: the interface of the running controller that has
-    claimed it, or None; it tells ``write()`` which of the commands counts. The controller manager sets it when it switches.
+    ``interfaces``: the interfaces through which the joint can be commanded. ``active``: the interface of the running controller
+    that has claimed the joint, or None. The controller manager sets it when it switches controllers, and ``write()`` uses it to
+    select the command to send.
     """
 
     name: str
@@ -96,7 +98,7 @@ class Joint:
 
 @dataclass(slots=True, eq=False)
 class ImuSensor:
-    """An inertial sensor. Quaternions are x, y, z, w; a covariance has nine numbers, row by row; None is not measured."""
+    """An inertial sensor. Quaternions are (x, y, z, w); a covariance has nine numbers, row by row; None means not measured."""
 
     name: str
     frame_id: str
@@ -110,7 +112,7 @@ class ImuSensor:
 
 @dataclass(slots=True, eq=False)
 class ForceTorqueSensor:
-    """A sensor of the force (x, y, z in N) and torque (x, y, z in N m) in its frame."""
+    """A sensor that measures force (x, y, z in N) and torque (x, y, z in N m) in its frame."""
 
     name: str
     frame_id: str
@@ -126,7 +128,7 @@ class InterfaceResources(NamedTuple):
 
 
 class ControllerInfo(NamedTuple):
-    """A controller as the hardware sees it when controllers are switched."""
+    """The description of a controller that the hardware receives when controllers are switched."""
 
     name: str
     type: str
@@ -134,14 +136,14 @@ class ControllerInfo(NamedTuple):
 
 
 class Conflict(NamedTuple):
-    """A joint that several controllers claim."""
+    """A joint that more than one controller claims."""
 
     resource: str
     controllers: tuple[str, ...]
 
 
 class SwitchState(Enum):
-    """The progress of the hardware's change to other interfaces."""
+    """The progress of the hardware's switch to new interfaces."""
 
     DONE = "done"
     ONGOING = "ongoing"
@@ -149,7 +151,7 @@ class SwitchState(Enum):
 
 
 def find_conflicts(controllers: Iterable[ControllerInfo]) -> list[Conflict]:
-    """Return the joints, sorted by name, that more than one of the controllers claims, through whatever interface."""
+    """Return the joints, sorted by name, that more than one of the controllers claims, through any interface."""
     claims: dict[str, list[str]] = {}
     for controller in controllers:
         for _, resources in controller.claimed:
@@ -162,8 +164,8 @@ def find_conflicts(controllers: Iterable[ControllerInfo]) -> list[Conflict]:
 class RobotHardware:
     """A robot's hardware: its joints and sensors by name. A driver overrides :meth:`read` and :meth:`write`.
 
-    Each cycle of the loop calls ``read``, then the controllers, then ``write``. All methods run in the loop's thread, except
-    ``prepare_switch``, which runs in a service's thread.
+    In each cycle the loop calls ``read``, then updates the controllers, then calls ``write``. All methods run in the loop's
+    thread, except ``prepare_switch``, which runs in a service thread.
     """
 
     joints: dict[str, Joint] = field(default_factory=dict)
@@ -171,7 +173,7 @@ class RobotHardware:
     force_torque_sensors: dict[str, ForceTorqueSensor] = field(default_factory=dict)
 
     def add_joint(self, name: str, *interfaces: Interface, position: float = 0.0) -> Joint:
-        """Add a joint that can be commanded through ``interfaces``; return it. Raise HardwareError if the name is taken."""
+        """Add a joint to command through ``interfaces``; return it. Raise HardwareError if the name is already in use."""
         if name in self.joints:
             raise HardwareError(f"the hardware already has a joint '{name}'")
         if not math.isfinite(position):
@@ -181,20 +183,23 @@ class RobotHardware:
         return joint
 
     def read(self, time: Time, period: Duration) -> None:
-        """Set the state of joints and sensors. ``period``: ROS time since the last cycle."""
+        """Update the states of joints and sensors. ``period``: ROS time since the last cycle."""
 
     def write(self, time: Time, period: Duration) -> None:
         """Send the commands of the joints to the motors, and stop the joints whose ``active`` is None.
 
-        A position motor holds its position without a command. One that keeps its last velocity or effort must be sent that of
-        the joint, which is 0 then.
+        A position motor holds its position without a command. A motor that keeps its last velocity or effort must be sent the
+        joint's command, which is then 0.
         """
 
     def close(self) -> None:
-        """Close the device, after a last ``write`` in which no joint is active; both are called even if the hardware failed."""
+        """Close the device, after a last ``write`` in which no joint is active.
+
+        Both are called even if the hardware has failed.
+        """
 
     def find_conflicts(self, controllers: Sequence[ControllerInfo]) -> list[Conflict]:
-        """Return the joints that several of these controllers, which would run together, claim."""
+        """Return the joints that several of these controllers would claim if they ran together."""
         return find_conflicts(controllers)
 
     def prepare_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> bool:
@@ -202,10 +207,10 @@ class RobotHardware:
         return True
 
     def do_switch(self, start: Sequence[ControllerInfo], stop: Sequence[ControllerInfo]) -> None:
-        """Begin to change the joints' interfaces, before controllers are stopped and started."""
+        """Start to switch the joints' interfaces, before the controllers are stopped and started."""
 
     def switch_result(self, controller: ControllerInfo | None = None) -> SwitchState:
-        """Return the progress of the change: for one controller, or for all if it is None."""
+        """Return the progress of the switch for one controller, or for all controllers if the argument is None."""
         return SwitchState.DONE
 
     def resources(self) -> Mapping[Interface, Sequence[str]]:

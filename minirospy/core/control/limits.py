@@ -1,6 +1,6 @@
-"""Limits of joints: read from a robot description and from parameters, and applied to commands.
+"""Joint limits: read from a robot description and from parameters, and applied to commands.
 
-The loop applies them between the controllers' update and ``hardware.write``. Positions are in radians or metres, velocities in
+The loop applies them after updating the controllers, before ``hardware.write``. Positions are in radians or metres, velocities in
 rad/s or m/s, accelerations in rad/s^2 or m/s^2, efforts in N m or N.
 Source: the code of joint_limits_interface in the noetic release.
 """
@@ -22,7 +22,7 @@ __all__ = ["JointLimits", "LimitEnforcer", "SoftLimits", "read_limits"]
 
 
 class SoftLimits(NamedTuple):
-    """Positions that slow a joint down: its velocity is at most ``k_position`` times the distance to them."""
+    """Positions near which a joint slows down: its speed is at most ``k_position`` times its distance from them."""
 
     lower: float
     upper: float
@@ -32,7 +32,7 @@ class SoftLimits(NamedTuple):
 
 @dataclass(frozen=True)
 class JointLimits:
-    """The limits of a joint; infinite if there is none."""
+    """The limits of a joint; a missing limit is infinite."""
 
     lower: float = -inf
     upper: float = inf
@@ -43,7 +43,7 @@ class JointLimits:
 
 
 def read_limits(joint: UrdfJoint | None, parameters: Parameters, name: str) -> JointLimits:
-    """Return a joint's limits: those of the description, overridden by the parameters below ``joint_limits/NAME``.
+    """Return a joint's limits from the description, overridden by the parameters below ``joint_limits/NAME``.
 
     Raise ValueError if a limit is not finite, or if the lowest position is above the highest.
     """
@@ -94,7 +94,7 @@ def _of_description(joint: UrdfJoint) -> JointLimits:
 
 
 def _limit(parameters: Parameters, flag: str, key: str, given: float, none: float = inf) -> float:
-    """Return a parameter if its flag is true, ``none`` if the flag is false, and ``given`` if one of both is not set."""
+    """Return a parameter if its flag is true, ``none`` if the flag is false, ``given`` if either of the two is not set."""
     has = parameters.get(flag)
     if has is False:
         return none
@@ -102,13 +102,13 @@ def _limit(parameters: Parameters, flag: str, key: str, given: float, none: floa
 
 
 class LimitEnforcer:
-    """Keeps commands within limits. A command that is not finite is replaced: the joint holds, or gets no effort."""
+    """Keeps commands within limits. A command that is not finite is replaced: the joint holds its position, or gets no effort."""
 
     def __init__(self, joints: Iterable[Joint], limits: Mapping[str, JointLimits]) -> None:
         self._joints = [_Limiter(joint, limits.get(joint.name, JointLimits())) for joint in joints]
 
     def enforce(self, period: Duration) -> list[str]:
-        """Limit the commands of the joints that a controller commands; return the joints whose command was not finite."""
+        """Limit the commands of all joints that a controller commands; return the joints whose commands were not finite."""
         seconds = period.to_sec()
         invalid: list[str] = []
         for each in self._joints:
@@ -129,11 +129,11 @@ class _Limiter:
         self.joint = joint
         self.limits = limits
         self.active: Interface | None = None
-        self.previous = 0.0  # the last position or velocity that was commanded
+        self.previous = 0.0  # the last commanded position or velocity
         self.enforce: Callable[[float], bool] | None = None
 
     def reset(self, active: Interface | None) -> None:
-        """Begin with the joint's present position, because another interface, or no controller, commanded it before."""
+        """Restart from the joint's present position, because another interface, or no controller, has commanded it meanwhile."""
         self.active = active
         is_velocity = active is Interface.VELOCITY
         self.previous = 0.0 if is_velocity else self.joint.position
@@ -150,7 +150,7 @@ class _Limiter:
             lowest, highest = _soft_velocities(soft, previous, limits.velocity)
         command = min(max(command, limits.lower), limits.upper)
         if isfinite(highest):
-            # The velocity counts more than the position: a joint outside its limits comes back without a jump.
+            # The velocity limit takes precedence over the position limit: a joint outside its limits returns without a jump.
             command = min(max(command, previous + lowest * seconds), previous + highest * seconds)
         joint.position_command = self.previous = command
         return is_valid
@@ -216,7 +216,7 @@ _METHODS: dict[Interface, Callable[[_Limiter], Callable[[float], bool]]] = {
 
 
 def _soft_velocities(soft: SoftLimits, position: float, velocity: float) -> tuple[float, float]:
-    """Return the lowest and the highest velocity at a position."""
+    """Return the lowest and highest velocity that the soft limits allow at a position."""
     lowest = -soft.k_position * (position - soft.lower)
     highest = -soft.k_position * (position - soft.upper)
     return min(max(lowest, -velocity), velocity), min(max(highest, -velocity), velocity)

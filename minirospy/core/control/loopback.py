@@ -1,7 +1,7 @@
-"""Hardware without a robot: joints whose state follows their commands within the limits of the description.
+"""Simulated hardware without a robot: the joints follow their commands, within the limits of the robot description.
 
-A position command is reached before the next cycle, a velocity command is integrated, and an effort command accelerates a mass of
-1 kg (or 1 kg m^2) against a damping of 1 N s/m (or N m s/rad). A joint without a controller stands still.
+A position command is reached by the next cycle, a velocity command is integrated, and an effort command accelerates a mass of 1
+kg (or 1 kg m^2) against a damping of 1 N s/m (or N m s/rad). A joint that no controller commands stands still.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _MOVABLE = {JointType.REVOLUTE, JointType.CONTINUOUS, JointType.PRISMATIC}
 
 
 class LoopbackHardware(RobotHardware):
-    """The joints of a robot description.
+    """Simulated hardware with the joints of a robot description.
 
-    A mimic joint follows its joint. It can be commanded only if it has a transmission, and then does not follow.
+    A mimic joint follows its master joint. If it has a transmission, it can be commanded instead, and does not follow.
     """
 
     def __init__(
@@ -44,10 +44,10 @@ class LoopbackHardware(RobotHardware):
         initial: Mapping[str, float] | None = None,
         warn: Callable[[str], object] = lambda _: None,
     ) -> None:
-        """Create the joints that have a transmission, or all movable ones, with all interfaces, if there is no transmission.
+        """Create the joints that have a transmission; if none has one, create all movable joints, with all interfaces.
 
-        Call ``warn`` with a line for each transmission or initial position that is ignored. Raise HardwareError if
-        ``initial`` names a joint that the robot lacks, or has a value that is not finite.
+        Call ``warn`` with a line for each transmission or initial position that is ignored. Raise HardwareError if ``initial``
+        names a joint that the robot lacks, or contains a value that is not finite.
         """
         super().__init__()
         movable = movable_joints(robot)
@@ -70,7 +70,7 @@ class LoopbackHardware(RobotHardware):
             added = self.add_joint(name, *(interfaces.get(name) or COMMAND_INTERFACES), position=position)
             self._bounds.append((added, lower, upper))
         mimics = {name: joint.mimic for name, joint in movable.items() if joint.mimic}
-        # A joint that mimics another mimic joint comes after that one; joints that mimic each other do not follow.
+        # A joint that mimics another mimic joint comes after that joint. Joints that mimic each other do not follow.
         while ready := [
             name for name, each in mimics.items() if each.joint in self.joints and each.joint not in mimics
         ]:
@@ -87,7 +87,7 @@ class LoopbackHardware(RobotHardware):
         self._follow()
 
     def add_sensors(self, imus: Mapping[str, str], force_torque_sensors: Mapping[str, str]) -> None:
-        """Add sensors of a robot that stands still, each with its frame."""
+        """Add sensors that measure a robot at rest, each with its frame."""
         for name, frame in imus.items():
             self.imus[name] = ImuSensor(
                 name,
@@ -103,10 +103,10 @@ class LoopbackHardware(RobotHardware):
             self.force_torque_sensors[name] = ForceTorqueSensor(name, frame)
 
     def read(self, time: Time, period: Duration) -> None:
-        """Move the joints by their last commands.
+        """Move the joints according to their last commands.
 
-        A motor would have moved them during the period that has passed. The cycles of a loop last differently long, so
-        write() does not know it yet.
+        A motor would have moved them during the elapsed period. The length of a cycle varies, so write() does not know the period
+        yet.
         """
         seconds = period.to_sec()
         for joint, lower, upper in self._bounds:
@@ -119,7 +119,7 @@ class LoopbackHardware(RobotHardware):
                 position += joint.velocity_command * seconds
             elif kind is Interface.EFFORT:
                 joint.effort = joint.effort_command
-                # The exact solution over one cycle, which is stable for any period.
+                # The exact solution over one cycle is stable for any period.
                 settled = joint.effort_command / _DAMPING
                 decay = math.exp(-_DAMPING / _MASS * seconds)
                 position += settled * seconds + (joint.velocity - settled) * (1 - decay) * _MASS / _DAMPING
@@ -141,7 +141,7 @@ class LoopbackHardware(RobotHardware):
 
 
 def movable_joints(robot: Robot) -> dict[str, UrdfJoint]:
-    """Return the joints with one axis, by name."""
+    """Return the joints with a single axis, by name."""
     return {name: joint for name, joint in robot.joints.items() if joint.type in _MOVABLE}
 
 

@@ -1,4 +1,4 @@
-"""The table of a robot's controllers: loading, unloading and switching, with the decisions and texts of ROS.
+"""The table of a robot's controllers: loads, unloads and switches them, with the decisions and messages of ROS.
 
 Methods for services (:meth:`ControllerTable.load`, :meth:`ControllerTable.plan_switch`) run in one thread at a time;
 :meth:`ControllerTable.update` runs in the loop's thread. Data passes between the two by the assignment of one attribute.
@@ -37,48 +37,48 @@ __all__ = ["BEST_EFFORT", "STRICT", "ControllerTable", "Loaded", "Switch", "desc
 
 BEST_EFFORT, STRICT = 1, 2  # as in controller_manager_msgs/SwitchController
 
-_LIBRARY = (os.path.dirname(os.__file__), "<frozen ")  # the beginnings of the standard library's file names
+_LIBRARY = (os.path.dirname(os.__file__), "<frozen ")  # prefixes of the standard library's file names
 _MINIROSPY = str(Path(__file__).parents[2])
 
-_RAISED = (Exception, SystemExit)  # by the user's code, which may call sys.exit
+_RAISED = (Exception, SystemExit)  # exceptions from the user's code, which may call sys.exit
 
 Log = Callable[[int, str], object]
-"""Called with a level of rosgraph_msgs/Log, and a line."""
+"""Called with a rosgraph_msgs/Log level and a line of text."""
 
 
 @dataclass(slots=True, eq=False)
 class Loaded:
-    """A loaded controller, with its state."""
+    """A loaded controller and its state."""
 
     info: ControllerInfo
     controller: Controller
     joints: tuple[tuple[Joint, Interface], ...]
-    """The joints that the controller commands while it runs."""
+    """The joints that the controller commands while it is running."""
     state: ControllerState = ControllerState.INITIALIZED
 
     @property
     def is_running(self) -> bool:
-        """Return whether the loop updates the controller."""
+        """Return whether the loop currently updates the controller."""
         return self.state is ControllerState.RUNNING
 
 
 @dataclass(slots=True, eq=False)
 class Switch:
-    """A change of the running controllers, which the loop performs. Times are in seconds."""
+    """A requested change of the running controllers, which the loop performs. Times are in seconds."""
 
     start: Sequence[Loaded]
     stop: Sequence[Loaded]
-    hardware_start: Sequence[ControllerInfo]  # those that do not run yet
-    hardware_stop: Sequence[ControllerInfo]  # those that run
+    hardware_start: Sequence[ControllerInfo]  # controllers to start that are not running yet
+    hardware_stop: Sequence[ControllerInfo]  # controllers to stop that are running
     start_asap: bool
-    timeout: float  # 0 or less: wait for the hardware without limit
+    timeout: float  # maximum wait for the hardware; 0 or less: no limit
     requested: Time
-    is_begun: bool = False  # set when the hardware has been told
+    is_begun: bool = False  # set once the hardware has been asked to switch
     on_done: Callable[[], object] = lambda: None
 
 
 class ControllerTable:
-    """The loaded controllers of one robot, in the order of loading."""
+    """The loaded controllers of one robot, in loading order."""
 
     def __init__(self, hardware: RobotHardware, log: Log) -> None:
         self._hardware = hardware
@@ -93,7 +93,7 @@ class ControllerTable:
     def load(
         self, name: str, kind: str, create: Callable[[], Controller], context: ControllerContext
     ) -> Loaded | None:
-        """Create a controller, initialize and add it. Log the reason and return None if that fails."""
+        """Create, initialize and add a controller. On failure, log the reason and return None."""
         resources = Resources(self._hardware)
         controller: Controller | None = None
         try:
@@ -120,7 +120,7 @@ class ControllerTable:
         return None
 
     def unload(self, name: str) -> Loaded | None:
-        """Remove a controller and return it; the caller closes it. Log the reason and return None if that fails."""
+        """Remove a controller and return it; the caller closes it. On failure, log the reason and return None."""
         found = self.find(name)
         if found is None or found.is_running:
             why = "it is still running" if found else "no controller with this name exists"
@@ -130,7 +130,7 @@ class ControllerTable:
         return found
 
     def close(self, loaded: Loaded) -> None:
-        """Close the topics of a controller that was unloaded, once the loop no longer updates it."""
+        """Close the topics of an unloaded controller, once the loop no longer updates it."""
         self._close(loaded.controller, loaded.info.name)
 
     def plan_switch(
@@ -142,7 +142,7 @@ class ControllerTable:
         timeout: float = 0.0,
         now: Time | None = None,
     ) -> Switch | None:
-        """Return the change for :meth:`begin`. Log the reason and return None if it is refused."""
+        """Return the change to pass to :meth:`begin`. If it is refused, log the reason and return None."""
         if strictness == 0:
             self._log(
                 WARN,
@@ -202,11 +202,11 @@ class ControllerTable:
         return Switch(to_start, to_stop, starting, stopping, start_asap, timeout, now or Time())
 
     def begin(self, switch: Switch) -> None:
-        """Let the next update perform a change."""
+        """Schedule a change for the next update."""
         self._switch = switch
 
     def withdraw(self) -> Switch | None:
-        """Forget the change that the loop has not finished, and return it, or None."""
+        """Cancel and return the change that the loop has not finished yet; return None if there is none."""
         switch, self._switch = self._switch, None
         return switch
 
@@ -231,7 +231,7 @@ class ControllerTable:
             switch.on_done()
 
     def stop_all(self, time: Time) -> None:
-        """Stop the running controllers and release their joints, the last one loaded first."""
+        """Stop the running controllers, last loaded first, and release their joints."""
         for each in reversed(self.loaded):
             if each.is_running:
                 self._stop(each, time)
@@ -255,7 +255,7 @@ class ControllerTable:
             self._log(ERROR, f"Controller '{name}' raised in close: {describe_error(error)}")
 
     def _named(self, names: Iterable[str], is_strict: bool, verb: str) -> list[Loaded] | None:
-        """Return the controllers with these names, without unknown ones, or None if there is an unknown one and it is strict."""
+        """Return the controllers with these names. Skip unknown names, or return None for one if ``is_strict``."""
         found = []
         for name in names:
             if each := self.find(name):
@@ -267,7 +267,7 @@ class ControllerTable:
         return found
 
     def _advance(self, switch: Switch, time: Time) -> bool:
-        """Stop and start the controllers of a change, as far as the hardware is ready; return whether it is finished."""
+        """Stop and start a change's controllers, as far as the hardware is ready; return whether the change is complete."""
         if not switch.is_begun:
             self._hardware.do_switch(switch.hardware_start, switch.hardware_stop)
             switch.is_begun = True
@@ -302,7 +302,7 @@ class ControllerTable:
             if joint.active is not None:
                 continue
             if math.isfinite(joint.position):
-                joint.position_command = joint.position  # a command from before must not move the joint
+                joint.position_command = joint.position  # an old command must not move the joint
             elif interface not in (Interface.VELOCITY, Interface.EFFORT):
                 each.state = ControllerState.STOPPED
                 self._log(
@@ -319,7 +319,7 @@ class ControllerTable:
         _release(each)
 
     def _call(self, each: Loaded, method: str, state: ControllerState, time: Time) -> bool:
-        """Call a method of a controller and set its state; if it raises, stop the controller and return False."""
+        """Call a controller's method and set the controller's state. If it raises, stop the controller and return False."""
         try:
             getattr(each.controller, method)(time)
         except _RAISED as error:
@@ -329,7 +329,7 @@ class ControllerTable:
         return True
 
     def _fail(self, each: Loaded, method: str, time: Time, error: BaseException) -> None:
-        """Stop a controller that raised; its joints are released, the others go on."""
+        """Stop a controller that raised an exception, and release its joints. The other controllers keep running."""
         was_running, each.state = each.is_running, ControllerState.STOPPED
         self._log(ERROR, f"Controller '{each.info.name}' is stopped: {method} raised {describe_error(error)}")
         if was_running and method != "stopping":
@@ -338,14 +338,14 @@ class ControllerTable:
 
 
 def describe_error(error: BaseException) -> str:
-    """Return an exception as one line, with the file and the line of code that raised it."""
+    """Return an exception as one line, with the file and line number of the code that raised it."""
     text = " ".join(str(error).split())
     shown = f"{type(error).__name__}: {text}" if text else type(error).__name__
     return f"{shown} ({place})" if (place := _place(error.__traceback__)) else shown
 
 
 def _place(trace: TracebackType | None) -> str:
-    """Return ``file:line`` of the innermost code of the user, else of minirospy's innermost code."""
+    """Return ``file:line`` of the innermost frame in the user's code, or else in minirospy."""
     frames = []
     while trace:
         file = trace.tb_frame.f_code.co_filename
@@ -357,7 +357,7 @@ def _place(trace: TracebackType | None) -> str:
 
 
 def _missing_interface(controller: Controller, resources: Resources) -> str:
-    """Return the error if the robot lacks an interface that the controller needs, else an empty string."""
+    """Return an error text if the robot lacks an interface that the controller needs, else an empty string."""
     try:
         for interface in controller.interfaces:
             resources.names(interface)
@@ -367,7 +367,7 @@ def _missing_interface(controller: Controller, resources: Resources) -> str:
 
 
 def _release(each: Loaded) -> None:
-    """Take a controller's joints from it. Velocities and efforts become zero, positions stay."""
+    """Release a controller's joints: set velocity and effort commands to zero, and keep position commands."""
     for joint, _ in each.joints:
         joint.active = None
         joint.velocity_command = joint.acceleration_command = joint.effort_command = 0.0

@@ -1,4 +1,4 @@
-"""Odometry of wheeled bases: a pose from the angles of wheels. Source: http://wiki.ros.org/diff_drive_controller.
+"""Odometry of wheeled bases: computes a pose from wheel angles. Source: http://wiki.ros.org/diff_drive_controller.
 
 Times are in nanoseconds (int), lengths in metres, angles in radians.
 """
@@ -10,12 +10,12 @@ from collections import deque
 
 __all__ = ["AckermannOdometry", "DiffDriveOdometry", "Odometry"]
 
-MIN_STEP = 100_000  # ns: no velocity can be measured in a shorter time
-STRAIGHT = 1e-6  # rad: the motion of a cycle that turns less is a line
+MIN_STEP = 100_000  # ns; over a shorter time no velocity can be measured
+STRAIGHT = 1e-6  # rad; a motion that turns by less in one cycle counts as a straight line
 
 
 class Odometry:
-    """The pose (x, y, heading) since the start, and the mean velocity of the last ``window`` cycles."""
+    """The pose (x, y, heading) relative to the start, and the mean velocity of the last ``window`` cycles."""
 
     def __init__(self, window: int) -> None:
         self.x = 0.0
@@ -27,12 +27,12 @@ class Odometry:
         self._speeds: deque[tuple[float, float]] = deque(maxlen=max(window, 1))
 
     def start(self, time: int) -> None:
-        """Forget the measured velocities. The pose stays."""
+        """Discard the measured velocities, and keep the pose."""
         self._speeds.clear()
         self._time = time
 
     def move(self, distance: float, turn: float, time: int) -> None:
-        """Add the motion of a cycle along an arc, which ends at ``time``."""
+        """Add one cycle's motion along an arc; the cycle ended at ``time``."""
         self._integrate(distance, turn)
         step = time - self._time
         if step < MIN_STEP:
@@ -46,7 +46,7 @@ class Odometry:
         self.angular = sum(angular for _, angular in speeds) / len(speeds)
 
     def move_open_loop(self, linear: float, angular: float, time: int) -> None:
-        """Add the motion of a cycle at the commanded velocities."""
+        """Add one cycle's motion at the commanded velocities."""
         seconds = max(time - self._time, 0) * 1e-9
         self._time = time
         self.linear = linear
@@ -54,7 +54,7 @@ class Odometry:
         self._integrate(linear * seconds, angular * seconds)
 
     def _integrate(self, distance: float, turn: float) -> None:
-        """Move the pose along an arc, exactly."""
+        """Move the pose along an arc, by exact integration."""
         heading = self.heading
         self.heading = heading + turn
         if abs(turn) < STRAIGHT:
@@ -71,7 +71,7 @@ class DiffDriveOdometry(Odometry):
 
     def __init__(self, window: int) -> None:
         super().__init__(window)
-        self._left = 0.0  # m, travelled by the wheel
+        self._left = 0.0  # m travelled by the left wheel
         self._right = 0.0
 
     def update(
@@ -84,7 +84,7 @@ class DiffDriveOdometry(Odometry):
         right_radius: float,
         time: int,
     ) -> None:
-        """Add the motion since the last angles of the wheels."""
+        """Add the wheels' motion since the last update, from their angles."""
         left_before, self._left = self._left, left * left_radius
         right_before, self._right = self._right, right * right_radius
         left_travel = self._left - left_before
@@ -93,14 +93,14 @@ class DiffDriveOdometry(Odometry):
 
 
 class AckermannOdometry(Odometry):
-    """Odometry of a base with a driven rear wheel and a steered front wheel, in the middle of each axle."""
+    """Odometry of a base with a driven rear wheel and a steered front wheel, each at the centre of its axle."""
 
     def __init__(self, window: int) -> None:
         super().__init__(window)
-        self._travelled = 0.0  # m
+        self._travelled = 0.0  # m travelled by the rear wheel
 
     def update(self, wheel: float, steering: float, *, wheelbase: float, radius: float, time: int) -> None:
-        """Add the motion since the last angle of the wheel, along the arc of the steering angle."""
+        """Add the wheel's motion since the last update, along the arc of the steering angle."""
         before, self._travelled = self._travelled, wheel * radius
         travel = self._travelled - before
         self.move(travel, math.tan(steering) * travel / wheelbase, time)

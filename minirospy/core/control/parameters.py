@@ -1,4 +1,4 @@
-"""A controller's parameters, read like roscpp's ``getParam``: a value of another type counts as not set."""
+"""A controller's parameters. As in roscpp's ``getParam``, a value of the wrong type counts as not set."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _T = TypeVar("_T")
 
 
 class Parameters:
-    """The parameters below a namespace, as they were when the controller was loaded. Keys may contain ``/``."""
+    """A snapshot of the parameters below a namespace, taken when the controller was loaded. Keys may contain ``/``."""
 
     def __init__(self, namespace: str, values: Mapping[str, object]) -> None:
         self.namespace = namespace
@@ -32,12 +32,12 @@ class Parameters:
         return isinstance(self.get(key), (int, float)) and not isinstance(self.get(key), bool)
 
     def number(self, key: str, default: float) -> float:
-        """Return an int or a float as a float, or the default. Callers that cannot handle NaN must check for it."""
+        """Return an int or float parameter as a float, or the default. The result may be NaN."""
         value = self.get(key)
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
 
     def finite(self, key: str, default: float) -> float:
-        """Return a number, or the default. Raise ValueError if it is infinite or not a number."""
+        """Return a number, or the default. Raise ValueError if the number is infinite or NaN."""
         value = self.number(key, default)
         if not math.isfinite(value):
             raise ValueError(f"parameter {self.namespace}/{key} is {value}: it must be a finite number")
@@ -57,21 +57,21 @@ class Parameters:
         return self._typed(key, str, default)
 
     def names(self, key: str) -> list[str] | None:
-        """Return a list of str, or None if the value is something else."""
+        """Return a list of str, or None if the value is not such a list."""
         value = self.get(key)
         if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
             return None
         return list(value)
 
     def numbers(self, key: str) -> list[float] | None:
-        """Return a list of ints and floats as floats, or None if the value is something else."""
+        """Return a list of numbers as floats, or None if the value is not such a list."""
         value = self.get(key)
         if not isinstance(value, list) or not all(type(each) in (int, float) for each in value):
             return None
         return list(map(float, value))
 
     def below(self, key: str) -> Parameters:
-        """Return the parameters of a namespace below this one; it has none if it is not set."""
+        """Return the parameters below a sub-namespace; empty if it is not set."""
         value = self.get(key)
         return Parameters(f"{self.namespace}/{key}", value if isinstance(value, Mapping) else {})
 

@@ -13,10 +13,11 @@ __all__ = ["Pid", "PidGains", "PidTerms"]
 
 
 class PidGains(NamedTuple):
-    """The gains, and the limits of the integral term.
+    """PID gains, and the limits of the integral term.
 
-    Without ``antiwindup``, the error's integral grows without limit, and only its term in the command is clamped to ``i_min``
-    and ``i_max``. With ``antiwindup``, the integral is clamped: the term shrinks as soon as the error changes its sign.
+    Without ``antiwindup``, the integral of the error is unlimited, and only its contribution to the command is clamped to
+    ``i_min`` and ``i_max``. With ``antiwindup``, the integral itself is clamped, so the contribution shrinks as soon as the error
+    changes sign.
     """
 
     p: float = 0.0
@@ -28,7 +29,7 @@ class PidGains(NamedTuple):
 
     @classmethod
     def read(cls, parameters: Parameters) -> PidGains:
-        """Return the gains of a namespace. Raise ControllerError if ``p`` is missing, ValueError if a number is not finite."""
+        """Return the gains in a namespace. Raise ControllerError if ``p`` is missing, ValueError if a number is not finite."""
         if not parameters.has_number("p"):
             raise ControllerError(f"No p gain specified for pid.  Namespace: {parameters.namespace}")
         i_clamp = abs(parameters.finite("i_clamp", 0.0))
@@ -43,7 +44,7 @@ class PidGains(NamedTuple):
 
 
 class PidTerms(NamedTuple):
-    """The terms of a command, and the seconds since the last one."""
+    """The terms of a command, and the seconds since the previous command."""
 
     dt: float
     p: float
@@ -52,7 +53,7 @@ class PidTerms(NamedTuple):
 
 
 class Pid:
-    """A PID controller. Set ``gains`` at any time, from any thread; only one thread may call ``compute`` and ``reset``."""
+    """A PID controller. ``gains`` may be set at any time from any thread; only one thread may call ``compute`` and ``reset``."""
 
     def __init__(
         self,
@@ -68,18 +69,18 @@ class Pid:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all errors. As in ROS, the derivative of the next error is computed from an error of 0."""
-        self.error = 0.0  # target - state, of the last call
-        self.error_integral = 0.0  # times seconds
-        self.error_rate = 0.0  # per second
-        self.command = 0.0  # of the last call whose arguments were valid
+        """Discard all errors. As in ROS, the next derivative is computed as if the previous error were 0."""
+        self.error = 0.0  # target - state in the last call
+        self.error_integral = 0.0  # error times seconds
+        self.error_rate = 0.0  # error per second
+        self.command = 0.0  # result of the last call with valid arguments
         self._last_error = 0.0
 
     def compute(self, error: float, error_rate: float | None, dt: float) -> float:
-        """Return the command for an error (target - state) that lasts ``dt`` seconds.
+        """Return the command for an error (target - state) that has lasted ``dt`` seconds.
 
-        ``error_rate``: the error's derivative; None computes it from the last error. If ``dt`` is 0, or a number is not finite,
-        return 0 and leave the integral unchanged.
+        ``error_rate``: the derivative of the error; if None, it is computed from the previous error. If ``dt`` is 0 or a number
+        is not finite, return 0 and leave the integral unchanged.
         """
         if dt == 0.0 or not math.isfinite(error) or not math.isfinite(dt):
             return 0.0

@@ -1,4 +1,4 @@
-"""A joint driven to a position by a PID controller, whose output is the joint's velocity or effort.
+"""Drives a joint to a position: a PID controller computes the joint's velocity or effort.
 
 Source: http://wiki.ros.org/effort_controllers.
 """
@@ -18,8 +18,8 @@ __all__ = ["PositionLoop"]
 class PositionLoop:
     """A joint with its limits and its PID controller.
 
-    Targets are cut to the limits of a revolute or prismatic joint. A joint that turns goes the shorter way, and a revolute
-    one the longer way if the shorter one leaves its limits.
+    Targets are clamped to the limits of a revolute or prismatic joint. A rotating joint takes the shorter way; a revolute joint
+    takes the longer way if the shorter one would leave its limits.
     """
 
     def __init__(self, joint: Joint, described: UrdfJoint, pid: Pid) -> None:
@@ -35,7 +35,7 @@ class PositionLoop:
         return min(max(position, self._lower), self._upper)
 
     def error(self, target: float) -> float:
-        """Return the way to a target that is within the limits. It is not finite if one of them is not."""
+        """Return the signed distance to a target within the limits. The result is not finite if an argument is not finite."""
         position = self.joint.position
         way = target - position
         if not self._turns or not math.isfinite(way):

@@ -1,4 +1,4 @@
-"""The rate at which a controller publishes, which is at most the rate of its loop."""
+"""The rate at which a controller publishes; it cannot exceed the rate of the loop."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from minirospy.core.control.parameters import Parameters
 __all__ = ["PublishRate", "nanoseconds"]
 
 MAX_BEHIND = (
-    1_000_000_000  # ns: after a longer gap, publish from now on, instead of in each cycle until caught up
+    1_000_000_000  # ns; after a longer gap, restart from now instead of publishing in each cycle to catch up
 )
 
 
 def nanoseconds(time: Time) -> int:
-    """Return a time as an int, which is faster to compute with, and exact."""
+    """Return a time as an int of nanoseconds, which is exact and faster to compute with."""
     return time.secs * 1_000_000_000 + time.nsecs
 
 
 class PublishRate:
-    """Decides in which cycles a controller publishes. The rate holds in ROS time; 0 and less is never."""
+    """Decides in which cycles a controller publishes. The rate refers to ROS time; 0 or less means never."""
 
     def __init__(self, hertz: float) -> None:
         self.set(hertz)
-        self._last: int | None = None  # ns: the time of the last message by the rate
+        self._last: int | None = None  # ns; the scheduled time of the last message
 
     @classmethod
     def read(cls, parameters: Parameters) -> PublishRate:
-        """Return the rate of the parameter ``publish_rate``. Raise ControllerError if it is not set."""
+        """Return the rate from the parameter ``publish_rate``. Raise ControllerError if it is not set."""
         if not parameters.has_number("publish_rate"):
             raise ControllerError("Parameter 'publish_rate' not set")
         return cls(parameters.finite("publish_rate", 0.0))
@@ -37,11 +37,11 @@ class PublishRate:
         self._period = round(1e9 / hertz) if hertz > 0.0 else None
 
     def start(self, time: Time, *, is_due: bool = False) -> None:
-        """Start to count: the first message is due after a period or, if ``is_due``, in the next cycle."""
+        """Restart the schedule: the first message is due after one period, or in the next cycle if ``is_due``."""
         self._last = nanoseconds(time) - (self._period or 0) * is_due
 
     def is_due(self, time: Time) -> bool:
-        """Return whether to publish in this cycle. If the time has gone backwards, count from it."""
+        """Return whether to publish in this cycle. If time has jumped back, restart the schedule from there."""
         period = self._period  # another thread may change it
         if period is None:
             return False

@@ -1,4 +1,4 @@
-"""Limits of a velocity, its acceleration and its jerk. Source: http://wiki.ros.org/diff_drive_controller."""
+"""Limits on velocity, acceleration and jerk. Source: http://wiki.ros.org/diff_drive_controller."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ __all__ = ["Range", "SpeedLimiter"]
 
 @dataclass(frozen=True)
 class Range:
-    """The least and the greatest value."""
+    """A minimum and a maximum value."""
 
     low: float
     high: float
 
     def clamp(self, value: float, factor: float = 1.0) -> float:
-        """Return the nearest value in the range times ``factor``."""
+        """Return the nearest value within the range multiplied by ``factor``."""
         return min(max(self.low * factor, value), self.high * factor)
 
 
 @dataclass(frozen=True)
 class SpeedLimiter:
-    """Limits in m or rad, s; None is unlimited."""
+    """Limits in m or rad, and s; None means unlimited."""
 
     velocity: Range | None = None
     acceleration: Range | None = None
@@ -31,7 +31,7 @@ class SpeedLimiter:
 
     @classmethod
     def read(cls, parameters: Parameters) -> SpeedLimiter:
-        """Return the limits of a namespace such as ``linear/x``. Raise ValueError if a limit is not finite."""
+        """Return the limits in a namespace such as ``linear/x``. Raise ValueError if a limit is not finite."""
 
         def read_range(name: str) -> Range | None:
             high = parameters.finite(f"max_{name}", 0.0)
@@ -41,10 +41,10 @@ class SpeedLimiter:
         return cls(read_range("velocity"), read_range("acceleration"), read_range("jerk"))
 
     def limit(self, velocity: float, last: float, before_last: float, dt: float) -> float:
-        """Return the velocity that is nearest to the wanted one, ``dt`` seconds after the last one.
+        """Return the allowed velocity that is nearest to the requested one, ``dt`` seconds after the previous one.
 
-        As in ROS, the jerk of one cycle is limited to twice its limit, and the limits of acceleration and velocity are
-        applied after it.
+        As in ROS, the jerk in one cycle may reach twice its limit, and the acceleration and velocity limits are applied
+        afterwards.
         """
         dt = max(dt, 0.0)
         if self.jerk is not None:

@@ -1,4 +1,4 @@
-"""Deadlines of a loop with a fixed rate, and statistics about its cycles. All times are in nanoseconds."""
+"""Deadlines of a fixed-rate loop, and statistics about its cycles. All times are in nanoseconds."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import NamedTuple
 
 __all__ = ["MAX_CYCLES", "CycleTimes", "Spread", "spread"]
 
-MAX_CYCLES = 100_000  # cycles kept until they are taken; some minutes, in case nothing takes them
+MAX_CYCLES = 100_000  # number of cycles that are kept until they are read: some minutes
 
 
 class Spread(NamedTuple):
     """The distribution of some durations."""
 
     mean: float
-    p99: int  # 99 of 100 are not longer
+    p99: int  # the 99th percentile
     longest: int
 
 
 class CycleTimes:
-    """Measures the cycles of a loop: the loop's thread calls :meth:`add`, another one :meth:`take`."""
+    """Measures the cycles of a loop. The loop's thread calls :meth:`add`, and another thread calls :meth:`take`."""
 
     def __init__(self, period: int) -> None:
         self.period = period
@@ -29,7 +29,7 @@ class CycleTimes:
         self._busy: list[int] = []
 
     def add(self, late: int, busy: int, is_overrun: bool) -> None:
-        """Record a cycle that began ``late`` after its deadline, and took ``busy``. ``is_overrun``: it missed the next one."""
+        """Record a cycle that started ``late`` after its deadline and lasted ``busy``. ``is_overrun``: it missed the next one."""
         self.cycles += 1
         self.overruns += is_overrun
         if len(self._late) < MAX_CYCLES:
@@ -37,7 +37,7 @@ class CycleTimes:
             self._busy.append(busy)
 
     def take(self) -> tuple[Sequence[int], Sequence[int]]:
-        """Return the delays and the durations of the cycles since the last call."""
+        """Return the delays and durations of the cycles since the last call."""
         late, self._late = self._late, []
         busy, self._busy = self._busy, []
         return late, busy

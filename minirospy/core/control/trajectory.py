@@ -1,7 +1,7 @@
-"""Trajectories of joints: segments, the sequence of segments that one joint follows, and points received in a message.
+"""Joint trajectories: segments, the sequence of segments that one joint follows, and the points received in a message.
 
-All times are nanoseconds; those of segments are counted from the start of the controller. Positions are in radians or metres,
-velocities and accelerations per second. Source: http://wiki.ros.org/joint_trajectory_controller.
+All times are in nanoseconds; segment times count from the start of the controller. Positions are in radians or metres, velocities
+and accelerations per second. Source: http://wiki.ros.org/joint_trajectory_controller.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ __all__ = [
     "wraparound_offset",
 ]
 
-NEVER = 1 << 100  # ns, after all uptimes, also if ROS time often jumps ahead
+NEVER = 1 << 100  # ns; later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
-MAX_MAGNITUDE = 1e100  # of positions and derivatives; no coefficient of a segment overflows below it
-_SINGULARITY = 1e-9  # rad; the direction of a half turn is chosen by the positions, not by rounding
+MAX_MAGNITUDE = 1e100  # maximum position or derivative; up to it, no segment coefficient overflows
+_SINGULARITY = 1e-9  # rad; this close to a half turn, the positions decide the direction, not rounding
 
 
 class ErrorCode(IntEnum):
-    """The numbers of FollowJointTrajectoryResult.error_code."""
+    """The values of FollowJointTrajectoryResult.error_code."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -52,7 +52,7 @@ class ErrorCode(IntEnum):
 
 
 class TrajectoryError(MinirospyError):
-    """Raised if a trajectory is rejected; the text is ROS's, if ROS rejects it, too."""
+    """Raised if a trajectory is rejected. The text is ROS's, if ROS also rejects it."""
 
 
 class PastTrajectoryError(TrajectoryError):
@@ -60,7 +60,7 @@ class PastTrajectoryError(TrajectoryError):
 
 
 class State(NamedTuple):
-    """A joint's state at one end of a segment; None is a derivative that is not specified."""
+    """A joint's state at one end of a segment. A derivative that is not specified is None."""
 
     position: float
     velocity: float | None = 0.0
@@ -68,25 +68,25 @@ class State(NamedTuple):
 
 
 class JointTolerances(NamedTuple):
-    """How far one joint may be off while it moves, and at its goal. A tolerance is checked if it is above 0."""
+    """The maximum errors of one joint during the motion and at its goal. Only tolerances above 0 are checked."""
 
     path_position: float = 0.0
     path_velocity: float = 0.0
     goal_position: float = 0.0
     goal_velocity: float = 0.0
-    goal_time: int = 0  # ns after the end, in which the joint may still reach its goal
+    goal_time: int = 0  # ns after the end of the trajectory within which the joint may still reach its goal
 
 
-UNCHECKED = JointTolerances()  # while a joint stops, or moves without a goal
+UNCHECKED = JointTolerances()  # for a joint that stops, or moves without a goal
 
 
 class Segment:
     """The motion of one joint between two times.
 
-    It is a line, a cubic or a quintic polynomial: of the highest degree for which both ends have the derivatives. It meets the
-    derivatives of both ends exactly, and so it may leave the range of the two positions, except for a line. After the end the
-    joint holds the last position; as in ROS, a segment without duration holds the first one. Raise TrajectoryError if it ends
-    before it starts.
+    The position is a linear, cubic or quintic polynomial: the highest degree for which both ends specify the derivatives. The
+    polynomial matches the derivatives at both ends exactly; unless it is linear, it may therefore leave the range between the two
+    positions. After the end, the joint holds the last position; as in ROS, a segment of zero duration holds the first one. Raise
+    TrajectoryError if the end comes before the start.
     """
 
     __slots__ = ("coefficients", "duration", "end", "goal", "last", "start", "time_from_start", "tolerances")
@@ -113,7 +113,7 @@ class Segment:
         self.coefficients = _coefficients(first, last, self.duration / _SECOND)
 
     def sample(self, time: int) -> tuple[float, float, float]:
-        """Return the position, velocity and acceleration. Outside the segment the joint holds the position of the nearer end."""
+        """Return position, velocity and acceleration. Outside the segment, the joint holds the position of the nearer end."""
         elapsed = time - self.start
         if elapsed > self.duration:
             return self.last, 0.0, 0.0
@@ -129,7 +129,7 @@ class Segment:
 
 
 def _coefficients(first: State, last: State, t: float) -> tuple[float, ...]:
-    """Return the polynomial's coefficients, from the constant up, then those of its derivatives that differ from them."""
+    """Return the polynomial's coefficients, lowest degree first, then those of its derivatives that are not among them."""
     p0, v0, a0 = first
     p1, v1, a1 = last
     distance = p1 - p0
@@ -156,7 +156,7 @@ def _coefficients(first: State, last: State, t: float) -> tuple[float, ...]:
 
 
 class Point(NamedTuple):
-    """A point of a trajectory message: for each of its joints in its order. Empty derivatives are not specified."""
+    """A point of a trajectory message, with values in the order of the message's joints. An empty derivative is not specified."""
 
     time: int  # ns from the start of the message's trajectory
     positions: Sequence[float]
@@ -164,7 +164,7 @@ class Point(NamedTuple):
     accelerations: Sequence[float] = ()
 
     def state(self, column: int, offset: float) -> State:
-        """Return the state of the message's joint number ``column``, its position moved by ``offset``."""
+        """Return the state of the message's joint ``column``, with ``offset`` added to the position."""
         return State(
             self.positions[column] + offset,
             self.velocities[column] if self.velocities else None,
@@ -174,23 +174,23 @@ class Point(NamedTuple):
 
 @dataclass(frozen=True)
 class Points:
-    """The valid points of a message. Those before ``first`` were in the past when it arrived."""
+    """A message's valid points. The points before ``first`` were in the past when the message arrived."""
 
     points: Sequence[Point]
     times: Sequence[int]
     first: int
-    stamp: int  # ns of ROS time at which it starts; 0: in the next cycle
+    stamp: int  # ns of ROS time at which the trajectory starts; 0: in the next cycle
     warning: str = ""
 
     def next_after(self, elapsed: int) -> int:
-        """Return the index of the first point later than this, but not after the last point."""
+        """Return the index of the first point after this time, or of the last point if there is none."""
         return min(bisect_right(self.times, elapsed), len(self.times) - 1)
 
 
 def parse_points(names: Sequence[str], points: Sequence[Point], stamp: int, now: int) -> Points:
-    """Check a message's points, of which those before ``now``, in ROS time, are dropped.
+    """Check a message's points, and drop those before ``now`` (ROS time).
 
-    Raise TrajectoryError if none is left, if their times do not increase strictly, or if their values do not fit.
+    Raise TrajectoryError if no points remain, if their times are not strictly increasing, or if their values are invalid.
     """
     times = [point.time for point in points]
     if any(later <= earlier for earlier, later in pairwise(times)):
@@ -223,7 +223,7 @@ def parse_points(names: Sequence[str], points: Sequence[Point], stamp: int, now:
 
 
 def _check_sizes(names: Sequence[str], points: Sequence[Point], index: int, is_first: bool) -> None:
-    """Raise TrajectoryError, with ROS's texts, if the numbers of values and of joints differ."""
+    """Raise TrajectoryError, with ROS's text, if the number of values does not match the number of joints."""
     _, positions, velocities, accelerations = points[index]
     count = len(positions)
     if (velocities and len(velocities) != count) or (accelerations and len(accelerations) != count):
@@ -245,7 +245,7 @@ def _check_sizes(names: Sequence[str], points: Sequence[Point], index: int, is_f
 
 
 def _check_values(names: Sequence[str], point: Point, index: int) -> None:
-    """Raise TrajectoryError if a value is not a finite number, or if it is absurdly large."""
+    """Raise TrajectoryError if a value is not finite, or is absurdly large."""
     for kind, values in (
         ("position", point.positions),
         ("velocity", point.velocities),
@@ -265,21 +265,21 @@ def _check_values(names: Sequence[str], point: Point, index: int) -> None:
 
 
 class Tail(NamedTuple):
-    """The part of a joint's path between the points of a message."""
+    """The part of a joint's path that runs between the points of a message."""
 
     points: Points
-    column: int  # the joint's place in the message
-    first: int  # the point at which it starts
-    start: int  # ns, at which the message's trajectory starts
-    offset: float  # rad added to the positions: whole turns
+    column: int  # the joint's index in the message
+    first: int  # the index of the first point
+    start: int  # ns; the time at which the message's trajectory starts
+    offset: float  # rad added to the positions: a number of whole turns
     tolerances: JointTolerances
 
 
 class JointPath:
-    """The segments that one joint follows; at the end it holds the last position.
+    """The segments that one joint follows. At the end, the joint holds the last position.
 
-    ``current`` is the segment at the time of the last :meth:`advance`; it starts with the first. The segments between a
-    message's points are constructed when they are reached.
+    ``current`` is the segment at the time of the last :meth:`advance`, at first the first segment. Segments between a message's
+    points are constructed when they are reached.
     """
 
     def __init__(
@@ -287,7 +287,7 @@ class JointPath:
     ) -> None:
         self._segments = segments
         self._tail = tail
-        self._goal = goal  # of the tail's segments
+        self._goal = goal  # the goal of the tail's segments
         self._count = len(segments)
         if tail is not None:
             self._count += len(tail.points.times) - 1 - tail.first
@@ -303,7 +303,7 @@ class JointPath:
         self.current = self._build(self._index)
 
     def set_goal(self, goal: MonitoredGoal | None) -> None:
-        """Make the current segment and all later ones part of another goal. They keep their tolerances."""
+        """Assign the current and all later segments to another goal. They keep their tolerances."""
         self._goal = goal
         self.current.goal = goal
         for segment in self._segments[self._index :]:
@@ -315,7 +315,7 @@ class JointPath:
         return self._segment(index).sample(time) if index >= 0 else None
 
     def until(self, time: int) -> list[Segment]:
-        """Return the segments from the current one to that at ``time``."""
+        """Return the segments from the current one to the one at ``time``."""
         return [self._segment(index) for index in range(self._index, self._find(time) + 1)]
 
     def _find(self, time: int) -> int:
@@ -355,7 +355,7 @@ class JointPath:
 
 
 def wraparound_offset(before: float, after: float) -> float:
-    """Return the whole turns, in rad, to add to ``after`` so that a continuous joint goes the shorter way."""
+    """Return the whole turns, in rad, to add to ``after`` so that a continuous joint takes the shorter way."""
     distance = math.remainder(after - before, math.tau)
     if math.pi - abs(distance) < _SINGULARITY:
         distance = math.copysign(distance, after - before)

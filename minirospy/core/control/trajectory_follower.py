@@ -1,7 +1,7 @@
-"""The decisions of a JointTrajectoryController: the joints' desired states in each cycle, and the outcome of its goals.
+"""The decisions of a JointTrajectoryController: the joints' desired states in each cycle, and the outcomes of its goals.
 
-It replaces, holds and stops trajectories, and checks tolerances. Its times are nanoseconds of ROS time and of the uptime,
-which starts at 0 and follows the cycles' periods. Source: http://wiki.ros.org/joint_trajectory_controller.
+It replaces, holds and stops trajectories, and checks tolerances. Times are in nanoseconds, of ROS time or of the uptime, which
+starts at 0 and is the sum of the cycles' periods. Source: http://wiki.ros.org/joint_trajectory_controller.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ from minirospy.core.urdf.model import JointType, Robot
 __all__ = ["FollowedJoint", "GoalTolerance", "JointsError", "Plan", "TrajectoryFollower", "read_joints"]
 
 _SECOND = 1_000_000_000  # ns
-_MAX_REQUESTS = 100  # trajectories kept while the loop pauses, like a simulation; the oldest are dropped
+_MAX_REQUESTS = 100  # trajectories queued while the loop is paused; the oldest are dropped
 _remainder, _turn = math.remainder, math.tau
 _SUCCEEDED = Outcome(GoalEvent.SUCCEED, (ErrorCode.SUCCESSFUL, ""))
 
 
 class JointsError(TrajectoryError):
-    """Raised if the joints of a trajectory are not those of the controller."""
+    """Raised if a trajectory's joints do not match the controller's."""
 
 
 class FollowedJoint(NamedTuple):
-    """A joint: a continuous one turns without limits, and its errors and replacements take the shorter way."""
+    """A joint. A continuous joint turns without limits, and takes the shorter way to a target."""
 
     name: str
     is_continuous: bool = False
@@ -54,7 +54,7 @@ class FollowedJoint(NamedTuple):
 
 
 class GoalTolerance(NamedTuple):
-    """A tolerance in a goal's message: above 0 it replaces the controller's, below 0 it is off, 0 keeps the controller's."""
+    """A tolerance in a goal message. A positive value overrides the controller's, a negative one disables it, and 0 keeps it."""
 
     name: str
     position: float
@@ -62,7 +62,7 @@ class GoalTolerance(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A valid message: for each of the controller's joints, its column in the message or None, and its tolerances."""
+    """A valid message. For each of the controller's joints: its column in the message, or None, and its tolerances."""
 
     points: Points
     columns: Sequence[int | None]
@@ -70,14 +70,14 @@ class Plan(NamedTuple):
 
 
 class TrajectoryFollower:
-    """Follows trajectories with several joints.
+    """Executes trajectories for several joints.
 
-    The loop's thread calls :meth:`start`, :meth:`update` and :meth:`stop`; other threads call :meth:`plan`,
-    :meth:`request_plan` and :meth:`request_hold`, whose requests the next update carries out. So a new trajectory starts from
-    the states that the old one has in this very cycle, however long its message took to arrive and to be checked.
+    The loop's thread calls :meth:`start`, :meth:`update` and :meth:`stop`. Other threads call :meth:`plan`, :meth:`request_plan`
+    and :meth:`request_hold`; the next update carries out their requests. A new trajectory therefore starts from the old one's
+    states in that same cycle, no matter how long its message took to arrive and to be checked.
 
-    The lists have one number per joint, and are new in each cycle. ``stop_duration``: ns in which the joints are slowed down to
-    hold their position; if it is 0, they hold their actual position without a ramp.
+    The lists have one number per joint, and are replaced in each cycle. ``stop_duration``: ns over which the joints slow down
+    before they hold their position; if it is 0, they hold their actual position immediately.
     """
 
     def __init__(
@@ -92,8 +92,8 @@ class TrajectoryFollower:
         self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque(maxlen=_MAX_REQUESTS)
         self._paths: list[JointPath] = []
         self.is_running = False
-        self.time = 0  # ns of ROS time, of the last update
-        self.uptime = 0  # ns, of the last update
+        self.time = 0  # ns of ROS time at the last update
+        self.uptime = 0  # ns at the last update
         self._clock = (0, 0, 0)  # time, period and uptime of the last update, for other threads
         self.positions: list[float] = []  # desired
         self.velocities: list[float] = []  # desired
@@ -102,7 +102,7 @@ class TrajectoryFollower:
         self.velocity_errors: list[float] = []
 
     def start(self, time: int, positions: Sequence[float], velocities: Sequence[float]) -> None:
-        """Hold the joints at their actual positions, which must be finite, from the next update on."""
+        """Hold the joints at their actual positions, which must be finite, starting with the next update."""
         self._requests.clear()
         self.time, self.uptime = time, 0
         self._clock = (time, 0, 0)
@@ -116,7 +116,7 @@ class TrajectoryFollower:
         self.is_running = True
 
     def stop(self) -> None:
-        """Follow nothing until the next start."""
+        """Discard the trajectory; do nothing until the next start."""
         self.is_running = False
         self._requests.clear()
 
@@ -127,9 +127,9 @@ class TrajectoryFollower:
         stamp: int,
         tolerances: Sequence[JointTolerances] | None = None,
     ) -> Plan:
-        """Check a message's trajectory; return what :meth:`request_plan` needs. ``stamp``: ns of ROS time, or 0 to start now.
+        """Check a message's trajectory; return the plan for :meth:`request_plan`. ``stamp``: ns of ROS time, or 0 to start now.
 
-        Raise JointsError or TrajectoryError if it is rejected.
+        Raise JointsError or TrajectoryError if the trajectory is rejected.
         """
         columns = self.columns(names)
         time, period, _ = self._clock
@@ -142,7 +142,7 @@ class TrajectoryFollower:
     def goal_tolerances(
         self, path: Sequence[GoalTolerance], goal: Sequence[GoalTolerance], goal_time: int
     ) -> list[JointTolerances]:
-        """Return the joints' tolerances with those of a goal's message. ``goal_time``: ns, overrides in the same way."""
+        """Return the joints' tolerances, overridden by those in a goal message. ``goal_time`` (ns) follows the same rules."""
         found = {joint.name: joint.tolerances for joint in self.joints}
         for name, position, velocity in path:
             if default := found.get(name):
@@ -162,9 +162,9 @@ class TrajectoryFollower:
         ]
 
     def columns(self, names: Sequence[str]) -> list[int | None]:
-        """Return the place of each of the controller's joints in ``names``, or None if it is missing there.
+        """Return the index in ``names`` of each of the controller's joints, or None for a joint that is missing there.
 
-        Raise JointsError if there are other names, the same name twice, or too few.
+        Raise JointsError if ``names`` has unknown or duplicate names, or too few.
         """
         places = {name: column for column, name in enumerate(names)}
         is_complete = len(names) == len(self._names)
@@ -180,16 +180,16 @@ class TrajectoryFollower:
         return columns
 
     def request_plan(self, plan: Plan, goal: MonitoredGoal | None) -> None:
-        """Follow a plan, from the next update or from its start time on."""
+        """Execute a plan, starting with the next update or at its start time."""
         self._requests.append((plan, goal))
 
     def request_hold(self, goal: MonitoredGoal | None = None) -> None:
-        """Stop all joints and hold their position. The goal succeeds when they are stopped."""
+        """Stop all joints and hold their positions. The goal succeeds when all joints have stopped."""
         self._requests.append((None, goal))
 
     @property
     def waiting(self) -> int:
-        """Return the number of plans and holds that wait for the next update; the oldest ones are dropped."""
+        """Return the number of plans and holds queued for the next update. Drop the oldest if there are too many."""
         return len(self._requests)
 
     def sample(self, time: int) -> list[tuple[float, float, float]] | None:
@@ -200,7 +200,7 @@ class TrajectoryFollower:
         return found if len(found) == len(states) else None
 
     def update(self, time: int, period: int, positions: Sequence[float], velocities: Sequence[float]) -> None:
-        """Compute the desired states of a cycle, and finish goals. A period below 0 counts as 0."""
+        """Compute one cycle's desired states, and finish goals. A negative period counts as 0."""
         before = self.uptime
         uptime = before + period if period > 0 else before
         self.time, self.uptime = time, uptime
@@ -258,9 +258,10 @@ class TrajectoryFollower:
         self.position_errors, self.velocity_errors = position_errors, velocity_errors
 
     def times_from_start(self) -> tuple[float, float]:
-        """Return the desired and the actual time from the start of the trajectory, in s, by ROS's definition.
+        """Return the desired and the actual time from the start of the trajectory, in s, as ROS defines them.
 
-        They are that of the point before the present, and how long ago that was in addition; 0 until the first point.
+        The desired time is that of the last point passed; the actual time adds the time since then. Both are 0 before the first
+        point.
         """
         segment = self._paths[0].current
         since = (self.uptime - segment.start) / _SECOND
@@ -289,7 +290,7 @@ class TrajectoryFollower:
         goal.finish(Outcome(GoalEvent.ABORT, (code, text)))
 
     def _hold(self, positions: Sequence[float], goal: MonitoredGoal | None, before: int = 0) -> None:
-        """Replace the trajectory by one that holds all joints. ``before``: uptime of the last desired states."""
+        """Replace the trajectory with one that holds all joints. ``before``: uptime of the last desired states."""
         paths = []
         for actual, position, velocity in zip(positions, self.positions, self.velocities, strict=True):
             if self._stop_duration:
@@ -301,14 +302,14 @@ class TrajectoryFollower:
         self._paths = paths
 
     def _replace(self, plan: Plan, goal: MonitoredGoal | None) -> None:
-        """Follow the points of a plan after those parts of the present trajectory that come before its start."""
+        """Keep the current trajectory up to the start of a plan, and follow the plan's points from there."""
         uptime, points = self.uptime, plan.points
         start = uptime + points.stamp - self.time if points.stamp else uptime
         first = max(points.first, points.next_after(uptime - start))
         bridge_start = max(start, uptime)
         bridge_end = start + points.times[first]
         if bridge_end <= uptime:
-            bridge_end = uptime + 1  # all points have passed since the message was checked: go to the last
+            bridge_end = uptime + 1  # all points have passed meanwhile: go to the last one
 
         paths = []
         for path, column, tolerances, is_continuous in zip(
@@ -393,14 +394,14 @@ def _override(default: float, value: float) -> float:
 def _is_within(
     position_error: float, velocity_error: float, max_position: float, max_velocity: float
 ) -> bool:
-    """Return whether both errors are within those limits that are above 0. An error that is not a number is not."""
+    """Return whether both errors are within their limits. A limit that is not above 0 is ignored; NaN exceeds any other limit."""
     return (max_position <= 0.0 or abs(position_error) <= max_position) and (
         max_velocity <= 0.0 or abs(velocity_error) <= max_velocity
     )
 
 
 def _stop(start: int, position: float, velocity: float, duration: int, goal: MonitoredGoal | None) -> Segment:
-    """Return a segment that slows a joint down, to where it would turn if it came back with the same speed."""
+    """Return a segment that brings a joint to rest: the first half of a motion that returns with the opposite velocity."""
     first = State(position, velocity)
     turning = Segment(start, first, start + 2 * duration, State(position, -velocity))
     return Segment(start, first, start + duration, State(*turning.sample(start + duration)), goal)

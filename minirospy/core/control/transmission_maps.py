@@ -1,7 +1,7 @@
-"""Transmissions as maps of positions, velocities and efforts between actuators and joints, in both directions.
+"""Transmissions: convert positions, velocities and efforts between actuators and joints, in both directions.
 
-A driver that commands the motors of a coupled mechanism uses them in ``read`` and ``write``. Source:
-http://wiki.ros.org/transmission_interface, and the code of the noetic release.
+A driver of a coupled mechanism uses them in ``read`` and ``write``. Source: http://wiki.ros.org/transmission_interface, and the
+code of the noetic release.
 """
 
 from __future__ import annotations
@@ -24,40 +24,40 @@ _Matrix = tuple[tuple[float, ...], ...]
 
 
 class TransmissionMap:
-    """The base of all transmissions. Values are in the order of the names in ``actuators`` and ``joints``."""
+    """The base class of all transmissions. Values are in the order of the names in ``actuators`` and ``joints``."""
 
     actuators: Sequence[str] = ()
     joints: Sequence[str] = ()
 
     def __init__(self, motion: _Matrix, effort: _Matrix, offsets: Sequence[float]) -> None:
-        """Set the matrices that turn actuators' velocities and efforts into those of joints, and the joints' zeros."""
+        """Set the matrices that convert actuator velocities and efforts to joint ones, and the joints' zero positions."""
         self._motion, self._effort, self._offsets = motion, effort, tuple(offsets)
         self._inverse_motion, self._inverse_effort = _inverse(motion), _inverse(effort)
 
     def joint_positions(self, actuators: Sequence[float]) -> list[float]:
-        """Return the joints' positions for those of the actuators."""
+        """Return the joint positions for these actuator positions."""
         moved = _product(self._motion, actuators)
         return [position + offset for position, offset in zip(moved, self._offsets, strict=True)]
 
     def joint_velocities(self, actuators: Sequence[float]) -> list[float]:
-        """Return the joints' velocities for those of the actuators."""
+        """Return the joint velocities for these actuator velocities."""
         return _product(self._motion, actuators)
 
     def joint_efforts(self, actuators: Sequence[float]) -> list[float]:
-        """Return the joints' efforts for those of the actuators."""
+        """Return the joint efforts for these actuator efforts."""
         return _product(self._effort, actuators)
 
     def actuator_positions(self, joints: Sequence[float]) -> list[float]:
-        """Return the actuators' positions for those of the joints."""
+        """Return the actuator positions for these joint positions."""
         moved = [position - offset for position, offset in zip(joints, self._offsets, strict=True)]
         return _product(self._inverse_motion, moved)
 
     def actuator_velocities(self, joints: Sequence[float]) -> list[float]:
-        """Return the actuators' velocities for those of the joints."""
+        """Return the actuator velocities for these joint velocities."""
         return _product(self._inverse_motion, joints)
 
     def actuator_efforts(self, joints: Sequence[float]) -> list[float]:
-        """Return the actuators' efforts for those of the joints."""
+        """Return the actuator efforts for these joint efforts."""
         return _product(self._inverse_effort, joints)
 
 
@@ -71,7 +71,7 @@ class SimpleTransmission(TransmissionMap):
 
 
 class DifferentialTransmission(TransmissionMap):
-    """Two actuators turn joint 1 together, and joint 2 against each other. Raise HardwareError if a reduction is 0."""
+    """Joint 1 moves with the sum of two actuators, joint 2 with their difference. Raise HardwareError if a reduction is 0."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class DifferentialTransmission(TransmissionMap):
 
 
 class FourBarLinkageTransmission(TransmissionMap):
-    """Actuator 1 turns joint 1; joint 2 is actuator 2 less the motion of joint 1. Raise HardwareError if a reduction is 0."""
+    """Actuator 1 moves joint 1; joint 2 is actuator 2 minus joint 1's motion. Raise HardwareError if a reduction is 0."""
 
     def __init__(
         self,
@@ -98,14 +98,14 @@ class FourBarLinkageTransmission(TransmissionMap):
     ) -> None:
         a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "four-bar linkage")
         motion = ((_reciprocal(a * c), 0.0), (-_reciprocal(a * c * d), _reciprocal(b * d)))
-        # These efforts are ROS's; the power of actuators and joints is not equal.
+        # These are ROS's formulas, although the actuators' and the joints' powers are not equal.
         super().__init__(motion, ((a * c, 0.0), (-a * c * d, b * d)), joint_offset)
 
 
 def load_transmissions(text: str | bytes, file: str = "robot_description") -> dict[str, TransmissionMap]:
-    """Return the simple, differential and four-bar linkage transmissions of a description, by name.
+    """Return the simple, differential and four-bar linkage transmissions in a description, by name.
 
-    Raise UrdfError if the text is not XML, HardwareError with ROS's text if a transmission is invalid.
+    Raise UrdfError if the text is not XML, or HardwareError, with ROS's text, if a transmission is invalid.
     """
     found: dict[str, TransmissionMap] = {}
     for element in parse_xml(text, file).all("transmission"):
@@ -133,7 +133,7 @@ _Part = tuple[str, float, float]  # an actuator or a joint: name, reduction, off
 
 
 def _sides(transmission: Element, name: str, count: int) -> tuple[list[_Part], list[_Part]]:
-    """Return the actuators and the joints of a transmission, in the order of their roles."""
+    """Return the actuators and joints of a transmission, in the order of their roles."""
     sides = []
     for tag in ("actuator", "joint"):
         elements = list(transmission.all(tag))
@@ -208,17 +208,17 @@ def _product(matrix: _Matrix, values: Sequence[float]) -> list[float]:
 
 
 def _reciprocal(value: float) -> float:
-    """Return 1 / value. Raise HardwareError if the product of reductions was too large or too small for a float."""
+    """Return 1 / value. Raise HardwareError if the product of reductions overflowed or underflowed."""
     if not value or not math.isfinite(value):
         raise HardwareError("Transmission reduction ratios are too large or too small.")
     return 1 / value
 
 
 def _inverse(matrix: _Matrix) -> _Matrix:
-    """Return the inverse of a matrix of size 1 or 2."""
+    """Return the inverse of a 1x1 or 2x2 matrix."""
     if len(matrix) == 1:
         return ((1 / matrix[0][0],),)
     (a, b), (c, d) = matrix
     determinant = a * d - b * c
-    _reciprocal(determinant)  # it raises HardwareError if there is no inverse
+    _reciprocal(determinant)  # raises HardwareError if there is no inverse
     return (d / determinant, -b / determinant), (-c / determinant, a / determinant)

@@ -15,7 +15,7 @@ __all__ = ["Transmission", "read_transmissions"]
 
 
 class Transmission(NamedTuple):
-    """A joint of a transmission, with its interfaces. ``kind``: such as ``transmission_interface/SimpleTransmission``."""
+    """One joint of a transmission, with its interfaces. ``kind``: for example ``transmission_interface/SimpleTransmission``."""
 
     name: str
     kind: str
@@ -26,12 +26,12 @@ class Transmission(NamedTuple):
 def read_transmissions(
     text: str | bytes, warn: Callable[[str], object], file: str = "robot_description"
 ) -> list[Transmission]:
-    """Return the joints of all transmissions in a description; call ``warn`` with a line for each that is skipped.
+    """Return the joints of all transmissions in a description; call ``warn`` with a line for each one skipped.
 
     Raise UrdfError if the text is not XML.
     """
     found: list[Transmission] = []
-    lines: dict[str, None] = {}  # a transmission may have the same line for each of its joints
+    lines: dict[str, None] = {}  # without duplicates, which a transmission's joints may cause
     for element in parse_xml(text, file).all("transmission"):
         found += _read(element, lines.setdefault)
     for line in lines:
@@ -54,7 +54,7 @@ def _read(element: Element, warn_of: Callable[[str], object]) -> list[Transmissi
         )
         return []
 
-    # Older descriptions name the interface in the actuator.
+    # Older descriptions name the interface in the actuator element.
     shared = [each for actuator in actuators for each in actuator.all("hardwareInterface")]
     found = []
     for joint in joints:

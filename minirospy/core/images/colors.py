@@ -1,4 +1,4 @@
-"""Convert YUV images and Bayer patterns to BGR with numpy, with OpenCV's results bit for bit. Pure.
+"""Convert YUV images and Bayer patterns to BGR with numpy; the results are bit-identical to OpenCV's. Pure.
 
 Source: https://docs.opencv.org (cvtColor), ITU-R BT.601. tests/core/images/record_colors.py records OpenCV's results.
 """
@@ -18,9 +18,9 @@ _BITS = 20
 
 
 def yuv_to_bgr(image: Pixels, *, has_luma_first: bool) -> Pixels:
-    """Convert an image of two bytes per pixel, U Y V Y, or Y U Y V if ``has_luma_first``. Its width is even.
+    """Convert an image with two bytes per pixel (U Y V Y, or Y U Y V if ``has_luma_first``) and an even width.
 
-    Raise ValueError if it is odd.
+    Raise ValueError if the width is odd.
     """
     import numpy as np
 
@@ -38,10 +38,10 @@ def yuv_to_bgr(image: Pixels, *, has_luma_first: bool) -> Pixels:
 
 
 def debayered(image: Pixels, pattern: str) -> Pixels:
-    """Convert a Bayer pattern, such as ``rggb``, to BGR of the same depth: missing colors are means of the neighbors.
+    """Convert a Bayer pattern, such as ``rggb``, to BGR of the same depth. Missing colors are averages of neighbors.
 
-    The outermost pixels have the colors of those next to them. An image with less than three rows or columns has one color
-    per cell of four pixels.
+    The outermost pixels copy the colors of the pixels next to them. In an image with fewer than three rows or columns, each cell
+    of four pixels has one color.
     """
     import numpy as np
 
@@ -58,7 +58,7 @@ def debayered(image: Pixels, pattern: str) -> Pixels:
     corners = (values[:-2, :-2] + values[:-2, 2:] + values[2:, :-2] + values[2:, 2:] + 2) >> 2
     for row in (0, 1):
         for column in (0, 1):
-            # The inner pixels begin at (1, 1).
+            # The inner pixels start at (1, 1).
             own = pattern[(1 - row) * 2 + (1 - column)]
             rows, columns = slice(row, None, 2), slice(column, None, 2)
             part = inner[rows, columns]
@@ -90,7 +90,7 @@ def _of_cells(image: Pixels, pattern: str) -> Pixels:
 
 
 def eight_bits(image: Pixels) -> Pixels:
-    """Return an image of 16 bits per channel with 8, rounded as OpenCV does."""
+    """Convert an image from 16 to 8 bits per channel, rounding as OpenCV does."""
     import numpy as np
 
     result: Pixels = np.rint(image * np.float64(255 / 65535)).astype(np.uint8)

@@ -1,1 +1,1 @@
-"""Meshes in STL, OBJ and Collada files, as numpy arrays, and their parts for collisions."""
+"""Meshes in STL, OBJ and Collada files, read as numpy arrays, and their convex parts for collisions."""

@@ -1,7 +1,7 @@
-"""Parse Collada files (DAE): geometry, materials' colours, the scene's transforms and units.
+"""Parse Collada files (DAE): geometry, material colours, the scene's transforms and units.
 
-Animations, skins, cameras and lights are ignored. So is ``up_axis``, as in Gazebo and RViz: robots' files are drawn with z up
-whatever it says. Source: https://www.khronos.org/files/collada_spec_1_4.pdf.
+Animations, skins, cameras and lights are ignored. So is ``up_axis``, as in Gazebo and RViz: files of robots have z up, whatever
+``up_axis`` says. Source: https://www.khronos.org/files/collada_spec_1_4.pdf.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from minirospy.core.meshes.mesh import MAX_TRIANGLES, Mesh, MeshMaterial
 
 __all__ = ["parse_dae"]
 
-MAX_NODES = 20_000  # instances of nodes; nodes that refer to each other can multiply
-MAX_DEPTH = 100  # of nodes within nodes
+MAX_NODES = 20_000  # node instances; nodes that instantiate each other can multiply
+MAX_DEPTH = 100  # nesting depth of nodes
 PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 Matrix = NDArray[np.float64]
 Texcoords = NDArray[np.float32]
 
 
 def parse_dae(data: bytes) -> list[Mesh]:
-    """Return the meshes of the scene in metres; a mesh has the name of its node.
+    """Return the meshes of the scene in metres. Each mesh has the name of its node.
 
-    Raise MeshError if the data is not Collada, refers to parts that do not exist, or is too large.
+    Raise MeshError if the data is not Collada, refers to missing parts, or is too large.
     """
     try:
         root = parse_xml(data)
@@ -46,7 +46,7 @@ def parse_dae(data: bytes) -> list[Mesh]:
 
 
 class _Part(NamedTuple):
-    """The triangles of one material, by its symbol. texcoords (n, 3, 2): the corners' places in the texture, or None."""
+    """The triangles of one material, with its symbol. texcoords (n, 3, 2): the corners' texture coordinates, or None."""
 
     symbol: str
     vertices: Matrix
@@ -69,7 +69,7 @@ class _Reader:
         self._triangles = 0
 
     def meshes(self) -> list[Mesh]:
-        """Return the meshes of the scene, or all geometries if there is no scene."""
+        """Return the meshes of the scene, or all geometries if the file has no scene."""
         asset = _child(self._root, "asset")
         unit = _child(asset, "unit") if asset else None
         scale = float(unit.attributes.get("meter", "1")) if unit else 1.0
@@ -114,7 +114,7 @@ class _Reader:
             elif tag == "instance_geometry":
                 self._add(self._find(child, "geometry"), name, self._bindings(child), matrix, result)
             elif tag == "instance_controller":
-                # A skin: its mesh at rest.
+                # For a skin, use its mesh at rest.
                 skin = _child(self._find(child, "controller"), "skin")
                 source = self._target(skin, "source")
                 if source is not None:
@@ -169,7 +169,7 @@ class _Reader:
         result.append(mesh.transformed(matrix[:3, :3], matrix[:3, 3]))
 
     def _read_geometry(self, geometry: XmlElement) -> Iterator[_Part]:
-        """Yield each set of primitives."""
+        """Yield the triangles of each set of primitives."""
         mesh = _child(geometry, "mesh")
         for element in mesh.children if mesh else ():
             if _tag(element) not in PRIMITIVES:
@@ -221,7 +221,7 @@ class _Reader:
         return values
 
     def _values(self, url: str, count: int) -> Matrix | None:
-        """Return the first ``count`` numbers of each entry of a source, or None if there is no such source."""
+        """Return the first ``count`` numbers of each entry of a source, or None if the source does not exist."""
         source = self._by_id.get(_reference(url))
         array = _child(source, "float_array") if source is not None else None
         if source is None or array is None:
@@ -235,7 +235,7 @@ class _Reader:
         return values[: len(values) // stride * stride].reshape(-1, stride)[:, :count]
 
     def _bindings(self, instance: XmlElement) -> dict[str, MeshMaterial]:
-        """Return the materials of an instance by their symbols."""
+        """Return the materials of an instance, by symbol."""
         return {
             element.attributes.get("symbol", ""): self._material(
                 _reference(element.attributes.get("target", ""))
@@ -298,7 +298,7 @@ def _turn(axis: Matrix, angle: float) -> Matrix:
 
 
 def _triangulate(tag: str, lists: list[NDArray[np.int32]], element: XmlElement) -> NDArray[np.int32]:
-    """Return the triangles (n, 3) of one set of primitives, whose corners are given."""
+    """Return the triangles (n, 3) of one set of primitives, given its corners."""
     if tag == "triangles":
         whole = np.concatenate(lists) if lists else np.zeros(0, np.int32)
         return whole[: len(whole) // 3 * 3].reshape(-1, 3)
@@ -323,7 +323,7 @@ def _triangulate(tag: str, lists: list[NDArray[np.int32]], element: XmlElement) 
 
 
 def _fans(corners: NDArray[np.int32], sizes: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the triangles of polygons that follow each other, from each polygon's first corner."""
+    """Return the triangles of consecutive polygons, each divided into a fan from its first corner."""
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]) if len(sizes) else np.zeros(0, np.int64)
     counts = np.maximum(sizes - 2, 0)
     first = np.repeat(starts, counts)
@@ -340,7 +340,7 @@ def _integers(text: str) -> NDArray[np.int32]:
 
 
 def _tag(element: XmlElement) -> str:
-    """Return a tag without the prefix of its namespace."""
+    """Return a tag without its namespace."""
     return element.tag.rpartition(":")[2]
 
 

@@ -1,4 +1,4 @@
-"""The error of meshes that cannot be read."""
+"""The error for meshes that cannot be read."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["MeshError"]
 
 
 class MeshError(MinirospyError):
-    """Raised if a mesh file is broken, too large or of an unknown format. ``file`` is empty until the reader of files sets it."""
+    """Raised if a mesh is invalid, too large or of an unknown format. ``file`` is empty until the file reader sets it."""
 
     def __init__(self, why: str, file: str = "") -> None:
         super().__init__(why, file)

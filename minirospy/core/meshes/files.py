@@ -20,16 +20,16 @@ from minirospy.core.sdf.model import Vector
 
 __all__ = ["MAX_BYTES", "read_mesh"]
 
-MAX_BYTES = 200_000_000  # a larger file needs gigabytes of memory
-MAX_LIBRARY_BYTES = 1_000_000  # of an MTL file
+MAX_BYTES = 200_000_000  # maximum file size; a larger file needs gigabytes of memory
+MAX_LIBRARY_BYTES = 1_000_000  # maximum size of an MTL file
 
 
 def read_mesh(
     path: str, submesh: str = "", scale: Vector = (1.0, 1.0, 1.0), *, is_centered: bool = False
 ) -> list[Mesh]:
-    """Return the meshes of a file: each node or object, or only the one named ``submesh``, about its centre if asked.
+    """Return the meshes in a file: all nodes or objects, or only the one named ``submesh``, centred if requested.
 
-    Raise MeshError with the file's name if it cannot be read.
+    Raise MeshError, with the file's name, if the file cannot be read.
     """
     try:
         meshes = list(_read(path, Path(path).stat().st_mtime_ns))
@@ -62,7 +62,7 @@ def _read(path: str, changed: int) -> tuple[Mesh, ...]:
 
 
 def _with_textures(mesh: Mesh, folder: Path) -> Mesh:
-    """Return the mesh with the paths of its textures, or without those that are missing."""
+    """Return the mesh with the paths of its textures. Missing textures are removed."""
     if not any(material.texture for material in mesh.materials):
         return mesh
     materials = tuple(replace(each, texture=_picture(each.texture, folder)) for each in mesh.materials)
@@ -70,9 +70,9 @@ def _with_textures(mesh: Mesh, folder: Path) -> Mesh:
 
 
 def _picture(name: str, folder: Path) -> str:
-    """Return the path of a picture that a mesh file in ``folder`` names, or an empty string.
+    """Return the path of a picture named by a mesh file in ``folder``, or an empty string.
 
-    Gazebo's models have their pictures in ``materials/textures``.
+    Gazebo's models store their pictures in ``materials/textures``.
     """
     name = unquote(name.removeprefix("file://")).replace("\\", "/")
     if not name or "\0" in name:

@@ -13,12 +13,12 @@ from minirospy.core.sdf.model import Color, Vector
 
 __all__ = ["MAX_TRIANGLES", "Mesh", "MeshMaterial"]
 
-MAX_TRIANGLES = 2_000_000  # per file; the arrays of a larger one, and what is made of them, exceed a gigabyte
+MAX_TRIANGLES = 2_000_000  # per file; larger arrays, and the data derived from them, exceed a gigabyte
 
 
 @dataclass(frozen=True)
 class MeshMaterial:
-    """A material: its name, diffuse colour, and the texture's path, or an empty string."""
+    """A material: its name, diffuse colour and texture path (empty: no texture)."""
 
     name: str = ""
     color: Color | None = None
@@ -27,10 +27,10 @@ class MeshMaterial:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Vertices (n, 3) in metres, triangles (m, 3) as indices of vertices, counter-clockwise seen from outside.
+    """Vertices (n, 3) in metres, and triangles (m, 3) as vertex indices, counter-clockwise seen from outside.
 
-    ``material_of`` (m,) has each triangle's index in ``materials``. ``texcoords`` (m, 3, 2) has the place of each corner in the
-    texture, from 0 to 1, from the lower left corner; None if the file has none.
+    ``material_of`` (m,): each triangle's index in ``materials``. ``texcoords`` (m, 3, 2): each corner's texture coordinates, from
+    0 to 1, with the origin at the lower left; None if the file has none.
     """
 
     vertices: NDArray[np.float64]
@@ -50,7 +50,7 @@ class Mesh:
         material_of: NDArray[np.int32] | None = None,
         texcoords: NDArray[np.float32] | None = None,
     ) -> Mesh:
-        """Return the mesh. Raise MeshError if an index or a coordinate is invalid, or if there is no triangle."""
+        """Return the mesh. Raise MeshError if an index or a coordinate is invalid, or if there are no triangles."""
         if not len(triangles):
             raise MeshError(f"the mesh '{name}' has no triangles" if name else "there are no triangles")
         if len(triangles) > MAX_TRIANGLES:
@@ -65,7 +65,7 @@ class Mesh:
 
     @classmethod
     def join(cls, meshes: Sequence[Mesh]) -> Mesh:
-        """Return one mesh with the triangles of all, without their materials."""
+        """Return one mesh with the triangles of all meshes, without materials."""
         starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
         triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts[:-1].tolist(), strict=True)]
         return cls(
@@ -73,7 +73,7 @@ class Mesh:
         )
 
     def transformed(self, matrix: NDArray[np.float64], offset: NDArray[np.float64]) -> Mesh:
-        """Return the mesh with ``matrix @ vertex + offset``; a mirroring matrix turns the triangles around."""
+        """Return the mesh with vertices ``matrix @ vertex + offset``. A mirroring matrix reverses the triangles' orientation."""
         triangles, texcoords = self.triangles, self.texcoords
         if np.linalg.det(matrix) < 0:
             triangles = np.ascontiguousarray(triangles[:, ::-1])
@@ -94,16 +94,16 @@ class Mesh:
         return crosses
 
     def scaled(self, scale: Vector) -> Mesh:
-        """Return the mesh, scaled along the axes."""
+        """Return the mesh scaled along each axis."""
         return self if scale == (1.0, 1.0, 1.0) else self.transformed(np.diag(scale), np.zeros(3))
 
     def by_material(self) -> Iterator[tuple[NDArray[np.int32], Color | None]]:
-        """Yield the triangles of each material, with its colour."""
+        """Yield the triangles of each material, with the material's colour."""
         for mesh in self.sections():
             yield mesh.triangles, mesh.materials[0].color
 
     def sections(self) -> Iterator[Mesh]:
-        """Yield the triangles of each material as a mesh with the same vertices."""
+        """Yield the triangles of each material as a mesh that shares the vertices."""
         if self.material_of is None or len(self.materials) <= 1:
             yield replace(self, materials=self.materials or (MeshMaterial(),))
             return

@@ -18,12 +18,12 @@ _Place = tuple[float, float]
 
 
 def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> list[Mesh]:
-    """Return the mesh of each object (``o``). ``library`` returns the text of an MTL file, or an empty string.
+    """Return a mesh for each object (``o``). ``library`` returns the text of an MTL file, or an empty string.
 
-    Polygons become fans of triangles. Raise MeshError with the line if a vertex or face is invalid.
+    Polygons are divided into fans of triangles. Raise MeshError, with the line, if a vertex or face is invalid.
     """
     vertices: list[tuple[float, float, float]] = []
-    places: list[tuple[float, float]] = []  # in the texture
+    places: list[tuple[float, float]] = []  # texture coordinates
     known: dict[str, MeshMaterial] = {}
     used: dict[str, int] = {}
     material, name, count = "", "", 0
@@ -75,7 +75,7 @@ def parse_obj(text: str, library: Callable[[str], str] = lambda name: "") -> lis
 
 @dataclass
 class _Faces:
-    """The triangles of one object, with the index of each one's material and the places of its corners in the texture."""
+    """The triangles of one object, with each triangle's material index and each corner's texture coordinates."""
 
     triangles: list[tuple[int, int, int]] = field(default_factory=list)
     materials: list[int] = field(default_factory=list)
@@ -92,7 +92,7 @@ class _Faces:
 
 
 def _places(words: list[str], known: list[_Place]) -> list[_Place] | None:
-    """Return the places of a polygon's corners in the texture, or None if it has none that can be used."""
+    """Return the texture coordinates of a polygon's corners, or None if they are missing or invalid."""
     try:
         return [known[_index(word.split("/")[1], len(known))] for word in words]
     except (ValueError, IndexError):
@@ -103,11 +103,11 @@ def _place(values: list[str]) -> _Place:
     try:
         return float(values[0]), float(values[1]) if len(values) > 1 else 0.0
     except (ValueError, IndexError):
-        return math.nan, math.nan  # then the object has no texture coordinates
+        return math.nan, math.nan  # the object then has no texture coordinates
 
 
 def _index(word: str, count: int) -> int:
-    """Return an index such as ``3`` or ``-1`` of a corner, from 0. Raise ValueError if it does not exist."""
+    """Return the 0-based index for a corner's index such as ``3`` or ``-1``. Raise ValueError if it does not exist."""
     index = int(word)
     index = index - 1 if index > 0 else count + index
     if not 0 <= index < count:
@@ -116,7 +116,7 @@ def _index(word: str, count: int) -> int:
 
 
 def parse_mtl(text: str) -> dict[str, MeshMaterial]:
-    """Return an MTL file's materials by name. Lines that are invalid are ignored."""
+    """Return the materials in an MTL file, by name. Invalid lines are ignored."""
     result: dict[str, MeshMaterial] = {}
     name, color, alpha, texture = "", (0.8, 0.8, 0.8), 1.0, ""
     for line in [*text.splitlines(), "newmtl"]:

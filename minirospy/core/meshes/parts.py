@@ -1,8 +1,9 @@
 """Convex parts of a mesh for collisions.
 
-A physics engine collides convex bodies. A convex part of a mesh, closed and oriented outwards, is used as it is. If other
-parts belong to a body that never moves, each flat patch of their surface becomes a thin prism, so that a robot can stand in
-a room that is one mesh. If the body moves, the convex hull of each part is used, or of what a function splits hollow parts into.
+A physics engine collides only convex bodies. A convex part of a mesh that is closed and oriented outwards is used unchanged. The
+treatment of any other part depends on its body. If the body never moves, each flat patch of the surface becomes a thin prism, so
+that a robot can stand in a room that is a single mesh. If the body moves, the convex hull of the part is used, or the result of a
+function that splits hollow parts.
 """
 
 from __future__ import annotations
@@ -18,25 +19,25 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
-MAX_HULLS = 32  # of a moving mesh; one with more parts collides as the hull of all
-# A static mesh with more flat patches is simplified until it has fewer. Worlds have many small models with fine meshes.
+MAX_HULLS = 32  # for a moving mesh; a mesh with more parts collides as one hull
+# A static mesh with more flat patches is simplified until it has fewer, because worlds have many small models with fine meshes.
 MAX_PRISMS = 1500
-MIN_PRISMS = 100  # of a small mesh
-PRISMS_PER_METER = 200  # of the longest side
-MAX_CONVEX = 5000  # triangles; the test of a larger part would take seconds
-MAX_RAYS = 200  # from the largest triangles, to find out whether a mesh is hollow
-MAX_TESTS = 2_000_000  # of a ray and a triangle; these take 0.2 s
-HOLLOW = 0.1  # of the surface faces other parts of it, as in a cup
-THICKNESS = 0.02  # m, of a prism, below the surface
-FLAT = 1e-6  # of the mesh's size: what is thinner has no hull
-TOLERANCE = 1e-4  # of the part's size, for vertices in front of a face of a convex part
+MIN_PRISMS = 100  # for a small mesh
+PRISMS_PER_METER = 200  # along the longest side
+MAX_CONVEX = 5000  # triangles; testing a larger part for convexity would take seconds
+MAX_RAYS = 200  # rays cast from the largest triangles, to detect a hollow mesh
+MAX_TESTS = 2_000_000  # ray-triangle tests; these take 0.2 s
+HOLLOW = 0.1  # from this fraction of the surface facing other parts, a mesh is hollow, as a cup is
+THICKNESS = 0.02  # m; thickness of a prism below the surface
+FLAT = 1e-6  # fraction of the mesh's size; anything thinner has no hull
+TOLERANCE = 1e-4  # fraction of the part's size by which vertices of a convex part may be in front of a face
 
 Points = NDArray[np.float64]
 Triangles = NDArray[np.int32]
 
 
 class Parts(NamedTuple):
-    """Meshes whose convex hulls collide; ``are_exact``: together they are the mesh itself."""
+    """Meshes whose convex hulls collide. ``are_exact``: together they are identical to the mesh."""
 
     meshes: list[Mesh]
     are_exact: bool
@@ -45,9 +46,9 @@ class Parts(NamedTuple):
 def collision_parts(
     mesh: Mesh, *, is_static: bool, split: Callable[[Mesh, int], list[Mesh] | None] = lambda part, most: None
 ) -> Parts:
-    """Return the convex parts.
+    """Return the convex parts of a mesh, for collisions.
 
-    ``split`` returns at most so many convex parts of a hollow part that moves, or None if its hull must do.
+    ``split`` returns at most the given number of convex parts of a hollow moving part, or None to use its hull.
     """
     mesh = _welded(mesh)
     if not _has_area(mesh).any():
@@ -57,7 +58,7 @@ def collision_parts(
         if len(parts) > MAX_HULLS:
             return Parts([_thickened(mesh)], False)
         hollow = list(map(is_hollow, parts))
-        most = MAX_HULLS // max(sum(hollow), 1)  # of each hollow part
+        most = MAX_HULLS // max(sum(hollow), 1)  # for each hollow part
         hulls: list[Mesh] = []
         for part, splits in zip(parts, hollow, strict=True):
             hulls += (split(part, most) if splits and most > 1 else None) or [_thickened(part)]
@@ -75,7 +76,7 @@ def collision_parts(
 
 
 def connected_parts(mesh: Mesh) -> list[Mesh]:
-    """Return the parts that share no vertex, in the order of their first triangles."""
+    """Return the connected parts, which share no vertices, in the order of their first triangles."""
     labels = _labels(len(mesh.vertices), mesh.triangles)
     of_triangle = labels[mesh.triangles[:, 0]]
     order = np.argsort(of_triangle, kind="stable")
@@ -87,7 +88,7 @@ def connected_parts(mesh: Mesh) -> list[Mesh]:
 
 
 def is_convex(part: Mesh) -> bool:
-    """Return whether a connected mesh is closed, oriented outwards, and has no vertex in front of a face."""
+    """Return whether a connected mesh is closed, oriented outwards, and has no vertices in front of its faces."""
     triangles, vertices = part.triangles, part.vertices
     if len(triangles) < 4 or len(triangles) > MAX_CONVEX:
         return False
@@ -100,17 +101,17 @@ def is_convex(part: Mesh) -> bool:
     size = float(np.ptp(vertices, axis=0).max())
     normals = _normals(part)
     offsets = np.einsum("ij,ij->i", normals, vertices[triangles[:, 0]])
-    for start in range(0, len(normals), 512):  # in blocks, because of the memory
+    for start in range(0, len(normals), 512):  # in blocks, to limit memory
         rows = slice(start, start + 512)
         heights = normals[rows] @ vertices.T - offsets[rows, None]
         if heights.max() > TOLERANCE * size:
             return False
-    # A flat part passes, too, but has no volume.
+    # A flat part passes these tests, but has no volume.
     return bool(np.linalg.matrix_rank(vertices - vertices[0], tol=FLAT * max(size, 1e-12)) == 3)
 
 
 def is_hollow(part: Mesh) -> bool:
-    """Return whether a mesh's hull is much larger: rays away from much of its surface hit the mesh again."""
+    """Return whether a mesh's hull is much larger than the mesh: many rays that leave its surface hit the mesh again."""
     if is_convex(part) or len(part.triangles) < 4:
         return False
     corners, crosses = part.corners, part.crosses
@@ -139,7 +140,7 @@ def _welded(mesh: Mesh) -> Mesh:
 
 
 def _labels(count: int, triangles: Triangles) -> NDArray[np.int64]:
-    """Return for each vertex the smallest index of a vertex that is connected with it."""
+    """Return, for each vertex, the smallest index of a vertex connected to it."""
     labels = np.arange(count)
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]]).astype(np.int64)
     while True:
@@ -147,7 +148,7 @@ def _labels(count: int, triangles: Triangles) -> NDArray[np.int64]:
         lower = np.minimum(left, right)
         if np.array_equal(left, right):
             return labels
-        # Hook each root to a smaller one, then shorten all paths.
+        # Attach each root to a smaller one, then shorten all paths.
         np.minimum.at(labels, left, lower)
         np.minimum.at(labels, right, lower)
         while True:
@@ -176,7 +177,7 @@ def _normals(mesh: Mesh) -> Points:
 
 
 def _thickened(part: Mesh) -> Mesh:
-    """Give a flat part a thickness, because it has no hull otherwise."""
+    """Thicken a flat part, which would otherwise have no hull."""
     centered = part.vertices - part.vertices.mean(axis=0)
     size = max(float(np.ptp(centered, axis=0).max()), 1e-9)
     _, axes = np.linalg.eigh(centered.T @ centered)
@@ -208,7 +209,7 @@ def _prisms(mesh: Mesh) -> list[Mesh]:
 
 
 def _patches(mesh: Mesh, limit: int) -> list[tuple[Points, Points]] | None:
-    """Return the outlines of flat convex patches, and their normals, or None if there are more than the limit."""
+    """Return the outlines and normals of flat convex patches, or None if there are more than the limit."""
     normals = _normals(mesh)
     patches: list[tuple[Points, Points]] = []
     groups = _coplanar(mesh, normals)
@@ -224,7 +225,7 @@ def _patches(mesh: Mesh, limit: int) -> list[tuple[Points, Points]] | None:
 
 
 def _simplified(mesh: Mesh, cell: float) -> Mesh:
-    """Merge the vertices in each cube of a grid."""
+    """Merge all vertices in the same cell of a cubic grid."""
     grid = np.round(mesh.vertices / cell).astype(np.int64)
     _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
     triangles = index.ravel()[mesh.triangles]
@@ -244,7 +245,7 @@ def _has_area(mesh: Mesh) -> NDArray[np.bool_]:
 
 
 def _coplanar(mesh: Mesh, normals: Points) -> list[NDArray[np.int64]]:
-    """Return groups of triangles that are connected by edges and lie in one plane."""
+    """Return groups of triangles that are connected by edges and lie in a common plane."""
     count = len(mesh.triangles)
     edges = np.sort(_edges(mesh.triangles), axis=1)
     owners = np.tile(np.arange(count), 3)
@@ -261,7 +262,7 @@ def _coplanar(mesh: Mesh, normals: Points) -> list[NDArray[np.int64]]:
 
 
 def _convex_outline(mesh: Mesh, rows: NDArray[np.int64], normal: Points) -> Points | None:
-    """Return the corners of a patch, or None if it is not convex."""
+    """Return the corners of a patch, or None if the patch is not convex."""
     points = mesh.vertices[np.unique(mesh.triangles[rows])]
     first = np.cross(normal, (1.0, 0, 0) if abs(normal[0]) < 0.9 else (0, 1.0, 0))
     first /= np.linalg.norm(first)
@@ -275,7 +276,7 @@ def _convex_outline(mesh: Mesh, rows: NDArray[np.int64], normal: Points) -> Poin
 
 
 def _hull(points: Points) -> list[int]:
-    """Return the indices of the corners of a plane hull (Andrew's monotone chain)."""
+    """Return the indices of the corners of a planar hull (Andrew's monotone chain)."""
     order = np.lexsort((points[:, 1], points[:, 0])).tolist()
     rows = points.tolist()
 
@@ -295,7 +296,7 @@ def _hull(points: Points) -> list[int]:
 
 
 def _depths(mesh: Mesh, patches: list[tuple[Points, Points]]) -> Points:
-    """Return each prism's thickness: less where the surface behind it is near, so that thin walls stay thin."""
+    """Return each prism's thickness, reduced if another surface is close behind, so that thin walls stay thin."""
     depths = np.full(len(patches), THICKNESS)
     if len(patches) * len(mesh.triangles) > 20_000_000:
         return depths
@@ -308,7 +309,7 @@ def _depths(mesh: Mesh, patches: list[tuple[Points, Points]]) -> Points:
 
 
 def _hits(corners: Points, start: Points, direction: Points) -> Points:
-    """Return the distances at which a ray hits triangles (n, 3, 3), by Moeller and Trumbore's method."""
+    """Return the distances at which a ray hits triangles (n, 3, 3), by the Moeller-Trumbore method."""
     origin, first, second = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     cross = np.cross(direction, second)
     determinant = np.einsum("ij,ij->i", first, cross)

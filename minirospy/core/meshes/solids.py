@@ -1,4 +1,4 @@
-"""Meshes of polylines, and the heights of terrains."""
+"""Meshes of polylines, and heights of terrains."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["polyline_mesh", "terrain"]
 
-MAX_POINTS = 2000  # of a polyline; triangulating takes the square of it
+MAX_POINTS = 2000  # per polyline; triangulation takes quadratic time
 MIN_EAR = 1e-12  # m^2
-NO_ELEVATION = -12_000.0  # m; below the deepest sea, as the numbers that mark missing data are
-MAX_TERRAIN = 2049  # pixels on a side; four million triangles
+NO_ELEVATION = -12_000.0  # m; below the deepest sea; lower values mark missing data
+MAX_TERRAIN = 2049  # pixels per side; four million triangles
 
 
 def polyline_mesh(points: Sequence[tuple[float, float]], height: float) -> Mesh:
-    """Return the prism from z = 0 to ``height`` over a simple polygon. Raise MeshError if there is no area."""
+    """Return the prism from z = 0 to ``height`` over a simple polygon. Raise MeshError if it has no area."""
     outline = [points[index] for index in range(len(points)) if points[index] != points[index - 1]]
     if not 3 <= len(outline) <= MAX_POINTS:
         raise MeshError(f"a polyline has 3 to {MAX_POINTS} points, not {len(outline)}")
@@ -41,11 +41,11 @@ def polyline_mesh(points: Sequence[tuple[float, float]], height: float) -> Mesh:
 
 
 def _ears(points: NDArray[np.float64]) -> list[tuple[int, int, int]]:
-    """Return the triangles of a counter-clockwise polygon, by cutting off ears."""
+    """Return the triangles of a counter-clockwise polygon, by ear clipping."""
     left = list(range(len(points)))
     result: list[tuple[int, int, int]] = []
     while len(left) > 3:
-        # Three points in a line are an ear without area, which is cut off only if there is no other one.
+        # Three collinear points form an ear without area, which is clipped only if there is no other ear.
         ears = (at for limit in (MIN_EAR, 0.0) for at in range(len(left)) if _is_ear(points, left, at, limit))
         at = next(ears, None)
         if at is None:
@@ -56,7 +56,7 @@ def _ears(points: NDArray[np.float64]) -> list[tuple[int, int, int]]:
 
 
 def _is_ear(points: NDArray[np.float64], left: list[int], at: int, limit: float) -> bool:
-    """Return whether a corner's triangle has more than an area, and no other corner inside."""
+    """Return whether a corner's triangle has more than the given area, and contains no other corner."""
     a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
 
     def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -73,10 +73,10 @@ def _is_ear(points: NDArray[np.float64], left: list[int], at: int, limit: float)
 
 
 def terrain(path: str) -> NDArray[np.float64]:
-    """Return a grey picture's heights from 0 to 1, the first row at the smallest y. Raise MeshError if it cannot be read.
+    """Return a grey picture's heights (0 to 1), with the first row at the smallest y. Raise MeshError if it is unreadable.
 
-    A picture of floating-point numbers has elevations in metres, as files of digital elevation models do: 1 is the highest,
-    0 the sea or, if all are above or below it, the lowest.
+    A floating-point picture contains elevations in metres, as in digital elevation models. Height 1 is the highest elevation;
+    height 0 is sea level, or the lowest elevation if all are above or all below sea level.
     """
     try:
         from PIL import Image

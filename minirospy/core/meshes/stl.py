@@ -9,7 +9,7 @@ from minirospy.core.meshes.mesh import MAX_TRIANGLES, Mesh
 
 __all__ = ["parse_stl"]
 
-HEADER = 84  # bytes: text, then the number of triangles
+HEADER = 84  # bytes: a text, then the number of triangles
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -19,7 +19,7 @@ def parse_stl(data: bytes) -> Mesh:
     needed = HEADER + count * RECORD.itemsize
     if len(data) >= HEADER and len(data) == needed:
         return _binary(data, count)
-    # Some programs begin binary files with "solid", and some write bytes after the last triangle.
+    # Some programs start binary files with "solid", and some append bytes after the last triangle.
     if data[:512].lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096]:
         return _ascii(data)
     if len(data) < HEADER:

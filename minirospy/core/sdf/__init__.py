@@ -1,4 +1,4 @@
-"""Simulated worlds: SDF and URDF descriptions, read into one model that a physics engine can build.
+"""Simulated worlds: reads SDF and URDF descriptions into one model, from which a physics engine can build the world.
 
 Source: http://sdformat.org/spec, versions 1.4 to 1.7.
 """

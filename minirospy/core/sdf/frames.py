@@ -1,4 +1,4 @@
-"""Poses of a model's links, joints and frames, each of which may be relative to another one (SDF 1.7). Pure."""
+"""Poses of a model's links, joints and frames; each may be relative to another one (SDF 1.7). Pure."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ MODEL = "__model__"
 
 
 class FrameError(ValueError):
-    """A pose is relative to a frame that does not exist, or to itself; ``str()`` names it."""
+    """Raised if a pose is relative to a missing frame or to itself; ``str()`` names the frame."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A pose, and the name of the frame that it is relative to."""
+    """A pose, and the name of the frame to which it is relative."""
 
     parent: str
     pose: Pose = IDENTITY
 
 
 class Frames:
-    """The frames of one model, by name. Poses relative to the model are computed when they are asked for."""
+    """The frames of one model, by name. Poses relative to the model are computed on demand."""
 
     def __init__(self, frames: Mapping[str, Frame]) -> None:
         self._frames = frames
@@ -52,7 +52,7 @@ class Frames:
         return pose
 
     def relative(self, pose: Pose, frame: str, target: str) -> Pose:
-        """Return a pose that is given in ``frame`` in the frame ``target``. Raise FrameError as :meth:`in_model` does."""
+        """Return a pose given in ``frame``, converted to the frame ``target``. Raise FrameError as :meth:`in_model` does."""
         if frame == target:
             return pose
         return compose(relative(self.in_model(target), self.in_model(frame)), pose)

@@ -1,4 +1,4 @@
-"""Find and open the files that ``<include>`` names: a model's folder with ``model.config``, or an SDF file."""
+"""Find and open the files that ``<include>`` refers to: a model folder with ``model.config``, or an SDF file."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ __all__ = ["Included", "open_include", "sdf_version"]
 
 _ENTITIES = ("model", "light", "actor")
 _CONFIGS = ("model.config", "manifest.xml")
-_NEWEST = (1, 11)  # the newest version that the readers know
+_NEWEST = (1, 11)  # the newest SDF version that the readers support
 _MAX_CONFIG_BYTES = 1024 * 1024
 
 
 @dataclass(frozen=True)
 class Included:
-    """A model, light or actor that a file includes.
+    """An included model, light or actor.
 
-    ``name`` and ``is_static`` are those of the ``<include>``: empty and None if it does not have them.
+    ``name`` and ``is_static`` come from the ``<include>``; empty and None if it does not specify them.
     """
 
     element: Element
@@ -33,7 +33,7 @@ class Included:
 
 
 def open_include(element: Element, source: Source) -> Included | None:
-    """Return what an ``<include>`` names, or None if the file has neither model nor light.
+    """Return the included element, or None if the file contains neither a model nor a light.
 
     Raise SdfError if the file does not exist or cannot be read.
     """
@@ -57,7 +57,7 @@ def open_include(element: Element, source: Source) -> Included | None:
 
 
 def sdf_version(root: Element) -> tuple[int, int]:
-    """Return the version of a document; one without a version, or with another root, is read as the newest."""
+    """Return a document's version. Without a version, or with another root element, it counts as the newest."""
     match = re.match(r"\s*(\d+)\.(\d+)", root.attributes.get("version", ""))
     if match is None or root.tag not in ("sdf", "gazebo"):
         return (1, 7)
@@ -65,9 +65,9 @@ def sdf_version(root: Element) -> tuple[int, int]:
 
 
 def model_file(path: str) -> str:
-    """Return the SDF file of a model's folder, or the path itself if it is a file.
+    """Return the SDF file in a model's folder, or the path itself if it is a file.
 
-    The newest version in ``model.config`` that the readers know wins. Raise SdfError if the folder has no model.
+    The newest supported version in ``model.config`` is used. Raise SdfError if the folder contains no model.
     """
     if not os.path.isdir(path):
         return path

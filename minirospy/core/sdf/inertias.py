@@ -1,4 +1,4 @@
-"""Move and add the inertials of links, in plain floats."""
+"""Move and add inertials of links, with plain floats."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Inertia = tuple[float, float, float, float, float, float]  # ixx, ixy, ixz, iyy,
 
 
 def moved(inertial: Inertial, pose: Pose) -> Inertial:
-    """Return a link's inertial in the frame in which the link has ``pose``."""
+    """Return a link's inertial in the frame in which the link's pose is ``pose``."""
     return inertial._replace(pose=compose(pose, inertial.pose))
 
 
 def add_inertials(first: Inertial, second: Inertial) -> Inertial:
-    """Return the inertial of two bodies that are one, in the axes of their common frame."""
+    """Return the inertial of two rigidly connected bodies, in the axes of their common frame."""
     mass = first.mass + second.mass
     x1, y1, z1 = first.pose.position
     x2, y2, z2 = second.pose.position

@@ -1,4 +1,4 @@
-"""The colours of Gazebo's materials, and materials from the scripts of models (Ogre's ``.material`` files)."""
+"""The colours of Gazebo's built-in materials, and materials from models' scripts (Ogre's ``.material`` files)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from minirospy.core.sdf.text import Element
 __all__ = ["named_material", "read_material"]
 
 _MAX_SCRIPT_BYTES = 1024 * 1024
-_MAX_SCRIPTS = 100  # files in a model's folder of scripts
+_MAX_SCRIPTS = 100  # files per folder of a model's scripts
 _PICTURES = (".jpg", ".jpeg", ".png")
 
 _BLOCK = re.compile(r"^[ \t]*material\s+([^\s{:]+)\s*(?::[^\n{]*)?\s*\{", re.MULTILINE)
@@ -82,7 +82,7 @@ _GLOWING = {
 
 
 def named_material(name: str) -> Material | None:
-    """Return one of Gazebo's own materials, such as ``Gazebo/Grey``, or None if there is no such name."""
+    """Return one of Gazebo's built-in materials, such as ``Gazebo/Grey``, or None if the name is unknown."""
     if name == "__default__":
         return Material(None, name)
     room, _, short = name.partition("/")
@@ -94,11 +94,11 @@ def named_material(name: str) -> Material | None:
 
 
 def read_material(element: Element, source: Source) -> Material:
-    """Read ``<material>``: the script's colours, then those of the element itself, which win."""
+    """Read ``<material>``: the script's colours, overridden by the element's own colours."""
     script = element.first("script")
     name = ""
     if script is not None:
-        # Before SDF 1.4 the element contains the name itself.
+        # Before SDF 1.4, the element itself contains the name.
         name = source.text(script, "name") or script.text.strip()
     known = named_material(name) if name else Material()
     if known is None and script is not None:
@@ -128,7 +128,7 @@ def _map(element: Element, source: Source) -> str:
 
 
 def _script_material(name: str, script: Element, source: Source) -> Material | None:
-    """Return a material that is defined in the files or folders of ``<uri>``s, or None."""
+    """Return a material defined in the files or folders of the ``<uri>`` elements, or None."""
     paths = [path for uri in script.all("uri") if (path := source.find(uri.text))]
     for path in paths:
         for file in _scripts(path):
@@ -163,7 +163,7 @@ def _text(file: str) -> str:
 
 
 def _find_block(text: str, name: str) -> str | None:
-    """Return the text between the braces of a material's definition, or None if it is not in the text."""
+    """Return the text between the braces of a material's definition, or None if the definition is missing."""
     for match in _BLOCK.finditer(text):
         if match.group(1) == name:
             level = 1

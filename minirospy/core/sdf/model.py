@@ -1,8 +1,8 @@
-"""The parts of a simulated world, as frozen records; SDF's and URDF's readers produce the same ones.
+"""The parts of a simulated world, as frozen records that both the SDF and the URDF reader produce.
 
-Lengths are in metres, angles in radians, masses in kilograms, times in seconds. Poses are relative to the parent: a model's
-to the world, a link's to its model, a joint's to its child link, the others to their link. Nested models are flattened:
-their links and joints are named ``nested::link``. Source: http://sdformat.org/spec.
+Lengths are in metres, angles in radians, masses in kilograms, times in seconds. Poses are relative to the parent: a model's pose
+to the world, a link's to its model, a joint's to its child link, all others to their link. Nested models are flattened, with
+their links and joints named ``nested::link``. Source: http://sdformat.org/spec.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ __all__ = [
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
-Color = tuple[float, float, float, float]  # red, green, blue, opacity, from 0 to 1
+Color = tuple[float, float, float, float]  # red, green, blue, opacity, each from 0 to 1
 
 
 class Pose(NamedTuple):
@@ -58,7 +58,7 @@ class Pose(NamedTuple):
 
 
 IDENTITY = Pose()
-MIN_STEP = 1e-9  # s; the time is counted in nanoseconds
+MIN_STEP = 1e-9  # s; time is counted in nanoseconds
 
 
 class Box(NamedTuple):
@@ -81,14 +81,14 @@ class Sphere(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """A plane through the origin. ``size`` is that of the visible part; collisions of the ground are infinite."""
+    """A plane through the origin. ``size``: the visible part; a ground's collisions are infinite."""
 
     normal: Vector = (0.0, 0.0, 1.0)
     size: tuple[float, float] = (1.0, 1.0)
 
 
 class MeshShape(NamedTuple):
-    """A mesh: the path of a file that exists, and the sub-mesh, or an empty string for all of it."""
+    """A mesh: the path of an existing file, and the name of the sub-mesh (empty: the whole mesh)."""
 
     path: str
     scale: Vector = (1.0, 1.0, 1.0)
@@ -97,7 +97,7 @@ class MeshShape(NamedTuple):
 
 
 class Heightmap(NamedTuple):
-    """A terrain: a grey picture of (2^n + 1) pixels squared, its size, and the position of its centre."""
+    """A terrain: a square grey picture with 2^n + 1 pixels per side, the terrain's size, and the position of its centre."""
 
     path: str
     size: Vector = (1.0, 1.0, 1.0)
@@ -115,7 +115,7 @@ Geometry = Box | Cylinder | Sphere | Plane | MeshShape | Heightmap | Polyline
 
 
 class Material(NamedTuple):
-    """The look of a visual. ``script``: the name of a material such as ``Gazebo/Grey``, which ``color`` has resolved."""
+    """The appearance of a visual. ``script``: the material's name, such as ``Gazebo/Grey``, whose colour is in ``color``."""
 
     color: Color | None = None
     script: str = ""
@@ -124,7 +124,7 @@ class Material(NamedTuple):
 
 
 class Surface(NamedTuple):
-    """Friction and contact parameters with ODE's defaults."""
+    """Friction and contact parameters. The defaults are ODE's."""
 
     mu: float = 1.0
     mu2: float = 1.0
@@ -162,7 +162,7 @@ class Visual:
 
 
 class Inertial(NamedTuple):
-    """A link's mass, the pose of its centre, and its inertia there: ixx, ixy, ixz, iyy, iyz, izz."""
+    """A link's mass, the pose of its centre of mass, and its inertia there: ixx, ixy, ixz, iyy, iyz, izz."""
 
     mass: float = 1.0
     pose: Pose = IDENTITY
@@ -174,7 +174,7 @@ _INERTIAL = Inertial()
 
 @dataclass(frozen=True)
 class Plugin:
-    """A plugin: the library's file name without ``lib`` and ``.so``, and its element with the parameters."""
+    """A plugin: the library's file name without ``lib`` and ``.so``, and the element with its parameters."""
 
     name: str
     library: str
@@ -183,7 +183,7 @@ class Plugin:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor: its kind is SDF's (``ray``, ``gpu_ray``, ``camera``, ``depth``, ``imu``, ``contact``, ...)."""
+    """A sensor; its kind has SDF's name (``ray``, ``gpu_ray``, ``camera``, ``depth``, ``imu``, ``contact``, ...)."""
 
     name: str
     kind: str
@@ -227,7 +227,7 @@ class Link:
 
 
 class Axis(NamedTuple):
-    """An axis of a joint in the joint's frame, with its limits (infinite: none) and passive forces."""
+    """A joint's axis in the joint's frame, with its limits (infinite: no limit) and passive forces."""
 
     xyz: Vector = (0.0, 0.0, 1.0)
     lower: float = float("-inf")
@@ -245,7 +245,7 @@ _AXIS = Axis()
 
 
 class Mimic(NamedTuple):
-    """Makes a joint follow another: its position is ``multiplier * position of joint + offset``."""
+    """Makes a joint follow another one: its position is ``multiplier * position of joint + offset``."""
 
     joint: str
     multiplier: float = 1.0
@@ -256,7 +256,7 @@ class Mimic(NamedTuple):
 class Joint:
     """A joint: ``revolute``, ``continuous``, ``prismatic``, ``fixed``, ``ball`` or ``universal``.
 
-    If ``parent`` is ``world``, the joint fixes or guides the child in the world.
+    If ``parent`` is ``world``, the joint attaches the child to the world.
     """
 
     name: str
@@ -272,10 +272,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Model:
-    """A model: links and joints by name, in the order of the file.
+    """A model: links and joints by name, in file order.
 
-    ``lumped``: for each link that was merged into another one, the name of that link, and its pose there, so that plugins
-    can find it. ``warnings``: one line for each part that was dropped or changed.
+    ``lumped``: for each link that was merged into another one, the other link's name and the merged link's pose in it, so that
+    plugins can find it. ``warnings``: one line for each part that was dropped or changed.
     """
 
     name: str
@@ -290,11 +290,11 @@ class Model:
 
 
 class Physics(NamedTuple):
-    """The engine's parameters with Gazebo's defaults."""
+    """The engine's parameters. The defaults are Gazebo's."""
 
     step: float = 0.001
     real_time_factor: float = 1.0
-    update_rate: float = 1000.0  # Hz; 0: as fast as it goes
+    update_rate: float = 1000.0  # Hz; 0: as fast as possible
     gravity: Vector = (0.0, 0.0, -9.8)
     iterations: int = 50
     sor: float = 1.3
@@ -306,7 +306,7 @@ _PHYSICS = Physics()
 
 @dataclass(frozen=True)
 class World:
-    """A world: its models and lights, in the order of the file."""
+    """A world: its models and lights, in file order."""
 
     name: str = "default"
     models: tuple[Model, ...] = ()
@@ -315,5 +315,5 @@ class World:
     plugins: tuple[Plugin, ...] = ()
     ambient: Color = (0.4, 0.4, 0.4, 1.0)
     background: Color = (0.7, 0.7, 0.7, 1.0)
-    camera: Pose | None = None  # the window's
+    camera: Pose | None = None  # the pose of the window's camera
     warnings: tuple[str, ...] = ()

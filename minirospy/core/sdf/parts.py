@@ -1,4 +1,4 @@
-"""Read the parts of a model that are not shapes: inertials, sensors, plugins, lights, axes."""
+"""Read the parts of a model other than shapes: inertials, sensors, plugins, lights, axes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SUFFIXES = (".so", ".dylib", ".dll")
 
 
 def read_plugin(element: Element, source: Source) -> Plugin | None:
-    """Read ``<plugin>``. Return None with a warning if it names no library."""
+    """Read ``<plugin>``. Return None, with a warning, if it does not name a library."""
     name = element.attributes.get("name", "").strip()
     library = element.attributes.get("filename", "").strip().replace("\\", "/").rpartition("/")[2]
     for suffix in _SUFFIXES:
@@ -56,7 +56,7 @@ def read_plugins(element: Element, source: Source) -> tuple[Plugin, ...]:
 
 
 def read_sensor(element: Element, pose: Pose, source: Source) -> Sensor | None:
-    """Read ``<sensor>``. Return None with a warning if it has no type."""
+    """Read ``<sensor>``. Return None, with a warning, if it has no type."""
     name, kind = source.name(element), element.attributes.get("type", "").strip()
     if not kind:
         source.warn(element, f"sensor [{name}] has no type and is left out")
@@ -89,7 +89,7 @@ def read_light(element: Element, pose: Pose, source: Source) -> Light:
 
 
 def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseReader) -> Inertial:
-    """Read a link's ``<inertial>``; a mass that is not possible adds a warning, and SDF's default is used."""
+    """Read a link's ``<inertial>``. If the mass is impossible, add a warning and use SDF's default."""
     element = link.first("inertial")
     if element is None:
         return Inertial()
@@ -107,7 +107,7 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
     try:
         xx, xy, xz, yy, yz, zz = (source.number(part, key, default) for key, default in keys.items())
     except SdfError as error:
-        # Gazebo's editor of buildings writes NaN.
+        # Gazebo's building editor writes NaN.
         source.warn(part, f"link [{name}] gets the inertia of SDF's default: {error.text}")
         xx, xy, xz, yy, yz, zz = keys.values()
     inertia = (xx, xy, xz, yy, yz, zz)
@@ -117,7 +117,7 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
 
 
 def read_axis(element: Element | None, source: Source, turned: Callable[[Element, Vector], Vector]) -> Axis:
-    """Read ``<axis>`` or ``<axis2>``. ``turned`` returns a vector that ``<xyz>`` gives in the joint's frame."""
+    """Read ``<axis>`` or ``<axis2>``. ``turned`` converts the vector in ``<xyz>`` to the joint's frame."""
     if element is None:
         return Axis()
     xyz = element.first("xyz")
@@ -153,7 +153,7 @@ def read_axis(element: Element | None, source: Source, turned: Callable[[Element
 
 
 def read_mimic(axis: Element | None, source: Source) -> Mimic | None:
-    """Read an axis's ``<mimic joint="...">``, which SDF 1.11 has, and the reader of URDF writes."""
+    """Read an axis's ``<mimic joint="...">``, which SDF 1.11 defines and the URDF reader writes."""
     element = axis.first("mimic") if axis is not None else None
     if element is None:
         return None

@@ -1,4 +1,4 @@
-"""Arithmetic of poses, vectors and quaternions (x, y, z, w) of length 1, in plain floats."""
+"""Arithmetic with poses, vectors and unit quaternions (x, y, z, w), in plain floats."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = [
 
 
 def pose_from_rpy(xyz: Vector, rpy: Vector) -> Pose:
-    """Return the pose with a rotation about the fixed axes x, y and z, in this order."""
+    """Return the pose with rotations about the fixed axes x, y and z, in this order."""
     if not any(rpy):
         return Pose(xyz)
     return Pose(xyz, quaternion_from_rpy(*rpy))
@@ -39,7 +39,7 @@ def rotate_back(rotation: Quaternion, vector: Vector) -> Vector:
 
 
 def normalized(rotation: Quaternion) -> Quaternion:
-    """Return the quaternion of length 1, or the identity if the length is zero or not finite."""
+    """Return the normalized quaternion, or the identity if the length is zero or not finite."""
     length = math.sqrt(sum(each * each for each in rotation))
     if not 1e-12 < length < math.inf:
         return 0.0, 0.0, 0.0, 1.0
@@ -65,7 +65,7 @@ def cross(left: Vector, right: Vector) -> Vector:
 
 
 def unit(vector: Vector) -> Vector | None:
-    """Return a vector's direction with length 1, or None if it has none."""
+    """Return the unit vector in a vector's direction, or None if it has no direction."""
     length = math.sqrt(sum(value * value for value in vector))
     if not 0.0 < length < math.inf:
         return None
@@ -74,14 +74,14 @@ def unit(vector: Vector) -> Vector | None:
 
 
 def transform(pose: Pose, point: Vector) -> Vector:
-    """Return a point of the pose's frame in the parent's frame."""
+    """Return a point, given in the pose's frame, in the parent's frame."""
     x, y, z = rotate(pose.orientation, point)
     px, py, pz = pose.position
     return px + x, py + y, pz + z
 
 
 def compose(parent: Pose, child: Pose) -> Pose:
-    """Return the pose of ``child``, which is relative to ``parent``, in the frame of ``parent``'s parent."""
+    """Return the pose of ``child``, which is relative to ``parent``, in the frame to which ``parent`` is relative."""
     return Pose(
         transform(parent, child.position), normalized(multiply(parent.orientation, child.orientation))
     )

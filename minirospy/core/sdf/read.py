@@ -1,6 +1,6 @@
 """Read worlds and models from text: SDF 1.4 to 1.7, and robot descriptions (URDF) with ``<gazebo>`` tags.
 
-URIs are resolved by a function that the caller passes. What cannot be used is left out, and one line in ``warnings`` names it.
+A function passed by the caller resolves URIs. Unusable parts are skipped, with one line each in ``warnings``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _OLDEST = (1, 4)
 def parse_urdf(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "robot_description", name: str = ""
 ) -> Model:
-    """Return the model of a robot description; ``name`` replaces the robot's. Raise SdfError if it cannot be used."""
+    """Return the model of a robot description; ``name`` replaces the robot's. Raise SdfError if it is unusable."""
     source = new_source(file, resolve)
     return read_urdf(parse_document(text, file, source.warnings), source, name)
 
@@ -33,7 +33,7 @@ def parse_urdf(
 def parse_model(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "model", name: str = ""
 ) -> Model:
-    """Return the first model in SDF or URDF text; ``name`` replaces its own. Raise SdfError if there is none that can be used."""
+    """Return the first model in SDF or URDF text; ``name`` replaces its own. Raise SdfError if none is usable."""
     source = new_source(file, resolve)
     root = parse_document(text, file, source.warnings)
     if root.tag == "robot":
@@ -55,10 +55,10 @@ def parse_model(
 def parse_world(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "world", max_parts: int = MAX_PARTS
 ) -> World:
-    """Return the first world in SDF text, or a world of its models and lights if it has none.
+    """Return the first world in SDF text or, if it has none, a world with its models and lights.
 
-    Models that cannot be used, or that exceed ``max_parts`` links, joints and models, are left out, and named in
-    ``warnings``. Raise SdfError if the text is not SDF.
+    Models that are unusable, or exceed ``max_parts`` links, joints and models, are skipped, and named in ``warnings``. Raise
+    SdfError if the text is not SDF.
     """
     source = new_source(file, resolve, max_parts)
     root = parse_document(text, file, source.warnings)
@@ -69,7 +69,7 @@ def parse_world(
 
 
 def new_source(file: str, resolve: Resolve, max_parts: int = MAX_PARTS) -> Source:
-    """Return the source of a document. If ``file`` is the path of a file, relative URIs are below its folder."""
+    """Return the source of a document. If ``file`` is a path, relative URIs are resolved below its folder."""
     is_file = os.path.isabs(file) and os.path.isfile(file)
     path = os.path.realpath(file) if is_file else ""
     return Source(

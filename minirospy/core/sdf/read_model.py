@@ -1,4 +1,4 @@
-"""Read ``<model>`` elements of SDF 1.4 to 1.7. Models inside a model are flattened: their parts are named ``nested::part``."""
+"""Read ``<model>`` elements of SDF 1.4 to 1.7. Nested models are flattened: their parts are named ``nested::part``."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ _NOT_BUILT = ("projector", "audio_source", "particle_emitter")
 
 
 def read_model(element: Element, source: Source, name: str = "", is_static: bool | None = None) -> Model:
-    """Read a model. ``name`` and ``is_static`` replace its own, if given.
+    """Read a model. ``name`` and ``is_static`` replace the model's own values if given.
 
-    Its pose must not be relative to a frame. Raise SdfError if the model cannot be used.
+    Its pose must not be relative to a frame. Raise SdfError if the model is unusable.
     """
     source = replace(source, warnings=[])
     reader = _Reader(element, source, name or source.name(element), is_static)
@@ -61,9 +61,9 @@ def read_model(element: Element, source: Source, name: str = "", is_static: bool
 
 
 def read_included_model(included: Included, source: Source) -> Model:
-    """Read a model that ``<include>`` names, with the name, pose, static flag and plugins of the element.
+    """Read a model referred to by ``<include>``, with the element's name, pose, static flag and plugins.
 
-    Raise SdfError if the model cannot be used.
+    Raise SdfError if the model is unusable.
     """
     model = read_model(included.entity, included.source, included.name, included.is_static)
     return replace(
@@ -75,7 +75,7 @@ def read_included_model(included: Included, source: Source) -> Model:
 
 @dataclass
 class _Nested:
-    """A model inside the model: its own name, its pose element, its parts."""
+    """A nested model: its own name, its pose element and its parts."""
 
     name: str
     pose: Element | None
@@ -85,10 +85,10 @@ class _Nested:
 
 @dataclass
 class _Reader:
-    """The state while one model is read.
+    """The state while reading one model.
 
-    element, source, name, static: of the model. links, joints: elements by name. nested: by name.
-    frames: of all of them. attached: for each ``<frame>``, the frame or link to which it is attached.
+    element, source, name, static: those of the model. links, joints: elements by name. nested: models by name. frames: the frames
+    of all of these. attached: for each ``<frame>``, the frame or link to which it is attached.
     """
 
     element: Element
@@ -108,7 +108,7 @@ class _Reader:
         self._collect()
         frames: dict[str, Frame] = {}
         for name, frame in self._all_frames():
-            frames.setdefault(name, frame)  # if a link and a joint have the same name, it means the link
+            frames.setdefault(name, frame)  # if a link and a joint share a name, it refers to the link
         self.frames = Frames(frames)
         self_collide = source.flag(element, "self_collide", False)
 
@@ -134,9 +134,9 @@ class _Reader:
     # ---- what there is
 
     def _own_static(self) -> bool | None:
-        """Return the first ``<static>`` of the model and of those that it includes, or None if there is none.
+        """Return the first ``<static>`` of the model and the models that it includes, or None if there is none.
 
-        sdformat moves the children of an included model into the model, also ``<static>``.
+        sdformat moves the children of an included model, including ``<static>``, into the including model.
         """
         for child in self.element.children:
             if child.tag == "static":
@@ -152,7 +152,7 @@ class _Reader:
         return None
 
     def _find_include(self, child: Element) -> Included | None:
-        """Return the model that an ``<include>`` names, or None if there is none."""
+        """Return the model that an ``<include>`` refers to, or None if there is none."""
         uri = self.source.text(child, "uri")
         if uri and self.source.find(uri) is None:
             return None
@@ -232,13 +232,13 @@ class _Reader:
         return Frame(*self._placed(part.first("pose"), default))
 
     def _placed(self, pose: Element | None, default: str) -> tuple[str, Pose]:
-        """Return the frame that a pose element refers to, and the pose."""
+        """Return the frame that a pose element refers to, and its pose."""
         if pose is None:
             return default, IDENTITY
         return self._reference(pose) or default, self.source.pose(pose)
 
     def _reference(self, pose: Element) -> str:
-        """Return the name of the frame in a pose's attributes. In SDF 1.5 and 1.6 an unknown one has no effect."""
+        """Return the frame name in a pose's attributes. In SDF 1.5 and 1.6, an unknown frame has no effect."""
         name = pose.attributes.get("relative_to", "").strip()
         if name:
             return MODEL if name == _WORLD else name
@@ -327,7 +327,7 @@ class _Reader:
         initial = source.number(element, "initial_joint_position", axis.initial_position)
         axis = axis._replace(initial_position=initial)
         if child == _WORLD:
-            # MuJoCo and Gazebo move the child. The world is the parent, and the axis points the other way.
+            # MuJoCo and Gazebo move the child. Make the world the parent, and reverse the axis.
             parent, child = child, parent
             axis, axis2 = (each._replace(xyz=_negative(each.xyz)) for each in (axis, axis2))
         pose = relative(links[child].pose, here)
@@ -344,7 +344,7 @@ class _Reader:
         return _KINDS.get(text)
 
     def _link_of(self, name: str) -> str:
-        """Return the link that a name in a joint means: a link, or the link to which a frame is attached."""
+        """Return the link that a name in a joint refers to: a link, or the link to which the frame of this name is attached."""
         for _ in range(len(self.attached) + 1):
             if name not in self.attached or name in self.links:
                 break
@@ -352,7 +352,7 @@ class _Reader:
         return name
 
     def _turner(self, joint: Pose, element: Element) -> Callable[[Element, Vector], Vector]:
-        """Return a function that turns an axis into the joint's frame. Before SDF 1.5 axes are given in the model's frame."""
+        """Return a function that converts an axis to the joint's frame. Before SDF 1.5, axes are in the model's frame."""
 
         def turned(axis: Element, xyz: Vector) -> Vector:
             part = axis.first("xyz")
@@ -368,7 +368,7 @@ class _Reader:
 
 
 def _joint_key(name: str) -> str:
-    """Return the key of a joint's frame; no name contains a newline."""
+    """Return the key of a joint's frame, which contains a newline, as no name does."""
     return f"joint\n{name}"
 
 

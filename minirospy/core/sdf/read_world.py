@@ -1,4 +1,4 @@
-"""Read ``<world>`` elements of SDF 1.4 to 1.7. A model that cannot be used is left out, and the rest of the world is read."""
+"""Read ``<world>`` elements of SDF 1.4 to 1.7. Skip unusable models, and read the rest of the world."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NOT_SIMULATED = ("actor", "population", "road", "joint", "gripper")
 
 
 def read_world(element: Element, source: Source) -> World:
-    """Read a ``<world>``, or an ``<sdf>`` that contains models and lights only."""
+    """Read a ``<world>``, or an ``<sdf>`` that contains only models and lights."""
     reader = _Reader(source)
     for child in element.children:
         reader.read(child)
@@ -50,7 +50,7 @@ def read_world(element: Element, source: Source) -> World:
 
 
 def read_physics(element: Element | None, source: Source) -> Physics:
-    """Read ``<physics>``; without one the values are Gazebo's defaults."""
+    """Read ``<physics>``. Without it, use Gazebo's defaults."""
     ode = element.first("ode") if element is not None else None
     solver = ode.first("solver") if ode is not None else None
     step = source.number(element, "max_step_size", _PHYSICS.step)
@@ -70,7 +70,7 @@ def read_physics(element: Element | None, source: Source) -> Physics:
 
 @dataclass
 class _Reader:
-    """The parts of one world that have been read."""
+    """The parts of one world that have been read so far."""
 
     source: Source
     models: list[Model] = field(default_factory=list)
@@ -79,13 +79,13 @@ class _Reader:
     names: set[str] = field(default_factory=set)
     numbers: dict[str, Iterator[int]] = field(
         default_factory=dict
-    )  # the next ones for names that exist already
+    )  # next numbers to append to names already in use
     ambient: Color = World.ambient
     background: Color = World.background
     camera: Pose | None = None
 
     def read(self, child: Element) -> None:
-        """Read one child of the world."""
+        """Read one child element of the world."""
         reader: Callable[[Element], None] | None = {
             "model": self._model,
             "include": self._include,
@@ -107,21 +107,21 @@ class _Reader:
             self.source.warnings.append(f"{_title(child)} is left out: {error}")
 
     def physics(self, world: Element) -> Physics:
-        """Return the engine's parameters: those of the default ``<physics>``, else the first."""
+        """Return the engine's parameters: the default ``<physics>``, else the first one."""
         profiles = list(world.all("physics"))
         chosen = next(
             (each for each in profiles if each.attributes.get("default", "") in ("1", "true")), None
         )
         try:
             physics = read_physics(chosen or (profiles[0] if profiles else None), self.source)
-            # Since SDF 1.6 gravity is the world's.
+            # Since SDF 1.6, gravity belongs to the world.
             return physics._replace(gravity=self.source.vector(world, "gravity", physics.gravity))
         except SdfError as error:
             self.source.warnings.append(f"physics has its default values: {error}")
             return _PHYSICS
 
     def apply(self, state: Element) -> None:
-        """Move models and lights to the poses in ``<state>``, and remove deleted ones."""
+        """Move models and lights to their poses in ``<state>``, and remove deleted ones."""
         poses = {
             kind: {part.attributes.get("name", ""): part for part in state.all(kind)}
             for kind in ("model", "light")

@@ -27,12 +27,12 @@ from minirospy.core.sdf.text import Element
 __all__ = ["read_collision", "read_geometry", "read_surface", "read_visual"]
 
 _SURFACE = Surface()
-_MIN_SIDE = 1e-4  # m; a box without thickness, as a picture on a wall has it
-_MAX_POINTS = 10_000  # of a polyline
+_MIN_SIDE = 1e-4  # m; the minimum side of a box: a picture on a wall may have a side of length 0
+_MAX_POINTS = 10_000  # per polyline
 
 
 def read_visual(element: Element, pose: Pose, source: Source) -> Visual | None:
-    """Read ``<visual>``. Return None if its shape cannot be shown, which adds a warning."""
+    """Read ``<visual>``. Return None, with a warning, if its shape cannot be shown."""
     geometry = read_geometry(element, source)
     if geometry is None:
         return None
@@ -43,7 +43,7 @@ def read_visual(element: Element, pose: Pose, source: Source) -> Visual | None:
 
 
 def read_collision(element: Element, pose: Pose, source: Source) -> Collision | None:
-    """Read ``<collision>``. Return None if it has no shape, which adds a warning."""
+    """Read ``<collision>``. Return None, with a warning, if it has no shape."""
     geometry = read_geometry(element, source)
     if geometry is None:
         return None
@@ -52,7 +52,7 @@ def read_collision(element: Element, pose: Pose, source: Source) -> Collision | 
 
 
 def read_surface(element: Element | None, source: Source) -> Surface:
-    """Read ``<surface>``; without one the values are ODE's defaults."""
+    """Read ``<surface>``. Without it, use ODE's defaults."""
     if element is None:
         return _SURFACE
     friction, contact = _ode(element, "friction"), _ode(element, "contact")
@@ -69,7 +69,7 @@ def read_surface(element: Element | None, source: Source) -> Surface:
 
 
 def read_geometry(owner: Element, source: Source) -> Geometry | None:
-    """Return the shape of a visual or a collision, or None with a warning if it is missing, unknown or has no file."""
+    """Return the shape of a visual or a collision. Return None, with a warning, if it is missing, unknown or has no file."""
     name = f"{owner.tag} [{owner.attributes.get('name', '')}]"
     geometry = owner.first("geometry")
     shapes = geometry.children if geometry is not None else []
@@ -90,7 +90,7 @@ def read_geometry(owner: Element, source: Source) -> Geometry | None:
 
 
 class _LeftOutError(ValueError):
-    """The shape cannot be used, but its model can."""
+    """Raised if a shape is unusable but its model is not."""
 
 
 def _read_box(element: Element, source: Source) -> Box:

@@ -1,4 +1,4 @@
-"""A file that is being read: typed values of its elements, the files that its URIs name, and one line per part left out."""
+"""A file that is being read: typed values of its elements, files that its URIs refer to, and warnings about skipped parts."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from minirospy.core.sdf.text import Element, parse_document
 __all__ = ["MAX_PARTS", "Resolve", "Shared", "Source", "no_files"]
 
 Resolve = Callable[[str], "str | None"]
-"""Return the path of the existing file or folder that a URI or a path names, or None.
+"""Returns the path of the existing file or folder that a URI or path refers to, or None.
 
-URIs begin with ``model://``, ``package://`` or ``file://``.
+URIs start with ``model://``, ``package://`` or ``file://``.
 """
 
-MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
-MAX_INCLUDES = 16  # files and models inside each other; deeper ones are a mistake or an attack
-MAX_WARNINGS = 200  # lines about one model or world; nobody reads more
-MAX_PARTS = 20_000  # links, joints and models that one world or spawn request may have
-_INFINITE = 1e16  # sdformat writes infinite limits as this number; larger ones overflow in the simulation
+MAX_FILE_BYTES = 64 * 1024 * 1024  # bytes; the largest worlds of Gazebo's users have 10 MB
+MAX_INCLUDES = 16  # nesting depth of files and models; a greater depth is a mistake or an attack
+MAX_WARNINGS = 200  # lines per model or world; nobody reads more
+MAX_PARTS = 20_000  # links, joints and models per world or spawn request
+_INFINITE = 1e16  # sdformat writes infinite limits as this number; larger numbers overflow in the simulation
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no", "")
 
 
 def no_files(uri: str) -> str | None:
-    """Return the path if ``uri`` is an absolute path that exists: a resolver without any search path."""
+    """Return ``uri`` if it is an absolute path that exists. A resolver without search paths."""
     path = uri.removeprefix("file://")
     return path if os.path.isabs(path) and os.path.exists(path) else None
 
 
 @dataclass
 class Shared:
-    """The data that all files of one reading share: documents and found paths by name, the number of parts so far."""
+    """Data shared by all files of one reading: documents and found paths by name, and the number of parts so far."""
 
     documents: dict[str, Element] = field(default_factory=dict)
     found: dict[str, str | None] = field(default_factory=dict)
@@ -54,8 +54,8 @@ class Shared:
 class Source:
     """A file and its context.
 
-    file: its name in messages. folder: its folder, for relative URIs, or an empty string.
-    version: of its SDF. chain: the paths of the files that include it, itself last. depth: the models around its elements.
+    file: its name in messages. folder: the base of relative URIs, or an empty string. version: its SDF version. chain: the paths
+    of the including files, ending with its own. depth: the number of enclosing models.
     """
 
     file: str
@@ -68,7 +68,7 @@ class Source:
     depth: int = 0
 
     def warn(self, element: Element | None, text: str) -> None:
-        """Add a line about a part that is left out or changed. Repeated lines are added once, and there is a limit."""
+        """Add a line about a part that is skipped or changed. Repeated lines are added once, up to a limit."""
         line = f"{self.file}:{element.line}: {text}" if element and element.line else f"{self.file}: {text}"
         if len(self.warnings) > MAX_WARNINGS or line in self.warnings:
             return
@@ -77,16 +77,16 @@ class Source:
         self.warnings.append(line)
 
     def missing(self, uri: str) -> str:
-        """Return the text that a file does not exist, with advice if there is any."""
+        """Return the message for a missing file, with advice if there is any."""
         hint = " (add its folder to GAZEBO_MODEL_PATH)" if uri.startswith("model://") else ""
         return f"{uri} does not exist{hint}"
 
     def error(self, element: Element, text: str) -> SdfError:
-        """Return the error for an element that cannot be read."""
+        """Return the error for an unreadable element."""
         return SdfError(self.file, element.line, text)
 
     def count(self, element: Element, parts: int = 1) -> None:
-        """Count links, joints and models. Raise SdfError if there are too many."""
+        """Count links, joints and models. Raise SdfError if the total is too large."""
         self.shared.parts += parts
         if self.shared.is_full:
             raise self.error(element, f"there are more than {self.shared.max_parts} links, joints and models")
@@ -94,7 +94,7 @@ class Source:
     # ---- other files
 
     def find(self, uri: str) -> str | None:
-        """Return the path of the existing file or folder that a URI names, or None. Relative ones: below this file's folder."""
+        """Return the path of the existing file or folder that a URI names, or None. Relative URIs start at this file's folder."""
         uri = uri.strip()
         if not uri:
             return None
@@ -107,9 +107,9 @@ class Source:
         return self.shared.found[uri]
 
     def open(self, element: Element, path: str) -> tuple[Element, Source]:
-        """Return the root element of a file that this one includes, and its source.
+        """Return the root element of an included file, and its source.
 
-        Raise SdfError if it cannot be read, is not XML, or includes itself.
+        Raise SdfError if the file is unreadable, is not XML, or includes itself.
         """
         path = os.path.realpath(path)
         if path in self.chain:
@@ -125,7 +125,7 @@ class Source:
         return self.shared.documents[path], inner
 
     def inside(self, element: Element) -> Source:
-        """Return the source of a model inside another one. Raise SdfError if there are too many levels."""
+        """Return the source of a nested model. Raise SdfError if the nesting is too deep."""
         if self.depth >= MAX_INCLUDES:
             raise self.error(element, f"models are nested more than {MAX_INCLUDES} levels deep")
         return replace(self, depth=self.depth + 1)
@@ -145,7 +145,7 @@ class Source:
         return child.text.strip() if child is not None else default
 
     def flag(self, element: Element | None, tag: str, default: bool) -> bool:
-        """Return a Boolean child's value."""
+        """Return the value of a Boolean child."""
         child = element.first(tag) if element else None
         if child is None:
             return default
@@ -161,7 +161,7 @@ class Source:
         return (self.numbers if infinite else self.finite)(child, (1,))[0]
 
     def amount(self, element: Element | None, tag: str, default: float, *, infinite: bool = False) -> float:
-        """Return a child's number; a negative one is 0, which adds a warning. Raise SdfError as :meth:`number` does."""
+        """Return a child's number. If it is negative, add a warning and return 0. Raise SdfError as :meth:`number` does."""
         value = self.number(element, tag, default, infinite=infinite)
         if value < 0.0:
             self.warn(element, f"<{tag}> is {value:g}: it is 0 instead")
@@ -207,9 +207,9 @@ class Source:
         return values
 
     def numbers(self, element: Element, counts: tuple[int, ...]) -> list[float]:
-        """Return an element's numbers; huge ones are infinite.
+        """Return an element's numbers; very large ones become infinite.
 
-        Raise SdfError if one is not a number (or NaN), or if there are too few or too many.
+        Raise SdfError if a value is not a number or is NaN, or if there are too few or too many values.
         """
         values = []
         for part in element.text.split():

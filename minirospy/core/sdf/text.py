@@ -1,4 +1,4 @@
-"""Parse the XML of worlds and robots into elements, as leniently as Gazebo's parser (TinyXML) does, and write elements again."""
+"""Parse the XML of worlds and robots into elements, as leniently as Gazebo's parser (TinyXML), and write elements."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["Element", "copy_of", "new_element", "parse_document"]
 
 
 def parse_document(text: str | bytes, file: str, warnings: list[str] | None = None) -> Element:
-    """Parse a document and return its root. ``file`` is its name in errors. Raise SdfError if the text is not accepted.
+    """Parse a document and return its root. ``file`` is its name in errors. Raise SdfError if the text is rejected.
 
-    A line for each kind of fault in the XML that was passed over is added to ``warnings``.
+    For each kind of XML fault that is tolerated, a line is added to ``warnings``.
     """
     if not text.strip():
         raise SdfError(file, 0, "the file is empty")
@@ -31,11 +31,11 @@ def parse_document(text: str | bytes, file: str, warnings: list[str] | None = No
 def new_element(
     tag: str, text: str = "", *children: Element, line: int = 0, attributes: dict[str, str] | None = None
 ) -> Element:
-    """Return an element that no file contains."""
+    """Return an element that does not come from a file."""
     return Element(tag, dict(attributes or {}), line, list(children), text)
 
 
 def copy_of(element: Element) -> Element:
-    """Return a copy of an element with copies of its children."""
+    """Return a deep copy of an element."""
     children = [copy_of(child) for child in element.children]
     return Element(element.tag, dict(element.attributes), element.line, children, element.text)

@@ -1,4 +1,4 @@
-"""Turn a robot description (URDF) with ``<gazebo>`` tags into an SDF model, by the rules of sdformat's reader.
+"""Convert a robot description (URDF) with ``<gazebo>`` tags to an SDF model, by the rules of sdformat's reader.
 
 - A link that a fixed joint attaches is merged into its parent: masses add, and its parts move along. ``preserveFixedJoint`` keeps
   the joint, ``disableFixedJointLumping`` makes a revolute one with the limits 0 and 0.
@@ -43,7 +43,7 @@ __all__ = ["read_urdf"]
 
 _WORLD = "world"
 _LUMP = "_fixed_joint_lump__"
-_MIN_MASS = 1e-6  # kg; sdformat takes a smaller mass for 0
+_MIN_MASS = 1e-6  # kg; sdformat treats a smaller mass as 0
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no")
 
@@ -60,7 +60,7 @@ _MOVED = ("sensor", "light", "projector")
 
 
 def read_urdf(root: Element, source: Source, name: str = "") -> Model:
-    """Return the model of a robot description. Raise SdfError if the description cannot be used."""
+    """Return the model of a robot description. Raise SdfError if the description is unusable."""
     try:
         robot = robot_from_element(root, source.file)
     except UrdfError as error:
@@ -80,7 +80,7 @@ def read_urdf(root: Element, source: Source, name: str = "") -> Model:
 
 @dataclass
 class _Body:
-    """A link of the model: its own parts and those of links that are merged into it, each with that link's name and pose."""
+    """A link of the model: its own parts and those of the links merged into it, each with that link's name and pose."""
 
     link: Link
     inertial: Inertial | None
@@ -90,7 +90,7 @@ class _Body:
 
 
 class _Converter:
-    """Converts one robot. ``lumped``: for each merged link, the name of the link that it is part of, and its pose there."""
+    """Converts one robot. ``lumped``: for each merged link, the name of the link that contains it, and its pose there."""
 
     def __init__(self, robot: Robot, root: Element, source: Source) -> None:
         self.lumped: dict[str, tuple[str, Pose]] = {}
@@ -103,10 +103,10 @@ class _Converter:
         self._kept = self._flagged("preserveFixedJoint")
         self._revolute = self._flagged("disableFixedJointLumping") - self._kept
         self._bodies: dict[str, _Body] = {}
-        self._names: dict[tuple[str, str], str] = {}  # (link, its collision's name) -> the name in the model
+        self._names: dict[tuple[str, str], str] = {}  # (link, its collision's name) -> that in the model
 
     def convert(self) -> Element:
-        """Return the ``<model>``. Raise SdfError if nothing is left of the robot."""
+        """Return the ``<model>``. Raise SdfError if no part of the robot remains."""
         self._check_references()
         for link in self._tree():
             self._merge(link)
@@ -156,7 +156,7 @@ class _Converter:
         )
 
     def _tree(self) -> Iterator[str]:
-        """Yield the links from the root, each before those below it; children are sorted by their joints' names."""
+        """Yield the links, starting at the root, each before its descendants; siblings are sorted by their joints' names."""
         seen: set[str] = set()
         stack = [self._robot.root]
         while stack:
@@ -181,7 +181,7 @@ class _Converter:
         body.merged.append((name, pose))
 
     def _sum(self, body: _Body) -> None:
-        """Collect the parts of a body's links in sdformat's order: own parts, then those of merged links, the deepest first."""
+        """Collect the parts of a body's links in sdformat's order: its own parts, then those of merged links, deepest first."""
         for name, pose in _deepest_first(body, self._robot):
             link = self._robot.links[name]
             body.visuals += [(name, pose, visual) for visual in link.visuals]
@@ -192,9 +192,9 @@ class _Converter:
                 body.inertial = inertial if body.inertial is None else add_inertials(body.inertial, inertial)
 
     def _with_mass(self) -> list[str]:
-        """Return the names of the links that stay, in the order of the tree, and warn about the others."""
+        """Return the names of the links that remain, in tree order, and warn about the others."""
         kept: list[str] = []
-        lost: dict[str, int] = {}  # the highest link without mass -> links below it
+        lost: dict[str, int] = {}  # topmost massless link -> the links below it
         cause: dict[str, str] = {}
         for name, body in self._bodies.items():
             joint = self._robot.parent_joint(name)
@@ -244,7 +244,7 @@ class _Converter:
                 yield element
 
     def _attachment(self, joint: UrdfJoint) -> tuple[str, Pose]:
-        """Return the link of the model that a joint hangs on (empty: the model itself), and the joint's pose there."""
+        """Return the link of the model to which a joint is attached (empty: the model itself), and the joint's pose there."""
         if joint.parent == _WORLD:
             return "", _pose(joint.origin)
         parent, pose = self.lumped.get(joint.parent, (joint.parent, IDENTITY))
@@ -316,9 +316,9 @@ class _Converter:
         collision.children.append(surface)
 
     def _add_link_extensions(self, link: Element, owner: str, pose: Pose) -> None:
-        """Copy what ``<gazebo reference="owner">`` contains for the link; sensors and lights of merged links move along."""
+        """Copy the link's children from ``<gazebo reference="owner">``. Sensors and lights of merged links are moved along."""
         children = self._extensions.get(owner, [])
-        # As in sdformat, unknown tags come last: <turnGravityOff> wins over <gravity>.
+        # As in sdformat, unknown tags come last, so <turnGravityOff> overrides <gravity>.
         for child in sorted(children, key=lambda child: child.tag not in _LINK_TAGS):
             tag = child.tag
             if tag == "turnGravityOff":
@@ -348,7 +348,7 @@ class _Converter:
         blob.children.append(_pose_element(compose(pose, inner)))
 
     def _rename_collisions(self, sensor: Element, owner: str) -> None:
-        """Let a contact sensor of a merged link refer to its collisions by their new names."""
+        """Update the collision names in a contact sensor of a merged link."""
         contact = sensor.first("contact")
         for collision in contact.all("collision") if contact is not None else ():
             collision.text = self._names.get((owner, collision.text.strip()), collision.text)
@@ -356,7 +356,7 @@ class _Converter:
     # ---- joints
 
     def _joint(self, joint: UrdfJoint) -> Element | None:
-        """Return the ``<joint>``, or None if its type leaves the child free."""
+        """Return the ``<joint>``, or None if the joint's type leaves the child free."""
         kind = self._joint_kind(joint)
         if kind is None:
             what = f"joint [{joint.name}] is {joint.type.value}, which Gazebo does not know: link [{joint.child}] is free"
@@ -419,7 +419,7 @@ class _Converter:
             model.children.append(blob)
 
     def _rename_links(self, joint: Element) -> None:
-        """Let a joint in ``<gazebo>`` refer to the links into which its own were merged. It stays at its child's pose."""
+        """Update the links of a joint in ``<gazebo>`` that were merged into other links. The joint stays at its child's pose."""
         child = joint.first("child")
         for tag in ("parent", "child"):
             part = joint.first(tag)
@@ -435,7 +435,7 @@ _OWN_TAGS = frozenset(("material", "visual", "collision", "static")) | _WITHOUT_
 
 
 def _deepest_first(body: _Body, robot: Robot) -> Iterator[tuple[str, Pose]]:
-    """Yield a body's links in the order in which sdformat adds their parts: a link, then each merged child's whole list."""
+    """Yield a body's links in the order in which sdformat adds their parts: a link, then the whole list of each merged child."""
     poses = dict(body.merged)
     stack = [body.link.name]
     while stack:
@@ -446,7 +446,7 @@ def _deepest_first(body: _Body, robot: Robot) -> Iterator[tuple[str, Pose]]:
 
 
 def _part_name(link: str, name: str, kind: str, index: int) -> str:
-    """Return a part's name as sdformat forms it: ``LINK_collision``, or ``LINK_fixed_joint_lump__OTHER_collision_1``."""
+    """Return a part's name in sdformat's form: ``LINK_collision``, or ``LINK_fixed_joint_lump__OTHER_collision_1``."""
     name = f"{name}_{kind}_{index}" if index else f"{name}_{kind}"
     return name if name.startswith(link) else f"{link}{_LUMP}{name}"
 
@@ -507,12 +507,12 @@ def _numbers(*values: float) -> str:
 
 
 def _value(element: Element) -> str:
-    """Return ``value="..."``, or the text."""
+    """Return the attribute ``value``, or else the text."""
     return element.attributes.get("value", element.text).strip()
 
 
 def _set(parent: Element, tag: str, value: Element) -> None:
-    """Set a child to a ``<gazebo>`` tag's value; the last one wins."""
+    """Set a child to the value of a ``<gazebo>`` tag. If there are several tags, the last one is used."""
     _replace(parent, tag, _value(value), value.line)
 
 
@@ -523,7 +523,7 @@ def _replace(parent: Element, tag: str, text: str, line: int) -> None:
 
 
 def _child(parent: Element, tag: str) -> Element:
-    """Return the first child with this tag; add it if there is none."""
+    """Return the first child with this tag, after adding one if there is none."""
     child = parent.first(tag)
     if child is None:
         child = new_element(tag)

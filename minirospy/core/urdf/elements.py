@@ -1,4 +1,4 @@
-"""Parse XML into elements with line numbers, as leniently as ROS's parser. Other text is refused, and too deep nesting."""
+"""Parse XML into elements with line numbers, as leniently as ROS's parser. Reject all other text, and deep nesting."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def parse_xml(text: str | bytes, file: str) -> Element:
 
 
 def parse_noted(text: str | bytes, file: str) -> Parsed:
-    """Parse as :func:`parse_xml`; return the root, and a note for each kind of fault that was passed over."""
+    """Parse like :func:`parse_xml`; return the root, and a note for each kind of fault that was tolerated."""
     if not text.strip():
         raise UrdfError(file, 0, "Error document empty.")
     try:

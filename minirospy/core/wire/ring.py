@@ -1,7 +1,7 @@
-"""The ring of shared memory that carries large messages between two processes of one machine: its words and its places.
+"""The ring of shared memory that carries large messages between two processes on one machine: its words and its places.
 
-The publisher writes a message into a *place* of the ring, once for all subscribers, and announces it on each subscriber's
-socket. A subscriber copies the message and releases the place. This module decides;
+The publisher writes a message into a *place* of the ring, once for all subscribers, and announces it on each subscriber's socket.
+A subscriber copies the message and releases the place. This module makes the decisions;
 :mod:`minirospy.runtime.transport.shared_memory` owns the memory. Source: docs/shared_memory.md.
 """
 
@@ -44,36 +44,36 @@ __all__ = [
     "prepare",
 ]
 
-# Words in place of a frame's length: they are greater than any frame's length, split or not
+# Words sent in place of a frame's length. They are greater than any frame length, split or not.
 PREPARE_WORD = 0xC0000001  # the publisher wants to offer a ring
-OFFER_WORD = 0xC0000002  # the ring's size follows; its file descriptors come with these bytes
-PLACE_WORD = 0xC0000003  # a message is in the ring: its offset, its size and its trailing array's size follow
+OFFER_WORD = 0xC0000002  # the ring's size follows; the ring's file descriptors are sent with these bytes
+PLACE_WORD = 0xC0000003  # a message's offset, size and trailing array's size follow
 
 # Bytes that a subscriber sends to the publisher
-READY = b"r"  # the answer to PREPARE_WORD: from now on it receives file descriptors
-MAPPED = b"m"  # the answer to OFFER_WORD: it reads places from now on
-REFUSED = b"n"  # the answer to OFFER_WORD: it cannot map the ring
+READY = b"r"  # answer to PREPARE_WORD: the subscriber now receives file descriptors
+MAPPED = b"m"  # answer to OFFER_WORD: the subscriber has mapped the ring and will read from it
+REFUSED = b"n"  # answer to OFFER_WORD: the subscriber cannot map the ring
 
-# Bytes of the shortest message for a ring. Measured: with one subscriber, a ring's bookkeeping costs as much CPU time as it
-# saves at 0.9 MB (VGA), and saves a quarter at 6 MB.
+# The shortest message, in bytes, that is sent through a ring. Measured with one subscriber: at 0.9 MB (VGA), a ring's bookkeeping
+# costs as much CPU time as it saves; at 6 MB, the ring saves a quarter.
 MIN_MESSAGE = 1_000_000
 
-MAX_RING = 64 * 1024 * 1024  # bytes per topic; enough for two images of 4K (25 MB)
-MAX_PLACES = 16  # per ring: more than a few subscribers hold, and few enough to stay in the processor's cache
-MIN_PLACES = 2  # one is written while another is read
-PAGE = 64 * 1024  # bytes; the largest page size of a common Linux machine, so that places share no page
-MAX_MESSAGE = MAX_RING // MIN_PLACES  # bytes of the longest message for a ring
+MAX_RING = 64 * 1024 * 1024  # bytes per topic; enough for two 4K images (25 MB each)
+MAX_PLACES = 16  # per ring; enough for a few subscribers, and few enough for the processor's cache
+MIN_PLACES = 2  # one for writing while another is read
+PAGE = 64 * 1024  # bytes; the largest page size of common Linux machines, so that no two places share a page
+MAX_MESSAGE = MAX_RING // MIN_PLACES  # bytes; the longest message that is sent through a ring
 
-# Bytes of messages that one subscriber may hold at a time: as much as a Unix socket buffers at most.
-# Beyond it, a slow subscriber's messages wait in the publisher's queue, where the drop rule applies.
+# Maximum bytes of messages that one subscriber may hold at a time; the most that a Unix socket buffers. Beyond this, messages for
+# a slow subscriber wait in the publisher's queue, where its drop rule applies.
 MAX_HELD = 4 * 1024 * 1024
-ALWAYS_HELD = 2  # places that one subscriber may hold whatever their size: one is read while another waits
+ALWAYS_HELD = 2  # places that a subscriber may hold regardless of size: one to read, one waiting
 
 _WORD = struct.Struct("<I")
 _OFFER = struct.Struct("<II")
 _ANNOUNCEMENT = struct.Struct("<IIII")
-OFFER_BYTES = _OFFER.size - _WORD.size  # after the word
-ANNOUNCEMENT_BYTES = _ANNOUNCEMENT.size - _WORD.size  # after the word
+OFFER_BYTES = _OFFER.size - _WORD.size  # without the word
+ANNOUNCEMENT_BYTES = _ANNOUNCEMENT.size - _WORD.size  # without the word
 
 
 # The end of a connection's text in getBusInfo; it comes from another process, so its length and its characters are limited
@@ -104,7 +104,7 @@ def parse_large_messages(info: str) -> LargeMessages | None:
 
 
 class Announcement(NamedTuple):
-    """Where a message is in the ring: its offset, its size, and the size of the byte array that ends it (0: no split)."""
+    """A message's location in the ring: its offset, its size, and the size of its trailing byte array (0: not split)."""
 
     offset: int
     size: int
@@ -112,17 +112,17 @@ class Announcement(NamedTuple):
 
 
 def prepare() -> bytes:
-    """Return the bytes that ask a subscriber to receive file descriptors."""
+    """Return the bytes that ask a subscriber to prepare for file descriptors."""
     return _WORD.pack(PREPARE_WORD)
 
 
 def offer(ring_size: int) -> bytes:
-    """Return the bytes that offer a ring; its file descriptors are sent with them."""
+    """Return the bytes that offer a ring; the ring's file descriptors must be sent with them."""
     return _OFFER.pack(OFFER_WORD, ring_size)
 
 
 def parse_offer(data: bytes) -> int:
-    """Return the ring's size from the bytes after :data:`OFFER_WORD`. Raise WireError if it is over the limit."""
+    """Return the ring's size from the bytes after :data:`OFFER_WORD`. Raise WireError if the size exceeds the limit."""
     (size,) = _WORD.unpack(data)
     if not 0 < size <= MAX_RING:
         raise WireError(f"a ring of {size} bytes is over the limit of {MAX_RING}")
@@ -135,7 +135,7 @@ def announcement(offset: int, size: int, tail: int) -> bytes:
 
 
 def parse_announcement(data: bytes, ring_size: int) -> Announcement:
-    """Parse the bytes after :data:`PLACE_WORD`. Raise WireError if the message is not inside the ring."""
+    """Parse the bytes after :data:`PLACE_WORD`. Raise WireError if the message lies outside the ring."""
     offset, size, tail = struct.unpack("<III", data)
     if offset + size > ring_size:
         raise WireError(f"a message of {size} bytes at {offset} is outside the ring of {ring_size} bytes")
@@ -145,14 +145,14 @@ def parse_announcement(data: bytes, ring_size: int) -> Announcement:
 
 
 class Step(Enum):
-    """How far the publisher's end of a connection is with its ring."""
+    """The state of the ring's setup at the publisher's end of a connection."""
 
-    NEW = auto()  # no ring, or an old one: the next large message sends PREPARE_WORD
-    ASKED = auto()  # PREPARE_WORD is sent
-    LISTENING = auto()  # the subscriber receives file descriptors: the next large message sends OFFER_WORD
-    OFFERED = auto()  # OFFER_WORD is sent
-    IN_USE = auto()  # the subscriber reads places
-    OFF = auto()  # the subscriber refused, or released more than it held
+    NEW = auto()  # no ring yet, or a replaced one; the next large message sends PREPARE_WORD
+    ASKED = auto()  # PREPARE_WORD was sent
+    LISTENING = auto()  # the subscriber can receive file descriptors; the next large message sends OFFER_WORD
+    OFFERED = auto()  # OFFER_WORD was sent
+    IN_USE = auto()  # the subscriber reads messages from the ring
+    OFF = auto()  # the subscriber refused the ring, or released more places than it held
 
 
 ANSWERS: dict[tuple[Step, bytes], Step] = {
@@ -160,11 +160,11 @@ ANSWERS: dict[tuple[Step, bytes], Step] = {
     (Step.OFFERED, MAPPED): Step.IN_USE,
     (Step.OFFERED, REFUSED): Step.OFF,
 }
-"""The step after a subscriber's answer. Any other byte is ignored."""
+"""The next step after a subscriber's answer. All other bytes are ignored."""
 
 
 class Layout(NamedTuple):
-    """The places of a ring: the size of each in bytes, and their number."""
+    """The division of a ring into places: their number, and the size of each in bytes."""
 
     place_size: int
     places: int
@@ -176,9 +176,9 @@ class Layout(NamedTuple):
 
 
 def layout_for(size: int) -> Layout:
-    """Return the layout for messages of up to ``size`` bytes (at most :data:`MAX_MESSAGE`) and a quarter more.
+    """Return the layout for messages of up to ``size`` bytes (at most :data:`MAX_MESSAGE`), with a quarter in reserve.
 
-    The quarter avoids a new ring for each slightly longer message.
+    Because of the reserve, a slightly longer message does not need a new ring.
     """
     place_size = min(MAX_MESSAGE, -(-(size + size // 4) // PAGE) * PAGE)
     return Layout(place_size, min(MAX_PLACES, MAX_RING // place_size))
@@ -186,17 +186,17 @@ def layout_for(size: int) -> Layout:
 
 @dataclass
 class Places:
-    """Which places of a ring are free, and which connections hold the others.
+    """Tracks which places of a ring are free, and which connections hold the others.
 
-    A place is free, or it has at least one holder: the thread that fills it, and each connection it was announced on. A
-    connection releases its places in the order of its announcements. A place that became free last is used first, because
-    it is still in the processor's cache. Not thread-safe.
+    A place is either free or has holders: the thread that fills it, and each connection on which it was announced. A connection
+    releases its places in the order of their announcements. The place that was freed last is reused first, because it is still in
+    the processor's cache. Not thread-safe.
     """
 
     count: int
     _free: list[int] = field(init=False)
     _holders: list[int] = field(init=False)  # the number of holders of each place
-    # for each connection: the places that were announced and not released, oldest first, with the sizes of their messages
+    # for each connection: the announced places that are not released yet, oldest first, with the sizes of their messages
     _held: dict[Hashable, deque[tuple[int, int]]] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -210,7 +210,7 @@ class Places:
         return tuple(self._free)
 
     def take(self) -> int | None:
-        """Return a free place, held for the thread that fills it until :meth:`let_go`; None if no place is free."""
+        """Return a free place, which the calling thread holds until :meth:`let_go`; None if no place is free."""
         if not self._free:
             return None
         place = self._free.pop()
@@ -218,23 +218,23 @@ class Places:
         return place
 
     def let_go(self, place: int) -> None:
-        """End the hold of :meth:`take`."""
+        """Release a place that :meth:`take` has returned."""
         self._holders[place] -= 1
         if not self._holders[place]:
             self._free.append(place)
 
     def may_hold(self, connection: Hashable, size: int) -> bool:
-        """Return whether a connection may hold one more place with a message of ``size`` bytes."""
+        """Return whether a connection may hold one more place, for a message of ``size`` bytes."""
         held = self._held.get(connection, ())
         return len(held) < ALWAYS_HELD or sum(each for _, each in held) + size <= MAX_HELD
 
     def hold(self, connection: Hashable, place: int, size: int) -> None:
-        """Let a connection hold a place that its caller has taken."""
+        """Add a connection as a holder of a place that the caller has taken."""
         self._held.setdefault(connection, deque()).append((place, size))
         self._holders[place] += 1
 
     def take_back(self, connection: Hashable) -> None:
-        """Undo the last :meth:`hold` of a connection: the place was not announced.
+        """Undo a connection's last :meth:`hold`, because the place was not announced.
 
         Do nothing if the connection holds no place: a subscriber may have released more than was announced.
         """
@@ -242,7 +242,7 @@ class Places:
             self.let_go(held.pop()[0])
 
     def release(self, connection: Hashable, count: int) -> bool:
-        """Release the oldest ``count`` places of a connection. Return False, and release none, if it holds fewer."""
+        """Release a connection's oldest ``count`` places. If it holds fewer, release none and return False."""
         held = self._held.get(connection, deque())
         if count > len(held):
             return False

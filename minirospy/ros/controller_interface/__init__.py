@@ -1,1 +1,1 @@
-"""The base class of controllers, for controllers of the user's own."""
+"""The base class for user-defined controllers."""

@@ -1,4 +1,4 @@
-"""``rosrun controller_manager controller_manager`` and ``controller_group``: the manager's services on the command line.
+"""``rosrun controller_manager controller_manager`` and ``controller_group``: call the manager's services on the command line.
 
 Source: http://wiki.ros.org/controller_manager.
 """
@@ -36,13 +36,13 @@ _EACH: dict[str, tuple[Callable[[str], object], ...]] = {
     "kill": (manager.stop_controller, manager.unload_controller),
     "kl": (manager.stop_controller, manager.unload_controller),
 }
-"""Commands that take names: each function is called for all names before the next function."""
+"""Commands that take names. Each function runs for all names before the next function starts."""
 
 _SERVICE_SECONDS = 5
 
 
 def main() -> int:
-    """Run ``controller_manager``; return its exit status: 1 for an unknown command, 0 also after an error of the manager."""
+    """Run ``controller_manager``; return its exit status: 1 for an unknown command, 0 even after an error from the manager."""
     words = rospy.myargv()[1:]
     try:
         rospy.init_node("controller_manager", anonymous=True)
@@ -86,7 +86,7 @@ def new_group_parser() -> argparse.ArgumentParser:
 
 
 def main_of_groups(argv: Sequence[str] | None = None) -> int:
-    """Run ``controller_group``; return its exit status, 1 without a command or a controller manager."""
+    """Run ``controller_group``; return its exit status: 1 without a command or a controller manager."""
     parser = new_group_parser()
     arguments = parser.parse_args(rospy.myargv()[1:] if argv is None else argv)
     if arguments.command is None:
@@ -115,7 +115,7 @@ def _print_groups(groups: dict[str, Sequence[str]]) -> None:
 
 
 def _use_group(groups: dict[str, Sequence[str]], group: str, is_switch: bool) -> None:
-    """Load and start a group's controllers; ``is_switch``: only those that do not run, and stop the other groups'."""
+    """Load and start a group's controllers. ``is_switch``: skip those already running, and stop the other groups' controllers."""
     wanted = list(dict.fromkeys(groups.get(group, ())))
     if not wanted:
         rospy.logerr(f"There is no controller defined in group {group}")
@@ -141,7 +141,7 @@ def _where(names: Iterable[str], running: dict[str, bool], is_running: bool) -> 
 
 
 def _running_of_loaded() -> dict[str, bool]:
-    """Return whether each loaded controller runs."""
+    """Return whether each loaded controller is running."""
     rospy.wait_for_service("controller_manager/list_controllers", timeout=_SERVICE_SECONDS)
     found = {}
     for each in rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller:

@@ -1,7 +1,7 @@
-"""Call the services of a controller manager, and print the results.
+"""Call a controller manager's services, and print the results.
 
-Each function waits for its service, and returns whether the call succeeded. The programs import this module, because
-``controller_manager`` imports the loop. Source: http://wiki.ros.org/controller_manager.
+Each function waits for its service, and returns whether the call succeeded. Programs import this module rather than
+``controller_manager``, which also imports the control loop. Source: http://wiki.ros.org/controller_manager.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def list_controller_types() -> None:
 
 
 def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
-    """Reload the controllers' modules. ``force_kill``: stop and unload all controllers first; ``restore``: load them again."""
+    """Reload the controllers' modules. ``force_kill``: stop and unload all controllers first. ``restore``: load them again."""
     before = _call("list_controllers", ListControllers).controller if restore else []
     print(f"Restore: {restore}")
     is_done = bool(_call("reload_controller_libraries", ReloadControllerLibraries, force_kill).ok)
@@ -86,7 +86,7 @@ def load_controller(name: str) -> bool:
 
 
 def unload_controller(name: str) -> bool:
-    """Unload a controller, which must not run."""
+    """Unload a controller, which must be stopped."""
     is_done = bool(_call("unload_controller", UnloadController, name).ok)
     print(f"Unloaded '{name}' successfully" if is_done else f"Error when unloading '{name}'")
     return is_done
@@ -98,7 +98,7 @@ def start_controller(name: str) -> bool:
 
 
 def start_controllers(names: Sequence[str]) -> bool:
-    """Start controllers together: all or none."""
+    """Start all of these controllers together, or none."""
     return start_stop_controllers(start_controllers=names)
 
 
@@ -108,14 +108,14 @@ def stop_controller(name: str) -> bool:
 
 
 def stop_controllers(names: Sequence[str]) -> bool:
-    """Stop controllers together: all or none."""
+    """Stop all of these controllers together, or none."""
     return start_stop_controllers(stop_controllers=names)
 
 
 def start_stop_controllers(
     start_controllers: Sequence[str] = (), stop_controllers: Sequence[str] = ()
 ) -> bool:
-    """Start and stop controllers in one cycle of the loop: all or none."""
+    """Start and stop controllers in the same cycle of the loop: all or none."""
     start, stop = list(start_controllers), list(stop_controllers)
     if not _call(
         "switch_controller", SwitchController, start, stop, SwitchControllerRequest.STRICT, False, 0.0

@@ -1,7 +1,7 @@
-"""The loop that reads the hardware, updates the controllers and writes the hardware, at a fixed rate.
+"""The control loop, which reads the hardware, updates the controllers and writes the hardware at a fixed rate.
 
-A cycle: ``hardware.read``, the controllers, starting and stopping controllers, limits, ``hardware.write``. Deadlines are
-absolute; a cycle that ends after the next deadline is an overrun, and the deadlines that it missed are skipped.
+The steps of a cycle: ``hardware.read``, updating controllers, starting and stopping controllers, limits, ``hardware.write``.
+Deadlines are absolute. A cycle that finishes after the next deadline is an overrun, and the deadlines that it missed are skipped.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from minirospy.ros.controller_manager.manager import ControllerManager, find_des
 __all__ = ["ControlLoop", "limits_of_parameters", "run"]
 
 _BILLION = 1_000_000_000
-_END_SECONDS = 5.0  # the longest wait for the loop's end at shutdown, in case a driver hangs
-_SLEEP_SECONDS = 0.1  # the longest sleep, after which a slow loop looks whether it must stop
+_END_SECONDS = 5.0  # maximum wait for the loop to finish at shutdown, in case a driver hangs
+_SLEEP_SECONDS = 0.1  # maximum sleep, so that a slow loop notices a stop request
 _REPORT_SECONDS = 1.0
-_WARN_SECONDS = 10.0  # between two warnings about overruns, or about commands that are not finite
-_WARN_SHARE = 0.05  # of the cycles of a second; a busy computer delays single ones
-# Another thread that computes gives way to the loop after this time; Python's default is 5 ms.
+_WARN_SECONDS = 10.0  # between two warnings about overruns or about non-finite commands
+_WARN_SHARE = 0.05  # warn if more of a second's cycles overrun; a busy computer delays single ones
+# Maximum time for which another computing thread holds the GIL; Python's default is 5 ms.
 _SWITCH_SECONDS = 0.0002
 
 
 def run(hardware: RobotHardware, rate: float = 100.0, namespace: str = "") -> int:
     """Control a robot until the node shuts down; return the exit status: 1 if the hardware failed, else 0.
 
-    ``rate``: cycles per second of ROS time. Raise ValueError if it is not positive, or if a limit of a joint is invalid.
+    ``rate``: cycles per second of ROS time. Raise ValueError if it is not positive, or if a joint limit is invalid.
     """
     loop = ControlLoop(hardware, rate, namespace)
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
     gc.collect()
-    gc.freeze()  # so that later collections do not look at the modules again
+    gc.freeze()  # so that later garbage collections skip the imported modules
     loop.start()
     return loop.wait()
 
 
 class ControlLoop:
-    """A loop in a thread of its own, with its controller manager. ``limits``: by default those of the node's parameters."""
+    """A control loop in a separate thread, with its controller manager. ``limits``: by default from the node's parameters."""
 
     def __init__(
         self,
@@ -71,9 +71,7 @@ class ControlLoop:
             limits = limits_of_parameters(hardware, self.manager.namespace)
         self._limits = LimitEnforcer(hardware.joints.values(), limits)
         self._times = CycleTimes(round(_BILLION / rate))
-        self._invalid: dict[
-            str, None
-        ] = {}  # joints that got a command that was not finite, since the last report
+        self._invalid: dict[str, None] = {}  # joints with a non-finite command since the last report, as keys
         self._stop = SignalSafeEvent()
         self._ended = SignalSafeEvent()
         self._status = 0
@@ -86,7 +84,7 @@ class ControlLoop:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the controllers and the loop, and wait for its end for at most five seconds."""
+        """Stop the controllers and the loop, and wait up to five seconds for the loop to finish."""
         self._stop.set()
         if threading.current_thread() is not self._thread and not self._ended.wait(_END_SECONDS):
             rospy.logfatal(
@@ -96,7 +94,7 @@ class ControlLoop:
             self._ended.set()
 
     def wait(self) -> int:
-        """Wait until the loop has ended; return the exit status: 1 if the hardware failed or hangs, else 0."""
+        """Wait until the loop has finished; return the exit status: 1 if the hardware failed or hangs, else 0."""
         wait_for_event(self._ended, None)
         return self._status
 
@@ -118,7 +116,7 @@ class ControlLoop:
             self._ended.set()
 
     def _end(self) -> None:
-        """Stop the controllers, and write once more so that the driver sees that its joints are released."""
+        """Stop the controllers, then write once more so that the driver sees the released joints."""
         now = rospy.get_rostime()
         period = Duration(*divmod(self._times.period, _BILLION))
         self.manager.stop(now)
@@ -156,7 +154,7 @@ class ControlLoop:
             now, started = now_of_wall(), clock()
             if is_reset := now < last_wall:
                 self._log_jump(last_wall - now)
-            # The monotonic clock measures the period, because the system's time may be set.
+            # The period comes from the monotonic clock, because the system time may be changed.
             self._cycle(Time(*divmod(now, _BILLION)), Duration(*divmod(started - last, _BILLION)), is_reset)
             last_wall, last = now, started
             ended = clock()
@@ -171,7 +169,7 @@ class ControlLoop:
         last = deadline = clock.now()
         while not self._stop.is_set():
             try:
-                # At most a period, because time may have jumped back while the last cycle was running.
+                # Limit the wait to one period, because time may have jumped back during the last cycle.
                 if not clock.sleep(min(max(1, deadline - clock.now()), period), self._stop):
                     return
             except ROSTimeMovedBackwardsException:
@@ -193,7 +191,7 @@ class ControlLoop:
         rospy.logwarn("time jumped back by %.3f s: the controllers are started again", nanoseconds / _BILLION)
 
     def _report(self) -> None:
-        """Publish the loop's times once a second, in a thread of its own."""
+        """Publish the loop's timing once per second. Runs in a separate thread."""
         try:
             publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
             known, warned = 0, -_WARN_SECONDS
@@ -209,8 +207,8 @@ class ControlLoop:
                     rospy.logwarn("%s", status.message)
                 self._log_invalid()
         except rospy.ROSException:
-            return  # the node shuts down
-        if not rospy.is_shutdown_requested():  # else the node unregisters all of its topics together
+            return  # the node is shutting down
+        if not rospy.is_shutdown_requested():  # otherwise the node unregisters all its topics together
             publisher.unregister()
 
     def _log_invalid(self) -> None:
@@ -226,7 +224,7 @@ class ControlLoop:
         delays, durations = spread(late), spread(busy)
         name, namespace = f"{rospy.get_name()[1:]}: control loop", self.manager.namespace
         if namespace != "/" + rospy.get_namespace().strip("/"):
-            name += f" {namespace}"  # a node may have several robots
+            name += f" {namespace}"  # a node may control several robots
         status = DiagnosticStatus(name=name, message="OK", hardware_id="none")
         if overruns:
             status.level = DiagnosticStatus.WARN
@@ -251,7 +249,7 @@ class ControlLoop:
 
 
 def limits_of_parameters(hardware: RobotHardware, namespace: str) -> dict[str, JointLimits]:
-    """Return the limits of a robot's joints: robot_description's, overridden by the parameters NAMESPACE/joint_limits.
+    """Return a robot's joint limits: from robot_description, overridden by the parameters NAMESPACE/joint_limits.
 
     Raise ValueError if a limit is invalid.
     """

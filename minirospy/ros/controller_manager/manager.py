@@ -1,4 +1,4 @@
-"""The controller manager that a node owns: the services NS/controller_manager/..., and :meth:`ControllerManager.update`.
+"""The controller manager of a node: its services NS/controller_manager/..., and :meth:`ControllerManager.update`.
 
 Source: http://wiki.ros.org/controller_manager.
 """
@@ -46,22 +46,22 @@ _LOG = {
     FATAL: rospy.logfatal,
 }
 _EXTRA_SECONDS = (
-    1.0  # a switch with a timeout returns this long after it, although the loop stands still: as ROS
+    1.0  # as in ROS, a switch with a timeout returns this long after it, even if the loop has stopped
 )
 _BASE_CLASS = "controller_interface::ControllerBase"
 
 
 def log(level: int, line: str) -> None:
-    """Log a line at a level of rosgraph_msgs/Log."""
+    """Log a line at a rosgraph_msgs/Log level."""
     _LOG[level]("%s", line)
 
 
 class ControllerManager:
     """Loads, starts and stops the controllers of one robot, on request through its services.
 
-    The node that owns it calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``;
-    :func:`controller_manager.run` is such a loop. All services wait for the loop: they return after its next update.
-    ``namespace``: of the services and of the controllers, by default the node's.
+    The node calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``, as
+    :func:`controller_manager.run` does. Each service returns after the loop's next update. ``namespace``: for the services and
+    controllers; by default the node's namespace.
     """
 
     def __init__(self, hardware: RobotHardware, namespace: str = "") -> None:
@@ -70,7 +70,7 @@ class ControllerManager:
         self.namespace = "/" + rospy.resolve_name(namespace or rospy.get_namespace()).strip("/")
         self.table = ControllerTable(hardware, log)
         self._plugins: dict[str, Plugin] | None = None
-        self._lock = threading.RLock()  # held by the service that runs
+        self._lock = threading.RLock()  # held by the service call in progress
         self._waiting: list[threading.Event] = []  # set by the next update
         self._has_updated = False
         self._is_closed = False
@@ -93,9 +93,9 @@ class ControllerManager:
         ]
 
     def update(self, time: Time, period: Duration, reset_controllers: bool = False) -> None:
-        """Update the running controllers, then start and stop those that a service asks for.
+        """Update the running controllers, then start and stop controllers as services have requested.
 
-        ``reset_controllers``: restart the running ones first, for example after a simulation was reset.
+        ``reset_controllers``: restart the running controllers first, for example after a simulation reset.
         """
         self.table.update(time, period, reset_controllers)
         self._has_updated = True
@@ -103,7 +103,7 @@ class ControllerManager:
             self._waiting.pop().set()
 
     def load(self, name: str) -> bool:
-        """Load the controller whose parameters are in NAMESPACE/name; return whether that succeeded. A failure is logged."""
+        """Load the controller with the parameters in NAMESPACE/name; return whether that succeeded. Failures are logged."""
         with self._lock:
             if self._is_closed:
                 return False
@@ -134,7 +134,7 @@ class ControllerManager:
             return self.table.load(name, kind, found, context) is not None and self._wait_for_update()
 
     def unload(self, name: str) -> bool:
-        """Unload a controller that does not run; return whether that succeeded. A failure is logged."""
+        """Unload a stopped controller; return whether that succeeded. Failures are logged."""
         with self._lock:
             if self._is_closed or not (found := self.table.unload(name)) or not self._wait_for_update():
                 return False
@@ -149,10 +149,10 @@ class ControllerManager:
         start_asap: bool = False,
         timeout: float = 0.0,
     ) -> bool:
-        """Start and stop controllers in one update, and wait for it; return whether that succeeded. A failure is logged.
+        """Start and stop controllers in one update, and wait for it; return whether that succeeded. Failures are logged.
 
-        As in ROS, a start that the hardware aborts is a success; one that fails in the controller is not, unlike there.
-        Wait without limit if ``timeout`` is 0, else for ``timeout`` plus one second.
+        As in ROS, a start that the hardware aborts counts as a success. A start that fails in the controller does not, unlike in
+        ROS. Wait without limit if ``timeout`` is 0, else for ``timeout`` plus one second.
         """
         with self._lock:
             if self._is_closed:
@@ -172,9 +172,10 @@ class ControllerManager:
             return is_done and not has_failed and not rospy.is_down() and not self._is_closed
 
     def stop(self, time: Time) -> None:
-        """Stop all controllers and refuse further requests. Call it in the loop's thread, or after the loop. Idempotent.
+        """Stop all controllers and refuse further requests. Call this in the loop's thread, or after the loop. Idempotent.
 
-        A last ``hardware.write`` then stops the joints, before :meth:`close` calls the master and code of the controllers.
+        Afterwards, a last ``hardware.write`` can stop the joints, before :meth:`close` calls the master and the controllers'
+        code.
         """
         self._is_closed = True
         if pending := self.table.withdraw():
@@ -184,22 +185,22 @@ class ControllerManager:
             self._waiting.pop().set()
 
     def close(self, time: Time) -> None:
-        """Stop all controllers and close them, and end the services. Like :meth:`stop`, it is idempotent."""
+        """Stop and close all controllers, and shut down the services. Idempotent, like :meth:`stop`."""
         self.stop(time)
         loaded, self.table.loaded = self.table.loaded, ()
         for each in reversed(loaded):
             self.table.close(each)
-        if not rospy.is_shutdown_requested():  # else the node unregisters all of its services at once
+        if not rospy.is_shutdown_requested():  # otherwise the node unregisters all its services together
             for service in self._services:
                 service.shutdown("the controller manager is closed")
 
     def unregister(self) -> None:
-        """End the services, after :meth:`close`, so that another controller manager of the node can use the namespace."""
+        """Unregister the services after :meth:`close`, so that another controller manager in this node can use the namespace."""
         for service in self._services:
             service.shutdown()
 
     def _wait_for_update(self) -> bool:
-        """Wait until the loop has used the new table; return False if the node shuts down."""
+        """Wait until the loop has used the new table; return False if the node is shutting down."""
         if self._has_updated and not self._is_closed:
             updated = SignalSafeEvent()
             self._waiting.append(updated)
@@ -208,7 +209,7 @@ class ControllerManager:
         return not rospy.is_down() and not self._is_closed
 
     def _find_class(self, name: str, kind: str) -> type[Controller] | None:
-        """Return the class of a type. Log the reason and return None if that fails."""
+        """Return the class of a controller type. On failure, log the reason and return None."""
         if (plugin := self._types().get(kind)) is not None:
             try:
                 return plugin.load()
@@ -283,7 +284,7 @@ class ControllerManager:
 
 
 def find_description(namespace: str, name: str = "robot_description") -> str | None:
-    """Return the parameter ``name`` in a namespace, or in the closest one above it; None if there is none."""
+    """Return the parameter ``name`` in a namespace, or in the closest one above that has it; None if there is none."""
     while True:
         namespace = namespace.rstrip("/")
         text = rospy.get_param(f"{namespace}/{name}", None)
@@ -295,7 +296,7 @@ def find_description(namespace: str, name: str = "robot_description") -> str | N
 
 
 def read_robot(namespace: str, name: str = "robot_description") -> Robot:
-    """Return the robot of a parameter, searched upwards from a namespace. Raise ControllerError without a valid one."""
+    """Return the robot of a parameter, searched upwards from a namespace. Raise ControllerError if none is valid."""
     text = find_description(namespace, name)
     if text is None:
         raise ControllerError(f"Could not find parameter {name} on parameter server")
@@ -306,7 +307,7 @@ def read_robot(namespace: str, name: str = "robot_description") -> Robot:
 
 
 def _invalid_name(name: str) -> str:
-    """Return roscpp's error if a name is not valid in the graph, else an empty string."""
+    """Return roscpp's error text if a graph name is invalid, else an empty string."""
     for number, character in enumerate(name):
         is_letter = character.isascii() and (character.isalpha() or character == "/")
         if number == 0 and not is_letter:

@@ -1,7 +1,7 @@
 """Find the controllers that packages export, and import their Python classes.
 
-A package.xml exports a file of plugins: `<export><controller_interface plugin="${prefix}/plugins.xml"/></export>`. A class in
-it has a dotted Python path as its ``type``. Python packages may instead have entry points in the group
+A package.xml exports a plugin file: `<export><controller_interface plugin="${prefix}/plugins.xml"/></export>`. The ``type`` of a
+class in that file is a dotted Python path. Python packages may instead have entry points in the group
 ``controller_interface.controllers``. Source: http://wiki.ros.org/pluginlib.
 """
 
@@ -37,19 +37,19 @@ _BASES = {
 
 
 class PluginError(MinirospyError):
-    """Raised if a controller's class cannot be imported; the message is one line."""
+    """Raised if a controller's class cannot be imported. The message is one line."""
 
 
 class Plugin(NamedTuple):
-    """A controller's class that can be loaded. ``name`` is the type in parameters, ``origin`` the file that declares it."""
+    """A controller class that can be loaded. ``name``: its type in parameters. ``origin``: the file that declares it."""
 
     name: str
-    python: str  # the class's dotted path, or its name in C++
+    python: str  # the dotted path of the class, or its name in C++
     origin: str
-    folder: Path | None = None  # the package's
+    folder: Path | None = None  # the package's folder
 
     def load(self) -> type[Controller]:
-        """Import the class. Raise PluginError if that is impossible."""
+        """Import the class. Raise PluginError if that fails."""
         if "::" in self.python:
             raise PluginError(
                 f"{self.python} is written in C++ ({self.origin}): minirospy loads controllers that are written in Python"
@@ -62,9 +62,9 @@ class Plugin(NamedTuple):
             found: object = importlib.import_module(module)
             for part in name.split("."):
                 found = getattr(found, part)
-        except (Exception, SystemExit) as error:  # the user's module may raise anything
+        except (Exception, SystemExit) as error:  # the user's module may raise any exception
             trace = error.__traceback__
-            why = describe_error(error.with_traceback(trace and trace.tb_next))  # without this function
+            why = describe_error(error.with_traceback(trace and trace.tb_next))  # skip this frame
             raise PluginError(f"cannot import {self.python} ({self.origin}): {why}") from error
         if not (isinstance(found, type) and issubclass(found, Controller)):
             raise PluginError(
@@ -91,7 +91,7 @@ def find_plugins(warn: Callable[[str], object] = lambda line: rospy.logwarn("%s"
 
 
 def forget_modules(plugins: Iterable[Plugin]) -> None:
-    """Let the next load of these controllers read their files again; minirospy's own modules stay."""
+    """Make the next load of these controllers re-read their files, except minirospy's own modules."""
     folders = [
         each.folder.resolve() for each in plugins if each.folder and not each.folder.is_relative_to(_OWN)
     ]
@@ -122,9 +122,9 @@ def _of_file(file: Path, folder: Path) -> Iterator[Plugin]:
 
 
 def _find_module(module: str, folder: Path) -> None:
-    """Let Python find a module of a package that was not built or sourced: its folder is ``src`` or the package's."""
+    """Make a module of an unbuilt or unsourced package importable, from the package's folder or its folder ``src``."""
     spec = importlib.util.find_spec(module)
-    if spec is None or spec.origin is None:  # a folder of that name without code, such as the package's own
+    if spec is None or spec.origin is None:  # a folder without code
         for place in (folder / "src", folder):
             if (place / module).is_dir() or (place / f"{module}.py").is_file():
                 sys.path.append(str(place))

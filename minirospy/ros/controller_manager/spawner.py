@@ -1,4 +1,4 @@
-"""``rosrun controller_manager spawner``: load and start controllers; at the end, stop and unload them.
+"""``rosrun controller_manager spawner``: load and start controllers, and stop and unload them on exit.
 
 Source: http://wiki.ros.org/controller_manager.
 """
@@ -25,7 +25,7 @@ from minirospy.ros.rosparam.rosparam import RosParamException, load_file, set_pa
 __all__ = ["main", "new_parser"]
 
 _SERVICES = ("load_controller", "switch_controller", "unload_controller")
-_MESSAGE_SECONDS = 1.0  # lets the manager's log appear before the spawner's, as in ROS
+_MESSAGE_SECONDS = 1.0  # gives the manager's log time to appear before the spawner's, as in ROS
 
 
 def new_parser() -> argparse.ArgumentParser:
@@ -56,7 +56,7 @@ def new_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program; return its exit status, which is 0 also if there is no controller manager."""
+    """Run the program; return its exit status, which is 0 even if there is no controller manager."""
     arguments = new_parser().parse_args(rospy.myargv()[1:] if argv is None else argv)
     rospy.init_node("spawner", anonymous=True)
     if arguments.shutdown_timeout is not None:
@@ -86,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class _Spawner:
-    """The controllers that were loaded, and the manager's services."""
+    """The loaded controllers, and the manager's services."""
 
     def __init__(self, prefix: str) -> None:
         self._prefix = prefix
@@ -125,7 +125,7 @@ class _Spawner:
         rospy.loginfo("Controller Spawner: Loaded controllers: " + ", ".join(self._loaded))
 
     def start(self) -> None:
-        """Start all controllers that were loaded, or none of them."""
+        """Start all loaded controllers, or none of them."""
         names = ", ".join(self._loaded)
         if self._switch(self._loaded, [], SwitchControllerRequest.STRICT, False, 0.0).ok:
             rospy.loginfo("Started controllers: " + names)
@@ -138,7 +138,7 @@ class _Spawner:
         try:
             rospy.loginfo("Stopping all controllers...")
             if not self._loaded:
-                return  # the manager may be busy with the controller that it loads, and would not answer
+                return  # the manager may be busy loading the controller, and would not respond
             self._switch([], self._loaded, SwitchControllerRequest.STRICT, False, 0.0)
             rospy.loginfo("Unloading all loaded controllers...")
             for name in reversed(self._loaded):
@@ -150,7 +150,7 @@ class _Spawner:
 
 
 def _controllers(words: Sequence[str]) -> list[str]:
-    """Return the controllers' names; a word that is a file stands for the names in it, whose parameters are set."""
+    """Return the controllers' names. If a word is a file, set the parameters in it and use the names in it."""
     names: list[str] = []
     for word in words:
         if not Path(word).is_file():
@@ -164,7 +164,7 @@ def _controllers(words: Sequence[str]) -> list[str]:
 
 
 def _wait_for_true(topic: str, timeout: float | None) -> None:
-    """Wait until a Bool on the topic is true; warn once if there is no message within ``timeout`` seconds."""
+    """Wait until a Bool on the topic is true; warn once if no message arrives within ``timeout`` seconds."""
     has_message, is_true = SignalSafeEvent(), SignalSafeEvent()
 
     def on_message(message: Bool) -> None:

@@ -1,4 +1,4 @@
-"""``rosrun controller_manager unspawner``: stop controllers every three seconds, and start them again at the end.
+"""``rosrun controller_manager unspawner``: stop the given controllers every three seconds, and restart them on exit.
 
 Source: http://wiki.ros.org/controller_manager.
 """
@@ -41,7 +41,7 @@ def main() -> int:
     def stop_again(_: object) -> None:
         try:
             stop()
-        except rospy.ServiceException as error:  # the manager may come back
+        except rospy.ServiceException as error:  # the manager may return later
             rospy.logwarn("%s", error)
 
     def start() -> None:

@@ -1,4 +1,4 @@
-"""The common part of controllers of wheeled bases: velocity commands, their timeout and limits, odometry and its topics.
+"""The common part of wheeled bases' controllers: velocity commands, their timeout and limits, odometry and its topics.
 
 Source: http://wiki.ros.org/diff_drive_controller, http://wiki.ros.org/ackermann_steering_controller.
 """
@@ -41,20 +41,21 @@ _STOP = _Command(0.0, 0.0, 0)
 
 
 class MobileBase(Controller):
-    """Follows ``cmd_vel`` and publishes ``odom`` and its transform. A subclass has the wheels.
+    """Follows ``cmd_vel``, and publishes ``odom`` and its transform. Subclasses handle the wheels.
 
-    The base stops, within its limits, if no command arrives for ``cmd_vel_timeout``, or if a wheel's position is not a number.
+    The base decelerates to a stop, within its limits, if no command arrives for ``cmd_vel_timeout``, or if a wheel position is
+    NaN.
     """
 
     def __init__(self) -> None:
-        self._command = _STOP  # replaced by the callback of cmd_vel
-        self._last = (0.0, 0.0)  # the velocities of the last cycle, linear and angular
+        self._command = _STOP  # replaced by the cmd_vel callback
+        self._last = (0.0, 0.0)  # the velocities in the last cycle, linear and angular
         self._before_last = (0.0, 0.0)
-        self._now = 0  # ns: the time of the last cycle
+        self._now = 0  # ns; the time of the last cycle
         self._is_running = False
 
     def measure(self, odometry: Odometry, time: int) -> bool:
-        """Add the wheels' motion to the odometry; return False, without a change, if a position is not a number."""
+        """Add the wheels' motion to the odometry. If a wheel position is NaN, change nothing and return False."""
         raise NotImplementedError
 
     def drive(self, linear: float, angular: float) -> None:
@@ -62,11 +63,11 @@ class MobileBase(Controller):
         raise NotImplementedError
 
     def create_odometry(self, window: int) -> Odometry:
-        """Return the odometry, which is at its origin."""
+        """Return the odometry, starting at the origin."""
         raise NotImplementedError
 
     def read_rate(self, context: ControllerContext) -> float:
-        """Read the rate of the odometry, the first parameter in ROS's log; return it."""
+        """Read and return the odometry's rate, the first parameter that ROS logs."""
         self._name = context.name
         hertz = context.parameters.finite("publish_rate", 50.0)
         self.log_info(f"Controller state will be published at {hertz:g}Hz.")
@@ -74,7 +75,7 @@ class MobileBase(Controller):
         return hertz
 
     def read_parameters(self, context: ControllerContext) -> None:
-        """Read the parameters that are common to all bases. Raise ControllerError or ValueError if one is invalid."""
+        """Read the parameters that all bases have. Raise ControllerError or ValueError if one is invalid."""
         parameters = context.parameters
         self._open_loop = parameters.flag("open_loop", False)
         window = parameters.integer("velocity_rolling_window_size", 10)
@@ -107,11 +108,11 @@ class MobileBase(Controller):
         self.opened.callback(self._subscriber.unregister)
 
     def open_publisher(self, topic: str, message_class: type[_M]) -> RealtimePublisher[_M]:
-        """Open a topic, which ``close`` closes."""
+        """Open a topic that ``close`` will close."""
         return self.opened.enter_context(closing(RealtimePublisher(topic, message_class, queue_size=100)))
 
     def starting(self, time: Time) -> None:
-        """Stand still; the odometry continues from its pose."""
+        """Stop the wheels; the odometry continues from its present pose."""
         self._command = _STOP
         self._last = self._before_last = (0.0, 0.0)
         self._now = nanoseconds(time)
@@ -126,10 +127,10 @@ class MobileBase(Controller):
         self.drive(0.0, 0.0)
 
     def update(self, time: Time, period: Duration) -> None:
-        """Update the odometry, publish it, and command the wheels."""
+        """Update and publish the odometry, then command the wheels."""
         now = nanoseconds(time)
         if now < self._now:
-            self._command = _STOP  # its time is in the future now, so that it would never be old
+            self._command = _STOP  # its timestamp is now in the future, so it would never time out
         self._now = now
         is_measured = True
         if self._open_loop:
@@ -152,10 +153,10 @@ class MobileBase(Controller):
         self.driven(time, period, linear, angular)
 
     def driven(self, time: Time, period: Duration, linear: float, angular: float) -> None:
-        """Publish the velocities that were commanded, if the base does so."""
+        """Publish the commanded velocities, if this base publishes them."""
 
     def log_info(self, text: str) -> None:
-        """Log a line in the name of the controller."""
+        """Log a line under the controller's name."""
         rospy.loginfo("%s", text, logger_name=self._name)
 
     def _receive(self, twist: Twist) -> None:
@@ -203,12 +204,12 @@ class MobileBase(Controller):
 
 
 def enabled(flag: bool) -> str:
-    """Return ROS's word for a flag in the log."""
+    """Return ROS's word for a flag, for the log."""
     return "enabled" if flag else "disabled"
 
 
 def _covariance(parameters: Parameters, key: str) -> list[float]:
-    """Return the covariance of six numbers on the diagonal. ROS's controller aborts its process without them."""
+    """Return the covariance with these six numbers on its diagonal. ROS's controller aborts its process if they are missing."""
     diagonal = parameters.numbers(key)
     if diagonal is None or len(diagonal) != 6:
         raise ControllerError(f"Parameter '{parameters.namespace}/{key}' must be a list of 6 numbers")
@@ -216,7 +217,7 @@ def _covariance(parameters: Parameters, key: str) -> list[float]:
 
 
 def read_robot(context: ControllerContext, text: str) -> Robot:
-    """Return the robot's description. Raise ControllerError with ``text`` if there is none, after logging the reason."""
+    """Return the robot's description. If there is none, log the reason and raise ControllerError with ``text``."""
     try:
         return context.robot()
     except ControllerError as error:
@@ -225,7 +226,7 @@ def read_robot(context: ControllerContext, text: str) -> Robot:
 
 
 def described_joint(robot: Robot, name: str) -> Joint:
-    """Return a joint of the robot's description. Raise ControllerError if it is not there."""
+    """Return a joint of the robot's description. Raise ControllerError if the joint is missing."""
     joint = robot.joints.get(name)
     if joint is None:
         raise ControllerError(f"{name} couldn't be retrieved from model description")
@@ -233,15 +234,15 @@ def described_joint(robot: Robot, name: str) -> Joint:
 
 
 def log_origin(name: str, joint: Joint) -> None:
-    """Log the position of a joint in its parent's frame, as ROS writes it."""
+    """Log a joint's position in its parent's frame, in ROS's format."""
     x, y, z = joint.origin.xyz
     rospy.loginfo("%s to origin: %g,%g, %g", name, x, y, z)
 
 
 def wheel_radius(robot: Robot, joint: Joint, *, allow_sphere: bool) -> float:
-    """Return the radius of the wheel below a joint: of the cylinder or sphere that is its collision geometry.
+    """Return the radius of the wheel below a joint, from its collision geometry, a cylinder or sphere.
 
-    Raise ControllerError if there is none, after logging the reason.
+    If there is none, log the reason and raise ControllerError.
     """
     link = robot.links[joint.child]
     if not link.collisions:

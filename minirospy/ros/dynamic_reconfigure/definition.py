@@ -1,4 +1,4 @@
-"""Configurations that a module defines itself, without a .cfg file; and the end of a server."""
+"""Configurations that a module defines without a .cfg file, and a function that closes a server."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["Definition", "close_server"]
 
 
 class Definition(ParameterGenerator):
-    """A configuration: call ``add`` as in a .cfg file, then copy the properties to the module."""
+    """A configuration. Call ``add`` as in a .cfg file, then assign the properties to the module's names."""
 
     def __init__(self) -> None:
         """Define a configuration without parameters. Unlike in a .cfg file, no folders are needed."""
@@ -34,17 +34,17 @@ class Definition(ParameterGenerator):
 
     @property
     def min(self) -> Mapping[str, Value]:
-        """The parameters' least values."""
+        """The parameters' minimum values."""
         return self._values("min")
 
     @property
     def max(self) -> Mapping[str, Value]:
-        """The parameters' greatest values."""
+        """The parameters' maximum values."""
         return self._values("max")
 
     @property
     def level(self) -> Mapping[str, int]:
-        """The bits that the server's callback gets if the parameters change."""
+        """The bits passed to the server's callback when a parameter changes."""
         return self._values("level")
 
     @property

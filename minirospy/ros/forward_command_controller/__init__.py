@@ -1,1 +1,1 @@
-"""Controllers that pass commands on to joints."""
+"""Controllers that forward commands to joints."""

@@ -1,4 +1,4 @@
-"""The joints that a controller commands, and the topic ``command`` with a number for each of them."""
+"""The joints that a controller commands, and the topic ``command``, which carries one number per joint."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["CommandTopic", "claim_group", "claim_joint"]
 
 
 def claim_joint(hardware: Resources, context: ControllerContext, interface: Interface) -> Joint:
-    """Return the joint of the parameter ``joint``. Raise ControllerError or HardwareError if there is none."""
+    """Return the joint named by the parameter ``joint``. Raise ControllerError or HardwareError if there is none."""
     if not (name := context.parameters.text("joint", "")):
         raise ControllerError(f"No joint given (namespace: {context.namespace})")
     return hardware.joint(name, interface)
 
 
 def claim_group(hardware: Resources, context: ControllerContext, interface: Interface) -> list[Joint]:
-    """Return the joints of the parameter ``joints``. Raise ControllerError if there are none, or one twice."""
+    """Return the joints named by the parameter ``joints``. Raise ControllerError if it is empty or has duplicates."""
     names = context.parameters.names("joints")
     if names is None:
         raise ControllerError(f"Failed to getParam 'joints' (namespace: {context.namespace}).")
@@ -39,11 +39,11 @@ def claim_group(hardware: Resources, context: ControllerContext, interface: Inte
 class CommandTopic:
     """The topic ``command`` of a controller.
 
-    ``values``: the last command of each joint. It is replaced as a whole, by messages and by the controller's ``starting``.
+    ``values``: the last command for each joint. Messages and the controller's ``starting`` replace the list as a whole.
     """
 
     def __init__(self, context: ControllerContext, joints: int, *, is_group: bool) -> None:
-        """Subscribe to Float64MultiArray for a group of joints, else to Float64."""
+        """Subscribe to Float64MultiArray for a group of joints, otherwise to Float64."""
         self.values: Sequence[float] = (0.0,) * joints
         self._name = f"{context.namespace}/command"
         self._subscriber = rospy.Subscriber(

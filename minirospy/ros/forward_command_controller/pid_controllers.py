@@ -1,4 +1,4 @@
-"""Base classes of controllers that reach a position or a velocity by PID: a subclass sets ``interfaces``.
+"""Base classes of controllers that control position or velocity with a PID controller; subclasses set ``interfaces``.
 
 Source: http://wiki.ros.org/effort_controllers, http://wiki.ros.org/velocity_controllers.
 """
@@ -21,11 +21,11 @@ from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
 
 __all__ = ["PidJointGroupPositionController", "PidJointPositionController", "PidJointVelocityController"]
 
-_STATE_CYCLES = 10  # the state is published in each tenth cycle, as in ROS
+_STATE_CYCLES = 10  # the state is published in every tenth cycle, as in ROS
 
 
 class _PidController(Controller):
-    """A controller whose output for each joint is that of a PID controller."""
+    """Commands each joint with the output of a PID controller."""
 
     _command: CommandTopic
 
@@ -52,7 +52,7 @@ class _PidController(Controller):
     def _publish_state(
         self, message: JointControllerState, time: Time, period: Duration, gains: PidGains
     ) -> None:
-        """Publish the state of a cycle, after setting the fields that are the same for all controllers."""
+        """Publish the state of a cycle, after setting the fields common to all controllers."""
         message.header.stamp = time
         message.time_step = period.to_sec()
         message.p, message.i, message.d, message.i_clamp, _, message.antiwindup = gains
@@ -64,7 +64,7 @@ class _PidController(Controller):
 
 
 class PidJointPositionController(_PidController):
-    """Drives the joint of the parameter ``joint`` to the positions of the topic ``command``, first to its own position."""
+    """Drives the joint in the parameter ``joint`` to positions from the topic ``command``; at first it holds its own position."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Claim the joint, read the gains in ``pid`` and the joint's limits, open the topics."""
@@ -99,7 +99,7 @@ class PidJointPositionController(_PidController):
 
 
 class PidJointVelocityController(_PidController):
-    """Drives the joint of the parameter ``joint`` at the velocities of the topic ``command``, first at 0."""
+    """Drives the joint in the parameter ``joint`` at velocities from the topic ``command``, at first at 0."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Claim the joint, read the gains in ``pid``, open the topics."""
@@ -126,7 +126,7 @@ class PidJointVelocityController(_PidController):
 
 
 class PidJointGroupPositionController(_PidController):
-    """Drives the joints of the parameter ``joints`` to the positions of the topic ``command``; gains are in ``JOINT/pid``."""
+    """Drives the joints in the parameter ``joints`` to positions from the topic ``command``. The gains are in ``JOINT/pid``."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Claim the joints, read their gains and limits, open the topic."""

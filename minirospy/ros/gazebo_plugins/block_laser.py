@@ -1,4 +1,4 @@
-"""libgazebo_ros_block_laser.so: the points of a scanner with several rows."""
+"""libgazebo_ros_block_laser.so: publishes the points of a multi-row scanner."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["BlockLaser"]
 
 
 class BlockLaser(RayPlugin):
-    """The plugin. Parameters: topicName, frameName, gaussianNoise (of the coordinates and the intensity)."""
+    """The plugin. Parameters: topicName, frameName, gaussianNoise (applied to coordinates and intensity)."""
 
     def load(self) -> None:
         """Read the sensor's rays."""
@@ -20,7 +20,7 @@ class BlockLaser(RayPlugin):
         self._noise = self.number("gaussianNoise", 0.0)
 
     def sense(self) -> None:
-        """Publish the points in the sensor's frame; a ray that hits nothing has its point at the range's end."""
+        """Publish the points in the sensor's frame. If a ray hits nothing, its point is at the maximum range."""
         rays, random = self.rays, self.simulation.random
         measured = rays.noisy(self.simulation, rays.cast(self.simulation, self.sensor_pose))
         ranges = np.minimum(measured, rays.max_range)

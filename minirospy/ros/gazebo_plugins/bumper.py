@@ -1,4 +1,4 @@
-"""libgazebo_ros_bumper.so: the contacts of a collision."""
+"""libgazebo_ros_bumper.so: publishes the contacts of collisions."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class Bumper(SensorPlugin):
     """The plugin. Parameters: bumperTopicName, frameName. All vectors are in world axes."""
 
     def load(self) -> None:
-        """Find the collisions, of which ``<contact>`` may name several."""
+        """Find the collisions; ``<contact>`` may name several."""
         self.simulation.records_details = True
         contact = self.sensor.element.first("contact")
         names = [each.text.strip() for each in contact.all("collision")] if contact is not None else []
         link = self.sensor_link
         known = {each.name for each in link.record.collisions}
-        # A name that sdformat changed when it merged links is not known: all collisions of the link count.
+        # The name is unknown if sdformat changed it when it merged links. In that case, use all collisions of the link.
         chosen = known.intersection(names) or known
         self._collisions = {f"{link.scoped_name}::{name}" for name in chosen}
         self._frame = self.frame("frameName", "world")

@@ -1,4 +1,4 @@
-"""libgazebo_ros_camera.so and libgazebo_ros_multicamera.so: pictures in colour, with camera_info."""
+"""libgazebo_ros_camera.so and libgazebo_ros_multicamera.so: publish colour pictures and camera_info."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Camera", "CameraPlugin", "Lens", "MultiCamera"]
 
-RATES = (2.0, 1.0, 50.0)  # Hz; default, least and greatest of dynamic reconfigure
+RATES = (2.0, 1.0, 50.0)  # Hz; default, minimum and maximum in dynamic reconfigure
 
 
 class CameraPlugin(SensorPlugin):
-    """The base of all cameras' plugins.
+    """The base class of all camera plugins.
 
     Parameters: cameraName, frameName, imageTopicName, cameraInfoTopicName, updateRate (0: the sensor's), hackBaseline, Cx, Cy,
     focalLength, distortionK1, K2, K3, T1, T2, autoDistortion.
@@ -46,7 +46,7 @@ class CameraPlugin(SensorPlugin):
     info_topic = "camera_info"
 
     def load(self) -> None:
-        """Read the common parameters."""
+        """Read the parameters that all cameras have."""
         if self.element.first("robotNamespace") is not None:
             self.default_namespace = self.model.name
         self.camera_name = self.text("cameraName").strip("/")
@@ -65,7 +65,7 @@ class CameraPlugin(SensorPlugin):
         self._offer_rate()
 
     def add_lens(self, optics: Optics, suffix: str = "", baseline: float | None = None) -> Lens:
-        """Add a camera whose topics are below the camera's name and a suffix. Raise PluginError if its size is impossible."""
+        """Add a camera whose topics are below the camera's name and a suffix. Raise PluginError if its size is invalid."""
         sizes = (optics.width, optics.height)
         if not (min(sizes) >= 1 and max(sizes) <= MAX_PIXELS and 0 < optics.horizontal_fov < math.pi):
             raise PluginError(
@@ -76,7 +76,7 @@ class CameraPlugin(SensorPlugin):
         return lens
 
     def is_due(self) -> bool:
-        """Return whether ``updateRate`` allows a picture of this moment."""
+        """Return whether a picture is due according to ``updateRate``."""
         now_ns = self.simulation.time_ns
         if self._last_ns is not None and 0 <= now_ns - self._last_ns < self.period_ns:
             return False
@@ -90,7 +90,7 @@ class CameraPlugin(SensorPlugin):
                 lens.sense()
 
     def reset(self) -> None:
-        """Start the periods again."""
+        """Restart the periods."""
         super().reset()
         self._last_ns = None
 
@@ -101,7 +101,7 @@ class CameraPlugin(SensorPlugin):
         super().close()
 
     def _offer_rate(self) -> None:
-        """Offer the rate by dynamic reconfigure; the sensor's rate stays until somebody changes it."""
+        """Offer the rate in dynamic reconfigure. The sensor's rate applies until the value is changed."""
         from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
 
         definition = Definition()
@@ -151,7 +151,7 @@ class Lens:
         )
         self.info.header.frame_id = plugin.frame_id
         self._check_focal_length()
-        # The picture is drawn in another thread, which must not use the simulation's generator.
+        # The picture is drawn in another thread, which must not use the simulation's random generator.
         self._random = np.random.default_rng(int(plugin.simulation.random.integers(1 << 32)))
         self.photographer = Photographer(plugin.simulation, optics.width, optics.height)
         self.images = self.publish_to("imageTopicName", plugin.image_topic, Image, latch=True)
@@ -162,13 +162,13 @@ class Lens:
     def publish_to(
         self, tag: str, topic: str, kind: type[rospy.Message], *, latch: bool = False
     ) -> rospy.Publisher[Any]:
-        """Return a publisher below the camera's name; a parameter may name the topic."""
+        """Return a publisher below the camera's name. A parameter may change the topic's name."""
         name = self.plugin.text(tag, topic)
         full = name if name.startswith("/") or not self.folder else f"{self.folder}/{name}"
         return self.plugin.output_to(full, kind, latch=latch)
 
     def sense(self) -> None:
-        """Publish a picture, and its camera_info; camera_info alone needs no picture."""
+        """Publish a picture and its camera_info. If only camera_info has subscribers, draw no picture."""
         now = self.plugin.now
         if not self.images.get_num_connections() or self.photographer.is_broken:
             self.publish_info(now, self.infos)
@@ -176,13 +176,13 @@ class Lens:
         self.take(lambda renderer: self._publish(renderer, now))
 
     def take(self, draw: Callable[[Renderer], None]) -> None:
-        """Copy the scene, and draw it later."""
+        """Copy the scene now, to draw it later."""
         optics = self.optics
         pose = compose(self.plugin.sensor_pose, optics.pose)
         self.photographer.take(pose, optics.horizontal_fov, (optics.near, optics.far), draw)
 
     def publish_info(self, stamp: Time, publisher: rospy.Publisher[Any]) -> None:
-        """Publish camera_info if there is a subscriber."""
+        """Publish camera_info if it has subscribers."""
         if publisher.get_num_connections():
             info = copy.copy(self.info)
             info.header = copy.copy(info.header)
@@ -190,7 +190,7 @@ class Lens:
             publisher.publish(info)
 
     def to_image(self, renderer: Renderer, stamp: Time) -> Image:
-        """Draw, and return the picture in the sensor's format."""
+        """Draw the picture, and return it in the sensor's format."""
         picture = add_noise(renderer.color(), self.optics, self._random)
         image = Image(height=self.optics.height, width=self.optics.width, encoding=self.encoding)
         image.header.stamp, image.header.frame_id = stamp, self.plugin.frame_id
@@ -230,7 +230,7 @@ class Camera(CameraPlugin):
 
 
 class MultiCamera(CameraPlugin):
-    """libgazebo_ros_multicamera.so: cameras whose names contain ``left`` or ``right``; pictures have the same stamp."""
+    """libgazebo_ros_multicamera.so: cameras whose names contain ``left`` or ``right``. Their pictures have the same stamp."""
 
     def load(self) -> None:
         """Start the topics."""

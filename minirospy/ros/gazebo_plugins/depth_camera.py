@@ -1,4 +1,4 @@
-"""libgazebo_ros_openni_kinect.so and libgazebo_ros_depth_camera.so: depths, points and colours."""
+"""libgazebo_ros_openni_kinect.so and libgazebo_ros_depth_camera.so: publish depths, points and colours."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _FIELDS = (("x", 0), ("y", 4), ("z", 8), ("rgb", 16))
 class DepthCamera(CameraPlugin):
     """libgazebo_ros_depth_camera.so.
 
-    Parameters, besides a camera's: pointCloudTopicName, depthImageTopicName, depthImageCameraInfoTopicName, pointCloudCutoff,
-    useDepth16UC1Format.
+    Parameters, in addition to a camera's: pointCloudTopicName, depthImageTopicName, depthImageCameraInfoTopicName,
+    pointCloudCutoff, useDepth16UC1Format.
     """
 
     image_topic = "ir/image_raw"
     info_topic = "ir/camera_info"
-    is_organized = False  # whether the cloud has the rows of the picture
+    is_organized = False  # whether the cloud has the same rows as the picture
 
     def load(self) -> None:
         """Start the topics."""
@@ -42,7 +42,7 @@ class DepthCamera(CameraPlugin):
         self._depths = lens.publish_to("depthImageTopicName", "depth/image_raw", Image)
         tag = "depthImageCameraInfoTopicName"
         if self.element.first(tag) is None:
-            tag = "depthImageInfoTopicName"  # of many models, which copied it from other plugins
+            tag = "depthImageInfoTopicName"  # in many models, which copied it from another plugin
         self._infos = lens.publish_to(tag, "depth/camera_info", CameraInfo)
         self._nearest, self._farthest = self.number("pointCloudCutoff", 0.4), self.read_farthest()
         self._is_16_bit = self.flag("useDepth16UC1Format", False)
@@ -53,11 +53,11 @@ class DepthCamera(CameraPlugin):
         )
 
     def read_farthest(self) -> float:
-        """Return the distance from which on there are no points."""
+        """Return the distance beyond which no points are published."""
         return np.inf
 
     def sense(self) -> None:
-        """Publish; ``updateRate`` concerns only camera_info."""
+        """Publish the subscribed topics; ``updateRate`` applies only to camera_info."""
         now, lens = self.now, self._lens
         if self.is_due():
             lens.publish_info(now, lens.infos)
@@ -100,7 +100,7 @@ class DepthCamera(CameraPlugin):
         rows = np.zeros((height, width, POINT_STEP), np.uint8)
         values = rows.view("<f4")
         values[:, :, 0], values[:, :, 1], values[:, :, 2] = z * right, z * down, z
-        # The reference copies the picture's first channel into the byte of blue: R8G8B8 swaps red and blue.
+        # Real Gazebo copies the picture's first channel into the blue byte, so R8G8B8 swaps red and blue.
         pixels = np.frombuffer(image.data, np.uint8)
         if len(pixels) in (height * width, 3 * height * width):
             rows[:, :, 16:19] = pixels.reshape(height, width, -1)
@@ -122,10 +122,10 @@ class OpenniKinect(DepthCamera):
     is_organized = True
 
     def read_farthest(self) -> float:
-        """Return the distance from which on there are no points."""
+        """Return the distance beyond which no points are published."""
         return self.number("pointCloudCutoffMax", 5.0)
 
 
 def _slopes(count: int, focal_length: float) -> NDArray[np.float32]:
-    """Return the distance from the axis of each pixel at a depth of 1 m."""
+    """Return each pixel's distance from the optical axis at a depth of 1 m."""
     return ((np.arange(count) - 0.5 * (count - 1)) / focal_length).astype(np.float32)

@@ -1,4 +1,4 @@
-"""libgazebo_ros_diff_drive.so: drives two wheels by /cmd_vel, and publishes /odom and its transform."""
+"""libgazebo_ros_diff_drive.so: drives two wheels as commanded on /cmd_vel, and publishes /odom and its transform."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class DiffDrive(DrivePlugin):
     """The plugin."""
 
     def load(self) -> None:
-        """Start the wheels' motors."""
+        """Start the wheel motors."""
         self.default_namespace = self.model.name
         self._joints = (
             self.joint(self.text("leftJoint", "left_joint")),
@@ -48,7 +48,7 @@ class DiffDrive(DrivePlugin):
             joint.set_velocity(0.0, self._torque)
 
     def update(self) -> None:
-        """Publish, and set the motors."""
+        """Publish the odometry, and set the motors."""
         now_ns = self.simulation.time_ns
         if self._uses_encoders:
             self._read_encoders(now_ns)

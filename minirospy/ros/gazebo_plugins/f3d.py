@@ -1,4 +1,4 @@
-"""libgazebo_ros_f3d.so: the force and torque that programs and plugins apply to a link."""
+"""libgazebo_ros_f3d.so: publishes the force and torque that programs and plugins apply to a link."""
 
 from __future__ import annotations
 

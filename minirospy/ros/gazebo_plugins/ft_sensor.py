@@ -1,4 +1,4 @@
-"""libgazebo_ros_ft_sensor.so: the force and torque in a joint, of the child on the parent, in the child's frame."""
+"""libgazebo_ros_ft_sensor.so: publishes a joint's force and torque, from child to parent, in the child's frame."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """libhector_gazebo_ros_imu.so, libhector_gazebo_ros_gps.so and libhector_gazebo_ros_sonar.so: sensors with drift.
 
-Not served: dynamic reconfigure of the noise, set_accel_bias, set_rate_bias and set_reference_geopose.
+Not supported: dynamic reconfigure of the noise, set_accel_bias, set_rate_bias and set_reference_geopose.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Values = NDArray[np.float64]
 
 EQUATORIAL_RADIUS = 6378137.0  # m; WGS 84
 FLATTENING = 1.0 / 298.257223563
-DRIFT_FREQUENCY = 1.0 / 3600.0  # Hz; a drift lasts an hour
+DRIFT_FREQUENCY = 1.0 / 3600.0  # Hz; a drift lasts one hour
 
 
 class ErrorModel:
-    """Offset, drift, noise and scale of a measurement with one or three axes.
+    """Offset, drift, noise and scale error of a measurement with one or three axes.
 
     Parameters, with a prefix such as ``accel``: Offset, Drift, DriftFrequency, GaussianNoise, ScaleError.
     """
@@ -52,15 +52,15 @@ class ErrorModel:
 
     @property
     def bias(self) -> Values:
-        """Return the error without noise."""
+        """Return the current error, without noise."""
         return self.current + self.offset
 
     def reset(self) -> None:
-        """Draw a new drift."""
+        """Draw a new random drift."""
         self.current: Values = self._normal(self.drift)
 
     def measured(self, value: Vector | Values, seconds: float) -> Values:
-        """Return a value with the errors after a time."""
+        """Return a value with errors, after advancing them by a time."""
         change = seconds * self._normal(np.sqrt(2 * self.frequency) * self.drift)
         self.current = np.exp(-seconds * self.frequency) * self.current + change
         return np.asarray(value) * self.scale + self.bias + self._normal(self.noise)
@@ -99,13 +99,13 @@ class _HectorPlugin(PeriodicPlugin):
 class HectorGps(_HectorPlugin):
     """The plugin. Parameters: topicName, velocityTopicName, frameId, referenceLatitude, Longitude, Heading and Altitude, status.
 
-    The errors of the position have no prefix, those of the velocity the prefix ``velocity``.
+    The error parameters of the position have no prefix, those of the velocity have the prefix ``velocity``.
     """
 
     default_rate = 4.0
 
     def load(self) -> None:
-        """Compute the radii of the earth at the reference."""
+        """Compute the earth's radii at the reference position."""
         super().load()
         self._latitude = self.number("referenceLatitude", 49.9)
         self._longitude = self.number("referenceLongitude", 8.9)
@@ -125,13 +125,13 @@ class HectorGps(_HectorPlugin):
         self._speeds = self.publish_to(self.text("velocityTopicName", "fix_velocity"), Vector3Stamped)
 
     def reset(self) -> None:
-        """Draw new drifts."""
+        """Draw new random drifts."""
         super().reset()
         self._position.reset()
         self._velocity.reset()
 
     def measure(self, seconds: float) -> None:
-        """Publish the position and the velocity."""
+        """Publish position and velocity."""
         state = self.body.state
         vx, vy, vz = self._velocity.measured(state.linear, seconds).tolist()
         x, y, z = self._position.measured(state.pose.position, seconds).tolist()
@@ -170,14 +170,14 @@ class HectorImu(_HectorPlugin):
         self.serve(self.text("serviceName", f"{topic}/calibrate"), Empty, self._calibrate)
 
     def reset(self) -> None:
-        """Draw new drifts."""
+        """Draw new random drifts."""
         super().reset()
         self._velocity = None
         for model in (self._accel, self._turn, self._yaw):
             model.reset()
 
     def measure(self, seconds: float) -> None:
-        """Publish the orientation, the angular velocity and the acceleration, in which gravity appears."""
+        """Publish the orientation, the angular velocity and the acceleration, which includes gravity."""
         state = self.body.state
         last, self._velocity = self._velocity, state.linear
         if last is None or seconds <= 0:
@@ -191,7 +191,7 @@ class HectorImu(_HectorPlugin):
         rates = self._turn.measured(rotate_back(turned.orientation, state.angular), seconds).tolist()
         self._yaw.measured(np.zeros(1), seconds)
 
-        # The error of the orientation is that of the accelerometer and of the compass, as in an attitude filter.
+        # As in an attitude filter, the orientation's error comes from the accelerometer and the compass.
         strength = math.hypot(*gravity)
         bx, by, bz = self._accel.bias.tolist()
         dx, dy, _ = rotate(state.pose.orientation, (bx, by, bz))
@@ -240,7 +240,7 @@ class HectorSonar(RayPlugin):
         self._last_ns = self.simulation.time_ns
 
     def reset(self) -> None:
-        """Draw a new drift."""
+        """Draw a new random drift."""
         super().reset()
         self._errors.reset()
         self._last_ns = self.simulation.time_ns

@@ -19,7 +19,7 @@ __all__ = ["Imu", "ImuSensor", "offset_of"]
 
 
 class _Accelerometer:
-    """Measures a link's motion at a place in it: the acceleration is the change of velocity since the last measurement."""
+    """Measures the motion of a point on a link. The acceleration is the change in velocity since the last measurement."""
 
     def __init__(self, link: SimLink, place: Pose) -> None:
         self._link = link
@@ -27,7 +27,7 @@ class _Accelerometer:
         self._last: tuple[int, Vector] | None = None
 
     def measure(self, time_ns: int) -> tuple[Pose, Vector, Vector]:
-        """Return the pose in the world, and the angular velocity and the acceleration in the sensor's axes."""
+        """Return the pose in the world, and the angular velocity and acceleration in the sensor's axes."""
         state = self._link.state
         pose = compose(state.pose, self._place)
         arm = difference(pose.position, state.pose.position)
@@ -42,7 +42,7 @@ class _Accelerometer:
 
 
 def offset_of(plugin: PluginBase) -> Pose:
-    """Return the pose of xyzOffset and rpyOffset."""
+    """Return the pose given by xyzOffset and rpyOffset."""
     x, y, z = plugin.numbers("xyzOffset", (0.0, 0.0, 0.0))
     roll, pitch, yaw = plugin.numbers("rpyOffset", (0.0, 0.0, 0.0))
     return pose_from_rpy((x, y, z), (roll, pitch, yaw))
@@ -86,7 +86,7 @@ class Imu(PeriodicPlugin):
 
 
 class ImuSensor(SensorPlugin):
-    """gazebo_ros_imu_sensor: reports accelerations as an accelerometer does, +9.8 upwards at rest.
+    """gazebo_ros_imu_sensor: reports accelerations like a real accelerometer, +9.8 upwards at rest.
 
     Parameters: frameName (required), topicName, updateRateHZ, gaussianNoise, rpyOffset, initialOrientationAsReference.
     """
@@ -105,7 +105,7 @@ class ImuSensor(SensorPlugin):
         self.rate = self.number("updateRateHZ", 1.0)
 
     def reset(self) -> None:
-        """Begin the period again."""
+        """Restart the period."""
         super().reset()
         self._meter = _Accelerometer(self.sensor_link, self.sensor.pose)
 

@@ -1,4 +1,4 @@
-"""libgazebo_ros_joint_pose_trajectory.so: sets the joints' positions from a trajectory, without forces."""
+"""libgazebo_ros_joint_pose_trajectory.so: sets joint positions from a trajectory, without forces."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _ZERO = (0.0, 0.0, 0.0)
 class JointPoseTrajectory(ModelPlugin):
     """The plugin. Parameters: topicName, serviceName.
 
-    The next point follows after a point's ``time_from_start``, as in the reference. While a trajectory runs, the link that
-    ``header.frame_id`` names, or the model, keeps its pose. The reference stops the physics of the whole world meanwhile; here
-    only the model stops.
+    As in Gazebo's plugin, each point is held for its ``time_from_start`` before the next one. While a trajectory runs, the link
+    in ``header.frame_id``, or the whole model, keeps its pose. Gazebo's plugin stops the physics of the whole world for that
+    time; here, only the model stops.
     """
 
     def load(self) -> None:
-        """Subscribe."""
+        """Subscribe to the topic."""
         self.reset()
         name = "set_joint_trajectory"
         self.subscribe_to(self.text("topicName", name), JointTrajectory, self._on_message)
@@ -47,7 +47,7 @@ class JointPoseTrajectory(ModelPlugin):
         self._held: Pose | None = None
 
     def update(self) -> None:
-        """Set the positions of the point whose time has come, and hold them until the next one."""
+        """Set the positions of the point that is due, and hold them until the next point."""
         message = self._message
         if message is None:
             return

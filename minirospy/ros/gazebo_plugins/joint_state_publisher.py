@@ -1,4 +1,4 @@
-"""libgazebo_ros_joint_state_publisher.so: publishes the positions and velocities of joints on joint_states."""
+"""libgazebo_ros_joint_state_publisher.so: publishes joint positions and velocities on joint_states."""
 
 from __future__ import annotations
 

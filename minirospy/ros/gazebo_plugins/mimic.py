@@ -1,4 +1,4 @@
-"""The mimic joint plugin of roboticsgroup: a joint that follows another one."""
+"""The mimic joint plugin of roboticsgroup: makes a joint follow another one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["MimicJoint"]
 
 
 class MimicJoint(ModelPlugin):
-    """The plugin. Parameters: joint, mimicJoint, multiplier, offset, maxEffort. A motor takes the place of its PID controller."""
+    """The plugin. Parameters: joint, mimicJoint, multiplier, offset, maxEffort. A motor replaces its PID controller."""
 
     def load(self) -> None:
         """Find the joints."""
@@ -22,6 +22,6 @@ class MimicJoint(ModelPlugin):
         self._max_effort = limit if limit > 0 and self.element.first("hasPID") is not None else math.inf
 
     def update(self) -> None:
-        """Move the motor's target."""
+        """Update the motor's target."""
         target = self._multiplier * self._leader.position + self._offset
         self._follower.set_position(target, self._max_effort)

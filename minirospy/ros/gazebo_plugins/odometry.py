@@ -104,7 +104,7 @@ class PlanarOdometry:
 
 
 def body_velocity(state: State) -> tuple[float, float, float]:
-    """Return the velocity forwards and to the left (m/s), and the turn rate (rad/s), by the yaw alone as in Gazebo."""
+    """Return the velocity forwards and to the left (m/s), and the turn rate (rad/s); as in Gazebo, only the yaw counts."""
     yaw = yaw_of(state.pose.orientation)
     vx, vy, _ = state.linear
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -40,7 +40,7 @@ _UNKNOWN_ENCODING = "bgr8"
 
 @dataclass(frozen=True)
 class Optics:
-    """A camera: it looks along x from its pose in the sensor. near, far: what is outside is not drawn, in m."""
+    """A camera that looks along the x axis of its pose in the sensor. near, far: range of the drawn distances, in m."""
 
     name: str = ""
     pose: Pose = IDENTITY
@@ -50,7 +50,7 @@ class Optics:
     horizontal_fov: float = 1.047  # rad
     near: float = 0.1
     far: float = 100.0
-    noise_mean: float = 0.0  # of 1: the brightest value
+    noise_mean: float = 0.0  # relative to the maximum brightness, which is 1
     noise_deviation: float = 0.0
     distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0)  # k1, k2, p1, p2, k3
 
@@ -61,7 +61,7 @@ class Optics:
 
 
 def read_optics(camera: XmlElement | None) -> Optics:
-    """Read ``<camera>``. Raise PluginError if a value cannot be used."""
+    """Read ``<camera>``. Raise PluginError if a value is invalid."""
     if camera is None:
         return Optics()
     image, clip = camera.first("image"), camera.first("clip")
@@ -86,9 +86,9 @@ def read_optics(camera: XmlElement | None) -> Optics:
 def to_camera_info(
     optics: Optics, number: Callable[[str, float], float], *, automatic: bool, baseline: float
 ) -> CameraInfo:
-    """Return the camera_info without its header.
+    """Return camera_info without its header.
 
-    number: returns a plugin's parameter or a default. automatic: whether the distortion is the sensor's. baseline: the distance
+    number: returns a plugin's parameter or a default. automatic: whether to use the sensor's distortion. baseline: the distance
     from the left camera in m.
     """
     focal = number("focalLength", 0.0) or optics.focal_length
@@ -104,12 +104,12 @@ def to_camera_info(
 
 
 def encoding_of(image_format: str) -> tuple[str, bool]:
-    """Return sensor_msgs' name of SDF's image format, and whether the format is known."""
+    """Return the sensor_msgs name of an SDF image format, and whether the format is known."""
     return ENCODINGS.get(image_format, _UNKNOWN_ENCODING), image_format in ENCODINGS
 
 
 def encode(picture: Picture, encoding: str) -> tuple[bytes, int]:
-    """Return the data of a picture (red, green, blue) in an encoding, and the bytes of a row."""
+    """Return the data of a picture (red, green, blue) in an encoding, and the number of bytes per row."""
     pixels: NDArray[np.uint8] | NDArray[np.uint16] = picture
     if encoding.startswith("mono"):
         pixels = (picture @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)

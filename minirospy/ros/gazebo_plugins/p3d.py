@@ -1,4 +1,4 @@
-"""libgazebo_ros_p3d.so: the true pose and velocity of a link as odometry."""
+"""libgazebo_ros_p3d.so: publishes the true pose and velocity of a link as odometry."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A thread that draws the pictures of all cameras, so that the physics does not wait for OpenGL.
 
-A camera copies the scene between two steps, and this thread draws the copy. A camera whose last picture is not finished skips
-one: as in Gazebo, the rate becomes lower if the computer is too slow.
+A camera copies the scene between two steps, and this thread draws the copy. If a camera's last picture is not finished, it skips
+the next one: as in Gazebo, the rate drops if the computer is too slow.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ __all__ = ["Photographer", "to_depths"]
 
 Draw = Callable[["Renderer"], None]
 
-MAX_CLOSING_SECONDS = 5.0  # for the pictures that are being drawn
+MAX_CLOSING_SECONDS = 5.0  # maximum wait for pictures that are being drawn
 
 
 class _DrawingThread:
-    """Runs jobs in one thread, which owns the contexts of OpenGL; it ends with the last user."""
+    """Runs jobs in one thread, which owns the OpenGL contexts and ends with its last user."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -47,7 +47,7 @@ class _DrawingThread:
                 self._thread.start()
 
     def leave(self) -> None:
-        """Remove a user; after the last one, wait for the thread's end."""
+        """Remove a user. After removing the last one, wait until the thread has ended."""
         with self._lock:
             self._users -= 1
             thread, is_last = self._thread, not self._users
@@ -58,11 +58,11 @@ class _DrawingThread:
             thread.join(MAX_CLOSING_SECONDS)
 
     def run(self, job: Callable[[], object]) -> None:
-        """Run a job later, in the thread."""
+        """Queue a job for the thread."""
         self._jobs.put(job)
 
     def warn_once(self, error: Exception) -> None:
-        """Log why there are no pictures, for all cameras together."""
+        """Log, once for all cameras, why there are no pictures."""
         if not self._is_warned:
             self._is_warned = True
             rospy.logwarn("cameras publish no pictures: %s", error)
@@ -79,9 +79,9 @@ _thread = _DrawingThread()
 
 
 class Photographer:
-    """Takes the pictures of one camera.
+    """Takes one camera's pictures.
 
-    simulation: is used in its own thread only. width, height: of the pictures.
+    simulation: used only in its own thread. width, height: the size of the pictures.
     """
 
     def __init__(self, simulation: Simulation, width: int, height: int) -> None:
@@ -95,10 +95,10 @@ class Photographer:
         _thread.join()
 
     def take(self, pose: Pose, horizontal_fov: float, clip: tuple[float, float], draw: Draw) -> bool:
-        """Copy the scene now, and call ``draw`` later in the drawing thread. Return whether this was possible.
+        """Copy the scene now, and call ``draw`` later in the drawing thread. Return False if that is not possible.
 
-        It is not possible if OpenGL is missing or not yet open, or if the last picture is not finished.
-        Call it in the simulation's thread.
+        It is not possible if OpenGL is missing or not open yet, or if the last picture is not finished. Call this in the
+        simulation's thread.
         """
         renderer = self._renderer
         if renderer is None:
@@ -115,7 +115,7 @@ class Photographer:
         return True
 
     def close(self) -> None:
-        """Free the context of OpenGL."""
+        """Free the OpenGL context."""
         if not self._is_closed:
             self._is_closed = True
             _thread.run(self._free)
@@ -143,6 +143,6 @@ class Photographer:
 
 
 def to_depths(renderer: Renderer, far: float) -> NDArray[np.float32]:
-    """Return the captured depths in m, with the far limit where nothing is."""
+    """Return the captured depths in m, with the far limit for pixels that show nothing."""
     depths: NDArray[np.float32] = np.minimum(renderer.depth(), np.float32(far))
     return depths

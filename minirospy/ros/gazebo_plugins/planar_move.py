@@ -1,4 +1,4 @@
-"""libgazebo_ros_planar_move.so: moves a whole model over the ground by /cmd_vel, and publishes /odom."""
+"""libgazebo_ros_planar_move.so: moves a whole model over the ground as commanded on /cmd_vel, and publishes /odom."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PlanarMove(DrivePlugin):
         self._last: tuple[int, Pose, float] | None = None  # time in ns, pose and yaw of the last message
 
     def update(self) -> None:
-        """Set the model's velocity, and publish."""
+        """Set the model's velocity, and publish odometry."""
         now_ns = self.simulation.time_ns
         if 0 <= self._timeout < (now_ns - self.commanded_ns) / 1e9:
             self.command = (0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ class PlanarMove(DrivePlugin):
             self.publish_odometry(pose._replace(position=(px, py, 0.0)), velocity, shown=pose)
 
     def _mean_velocity(self, now_ns: int, pose: Pose, yaw: float) -> tuple[float, float, float]:
-        """Return the velocity forwards, to the left and the turn rate since the last message, as in Gazebo."""
+        """Return the mean velocity forwards and to the left, and the mean turn rate, since the last message, as in Gazebo."""
         last, self._last = self._last, (now_ns, pose, yaw)
         if last is None or now_ns <= last[0]:
             return 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""libgazebo_ros_range.so: a sonar or infrared sensor, which reports the nearest of its rays."""
+"""libgazebo_ros_range.so: a sonar or infrared sensor, which reports the shortest distance that its rays measure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rays of a ``<ray>`` sensor, and the base class of the plugins that cast them."""
+"""The rays of a ``<ray>`` sensor, and the base class of plugins that cast them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from minirospy.ros.gazebo_ros.plugins import RayFan, SensorPlugin
 
 __all__ = ["RayPlugin", "Rays", "read_rays"]
 
-MAX_RAYS = 1_000_000  # of one sensor; more would fill the memory
+MAX_RAYS = 1_000_000  # per sensor; more would fill the memory
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Rays(RayFan):
     noise_deviation: float = 0.0
 
     def cast(self, simulation: Simulation, pose: Pose) -> NDArray[np.float64]:
-        """Return the distances that the rays measure from a pose, infinite if they hit nothing."""
+        """Return the distances that the rays measure from a pose; infinite for rays that hit nothing."""
         return simulation.cast_rays(pose, self.directions, self.max_range, min_range=self.min_range).distances
 
     def noisy(self, simulation: Simulation, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return distances with noise, within the range's limits. Infinite distances are not changed."""
+        """Return the distances with noise, within the range limits. Infinite distances stay unchanged."""
         if self.noise_deviation <= 0 and self.noise_mean == 0:
             return ranges
         noise = simulation.random.normal(self.noise_mean, self.noise_deviation, len(ranges))
@@ -48,7 +48,7 @@ class RayPlugin(SensorPlugin):
     """A plugin with rays and one topic. Parameters: topicName, frameName."""
 
     def load_rays(self, topic: str, kind: type[rospy.Message]) -> None:
-        """Read the sensor's rays, and start the topic; ``topic`` is its default."""
+        """Read the sensor's rays, and open the topic; ``topic`` is its default name."""
         self.shown_rays = self.rays = read_rays(self.sensor)
         self.frame_id = self.frame("frameName", "/world")
         self.publisher = self.output_to(self.text("topicName", topic), kind)
@@ -59,7 +59,7 @@ class RayPlugin(SensorPlugin):
 
 
 def read_rays(sensor: Sensor) -> Rays:
-    """Read ``<ray>``, or ``<lidar>``. Raise PluginError if a value cannot be used."""
+    """Read ``<ray>`` or ``<lidar>``. Raise PluginError if a value is invalid."""
     ray = sensor.element.first("ray") or sensor.element.first("lidar")
     scan = _child(ray, "scan")
     horizontal, vertical = _child(scan, "horizontal"), _child(scan, "vertical")

@@ -1,4 +1,4 @@
-"""libgazebo_ros_skid_steer_drive.so: drives four wheels by /cmd_vel, and publishes /odom."""
+"""libgazebo_ros_skid_steer_drive.so: drives four wheels as commanded on /cmd_vel, and publishes /odom."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class SkidSteerDrive(DrivePlugin):
     """The plugin."""
 
     def load(self) -> None:
-        """Start the wheels' motors."""
+        """Start the wheel motors."""
         self._joints = [(self.joint(self.text(tag, name)), side) for tag, name, side in _WHEELS]
         self._separation = self.number("wheelSeparation", 0.4)
         self._radius = self.number("wheelDiameter", 0.15) / 2

@@ -1,4 +1,4 @@
-"""libgazebo_ros_vacuum_gripper.so: while it is on, links near the gripper follow it."""
+"""libgazebo_ros_vacuum_gripper.so: while switched on, it pulls nearby links along with the gripper."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from minirospy.ros.gazebo_ros.plugins import ModelPlugin
 
 __all__ = ["VacuumGripper"]
 
-REACH = 0.05  # m between the origins of the links
-SNAP = 0.01  # m; a nearer link moves to the gripper's origin
+REACH = 0.05  # m; maximum distance between the links' origins
+SNAP = 0.01  # m; a link closer than this moves to the gripper's origin
 MAX_FORCE = 20.0  # N
 
 
 class VacuumGripper(ModelPlugin):
-    """The plugin. Parameters: bodyName, topicName. Services: on, off, in the namespace."""
+    """The plugin. Parameters: bodyName, topicName. Services: on and off, in the plugin's namespace."""
 
     def load(self) -> None:
         """Find the link."""
@@ -32,7 +32,7 @@ class VacuumGripper(ModelPlugin):
         self.serve("off", Empty, lambda request: self._switch(request, is_on=False))
 
     def update(self) -> None:
-        """Move the links in reach, and publish whether there are any."""
+        """Move the links within reach, and publish whether there are any."""
         is_holding = self._is_on and self._attract()
         if self._publisher.get_num_connections():
             self._publisher.publish(Bool(is_holding))

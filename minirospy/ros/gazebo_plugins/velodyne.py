@@ -1,6 +1,6 @@
-"""libgazebo_ros_velodyne_laser.so and libgazebo_ros_velodyne_gpu_laser.so: the points of a scanner with several rows.
+"""libgazebo_ros_velodyne_laser.so and libgazebo_ros_velodyne_gpu_laser.so: publish the points of a multi-row scanner.
 
-Layout, order and filters of the points are those of velodyne_simulator 1.0.12 (https://bitbucket.org/DataspeedInc).
+The layout, order and filters of the points match velodyne_simulator 1.0.12 (https://bitbucket.org/DataspeedInc).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Velodyne(RayPlugin):
         self._is_organized = self.flag("organize_cloud", False)
         self._nearest = max(self.number("min_range", 0.0), rays.min_range)
         self._farthest = min(self.number("max_range", math.inf), rays.max_range)
-        # All intensities are 0: a higher minimum leaves no points.
+        # All intensities are 0, so a higher minimum leaves no points.
         self._has_points = self._is_organized or self.number("min_intensity", 0.0) <= 0
         self._noise = self.number("gaussianNoise", 0.0)
 

@@ -1,4 +1,4 @@
-"""The simulation: a node that answers under the names of Gazebo's, on MuJoCo.
+"""The simulation: a node with the names of Gazebo's node, based on MuJoCo.
 
 Source: http://wiki.ros.org/gazebo_ros.
 """

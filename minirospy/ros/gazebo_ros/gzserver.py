@@ -1,7 +1,7 @@
 """`rosrun gazebo_ros gzserver`: the node /gazebo. `gazebo`, `debug` and `gzclient` are variants of it.
 
-Exit statuses: 0 after Ctrl-C or a request to shut down, 1 if the simulation's library or the world file is missing or
-invalid or the simulation failed, 2 for wrong arguments.
+Exit statuses: 0 after Ctrl-C or a shutdown request; 1 if the simulation library or world file is missing or invalid, or the
+simulation failed; 2 for wrong arguments.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ DEFAULT_WORLD = "worlds/empty.world"
 
 
 def new_parser(program: str) -> argparse.ArgumentParser:
-    """Return the parser of gzserver, with Gazebo's options. Those without effect here say so."""
+    """Return gzserver's parser, with Gazebo's options. Options without effect say so in their help."""
     parser = argparse.ArgumentParser(prog=program, description=ABOUT)
     parser.add_argument("world", nargs="?", default=DEFAULT_WORLD, help="file of the world")
     parser.add_argument("-v", "--version", action="version", version=ABOUT)
@@ -51,7 +51,7 @@ def new_parser(program: str) -> argparse.ArgumentParser:
 
 
 def read_world_file(name: str, resources: ResourcePaths) -> World:
-    """Return the world in a file. Raise SdfError if it does not exist or is invalid."""
+    """Return the world in a file. Raise SdfError if the file is missing or invalid."""
     path = resources.find_world(name)
     if path is None:
         raise SdfError(name, 0, "there is no such world file, here or below GAZEBO_RESOURCE_PATH")
@@ -63,7 +63,7 @@ def read_world_file(name: str, resources: ResourcePaths) -> World:
 
 
 def world_warnings(world: World) -> list[str]:
-    """Return the lines about a world and its models. A line that several models share is returned once, with their number."""
+    """Return the warnings about a world and its models. A line common to several models is returned once, with their number."""
     places: dict[str, list[str]] = {}
     for model in world.models:
         for line in model.warnings:
@@ -77,7 +77,7 @@ def world_warnings(world: World) -> list[str]:
 
 
 def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     words = list(rospy.myargv()[1:] if argv is None else argv)
     arguments = new_parser(program).parse_args([word for word in words if word])
     try:
@@ -114,7 +114,7 @@ def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
 
 def _start_node() -> None:
     """Start the node /gazebo, and set /use_sim_time if it is not set."""
-    # This process sets its own clock, without a subscription to its own topic.
+    # This process sets its clock itself, without subscribing to its own topic.
     rospy.init_node("gazebo", disable_rostime=True)
     rospy.loginfo("%s", ABOUT)
     if not rospy.has_param("/use_sim_time"):

@@ -1,4 +1,4 @@
-"""The thread that owns the simulation: it steps in real time or faster, and runs other threads' jobs between steps."""
+"""The thread that owns the simulation. It steps in real time or faster, and runs jobs of other threads between steps."""
 
 from __future__ import annotations
 
@@ -18,24 +18,23 @@ __all__ = ["LoopClosed", "SimulationLoop"]
 
 _T = TypeVar("_T")
 
-DEFAULT_TICK_HZ = 250.0  # /clock and the states of models; 1000 messages/s would keep every Python node busy
-MAX_LAG_SECONDS = 0.1  # a simulation that is later than this does not try to catch up
-MAX_STEPPING_SECONDS = 0.1  # of wall time, after which jobs run before the next tick: a step may be 1 ns
+DEFAULT_TICK_HZ = 250.0  # rate of /clock and the models' states; a 1000 Hz clock keeps every Python node busy
+MAX_LAG_SECONDS = 0.1  # if the simulation is later than this, it does not try to catch up
+MAX_STEPPING_SECONDS = 0.1  # of wall time; then jobs run before the next tick, because a step may be 1 ns
 
-MAX_WAIT_SECONDS = 60.0  # for the next steps; longer times overflow in wait()
+MAX_WAIT_SECONDS = 60.0  # maximum wait for the next steps; longer times overflow in wait()
 
 
 class LoopClosed(MinirospyError):
-    """Raised by a job if the simulation has ended."""
+    """Raised for a job if the simulation has ended."""
 
 
 class SimulationLoop:
     """Runs a simulation.
 
-    simulation: only this loop's thread uses it; other threads use :meth:`call`.
-    before_step: is called before each step. on_tick: is called at the tick rate of simulated time, and after each reset.
-    on_lost: is called for each model that the simulation removed.
-    on_failure: is called if the thread ends by an error, which ``failure`` is then.
+    simulation: used only by this loop's thread; other threads use :meth:`call`. before_step: called before each step. on_tick:
+    called at the tick rate of simulated time, and after each reset. on_lost: called for each model that the simulation has
+    removed. on_failure: called if an error ends the thread; the error is then in ``failure``.
     """
 
     def __init__(self, simulation: Simulation, *, paused: bool = False, tick_rate: float = 0.0) -> None:
@@ -45,7 +44,7 @@ class SimulationLoop:
         self.on_lost: Callable[[LostModel], None] = lambda lost: None
         self.on_failure: Callable[[Exception], object] = lambda error: None
         self.failure: Exception | None = None
-        self.real_time_factor = 0.0  # of the last second of wall time
+        self.real_time_factor = 0.0  # over the last second of wall time
         self._paused = paused
         self._rate = simulation.physics.update_rate
         self._tick_rate = tick_rate or DEFAULT_TICK_HZ
@@ -63,7 +62,7 @@ class SimulationLoop:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread, and wait for it. Jobs that have not run raise LoopClosed."""
+        """Stop the thread, and wait for it. Jobs that have not run raise LoopClosed."""
         with self._wake:
             self._is_closed = True
             self._wake.notify_all()
@@ -71,7 +70,7 @@ class SimulationLoop:
             self._thread.join()
 
     def call(self, function: Callable[[], _T]) -> _T:
-        """Run a function between two steps, in the loop's thread; return its result. Raise LoopClosed after the end."""
+        """Run a function between two steps, in the loop's thread; return its result. Raise LoopClosed if the loop has ended."""
         if threading.current_thread() is self._thread:
             return function()
         return self._submit(function).result()
@@ -91,31 +90,31 @@ class SimulationLoop:
         return self._paused
 
     def set_paused(self, paused: bool) -> None:
-        """Pause or continue; return after the current steps."""
+        """Pause or continue; return after the steps in progress."""
         self.call(lambda: setattr(self, "_paused", paused))
 
     @property
     def update_rate(self) -> float:
-        """Return the steps per second of wall time; 0 means as many as possible."""
+        """Return the number of steps per second of wall time; 0 means as many as possible."""
         return self._rate
 
     def set_update_rate(self, rate: float) -> None:
-        """Set the steps per second of wall time. Call it in the loop's thread."""
+        """Set the number of steps per second of wall time. Call this in the loop's thread."""
         self._rate = max(rate, 0.0)
         self._deadline = wall.monotonic()
 
     def end_after(self, steps: int, function: Callable[[], object]) -> None:
-        """Pause after a number of steps since the start, and call a function."""
+        """After this number of steps since the start, pause and call a function."""
         self.call(lambda: setattr(self, "_end", (steps, function)))
 
     def step(self, count: int) -> None:
-        """Advance by steps, while paused or not. Call it in the loop's thread."""
+        """Advance by a number of steps, even while paused. Call this in the loop's thread."""
         for _ in range(count):
             self._step_once()
         self.on_tick()
 
     def reset(self, *, with_time: bool) -> None:
-        """Reset the models, and the time if ``with_time``. Call it in the loop's thread."""
+        """Reset the models, and the time if ``with_time``. Call this in the loop's thread."""
         if with_time:
             self.simulation.reset()
         else:
@@ -149,7 +148,7 @@ class SimulationLoop:
                 self._end = None
 
     def _advance(self, count: int) -> int:
-        """Advance by steps, and by fewer if they take too long; return their number."""
+        """Advance by a number of steps, or fewer if they take too long; return the number."""
         end = wall.monotonic() + MAX_STEPPING_SECONDS
         done = 0
         while done < count and not self._is_closed:
@@ -175,7 +174,7 @@ class SimulationLoop:
                 future.set_exception(error)
 
     def _must_wait(self) -> bool:
-        """Wait while paused, or until the next steps are due. Return whether jobs must be looked at again."""
+        """Wait while paused, or until the next steps are due. Return whether to check for jobs again."""
         with self._wake:
             if self._jobs or self._is_closed:
                 return True

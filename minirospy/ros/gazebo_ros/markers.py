@@ -1,7 +1,7 @@
-"""The world as markers, for rviz: /gazebo/world_markers, in the frame ``world``. The dashboard's window uses window.py.
+"""Publishes the world as rviz markers: /gazebo/world_markers, in the frame ``world``. The dashboard's window uses window.py.
 
-All visuals of all models are published (latched) whenever a model is added or removed. Models that move are published again
-while there are subscribers.
+All visuals of all models are published (latched) whenever a model is added or removed. Moving models are published again while
+there are subscribers.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ if TYPE_CHECKING:
 __all__ = ["WorldMarkers", "has_moved", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
-RATE_HZ = 10.0  # of simulated time, for models that move
+RATE_HZ = 10.0  # of simulated time, for moving models
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
-MAX_PLANE = 100.0  # m; larger planes are drawn smaller
+MAX_PLANE = 100.0  # m; larger planes are drawn with this size
 PLANE_THICKNESS = 0.001  # m
-MIN_CHANGE = 1e-5  # m, and of quaternions: bodies at rest tremble by less
+MIN_CHANGE = 1e-5  # m, and for quaternions; bodies at rest tremble by less
 
 
 class WorldMarkers:
@@ -84,7 +84,7 @@ class WorldMarkers:
             return
         self._next_ns = now + round(1e9 / RATE_HZ)
         if has_moved(self._published, self._simulation.body_poses()):
-            # The latch keeps only the last message, so it contains all markers.
+            # A latched topic keeps only its last message, so publish all markers together.
             self._send(self._all())
 
     def _send(self, markers: list[Marker]) -> None:
@@ -96,12 +96,12 @@ class WorldMarkers:
 
 
 def has_moved(before: NDArray[np.float64], now: NDArray[np.float64]) -> bool:
-    """Return whether one of (n, 7) poses has changed visibly, or there are other ones."""
+    """Return whether any of the (n, 7) poses has visibly changed, or their number has."""
     return before.shape != now.shape or bool((abs(now - before) > MIN_CHANGE).any())
 
 
 def model_markers(model: SimModel) -> list[Marker]:
-    """Return the shapes of a model where they are now, in the frame ``world``."""
+    """Return the shapes of a model at their current poses, in the frame ``world``."""
     found = []
     for link in model.links.values():
         pose = link.pose
@@ -115,8 +115,8 @@ def model_markers(model: SimModel) -> list[Marker]:
 
 @functools.cache
 def _uri(path: str) -> str:
-    """Return a file's URI: package://, which the dashboard can read, if the file is in a package."""
-    file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may have relative folders
+    """Return a file's URI. If the file is in a package, the URI is package://, which the dashboard can read."""
+    file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may contain relative folders
     for folder in file.parents:
         if name := package_name(folder):
             return f"package://{name}/{file.relative_to(folder).as_posix()}"
@@ -124,9 +124,9 @@ def _uri(path: str) -> str:
 
 
 def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker | None:
-    """Return the marker of a visual at a pose, without a frame; None if its shape cannot be shown.
+    """Return the marker for a visual at a pose, without a frame; None if its shape cannot be shown.
 
-    Its text is the URI of its picture, which rviz ignores.
+    The marker's text is the URI of the picture, which rviz ignores.
     """
     marker = Marker(action=Marker.ADD, ns=namespace, id=number, pose=to_pose(pose))
     if visual.material.texture:
@@ -159,7 +159,7 @@ def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker
 def _add_triangles(
     marker: Marker, shape: MeshShape | Polyline | Heightmap, *, is_colored: bool
 ) -> Marker | None:
-    """Return the marker with the triangles of a shape, or None after one line if there are none."""
+    """Return the marker with a shape's triangles. If it has none, log a line once and return None."""
     try:
         points, colors = _triangle_points(shape)
     except MeshError as error:
@@ -180,7 +180,7 @@ def _warn_once(error: str) -> None:
 
 @functools.lru_cache(maxsize=64)
 def _triangle_points(shape: MeshShape | Polyline | Heightmap) -> tuple[list[Point], list[ColorRGBA]]:
-    """Return the corners and their colours, none if the shape has none. Each change of the world needs them again."""
+    """Return the corners and colours of a shape's triangles, if any. Each change of the world needs them again."""
     found = read_triangles(shape)
     colors = [] if found.colors is None else [ColorRGBA(*color) for color in found.colors.tolist()]
     return [Point(x, y, z) for x, y, z in found.corners.tolist()], colors

@@ -1,4 +1,4 @@
-"""Convert between the simulation's records and messages."""
+"""Convert between the simulation's records and ROS messages."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def vector_of(message: object) -> Vector:
 
 
 def quaternion_of(message: QuaternionMsg) -> Quaternion:
-    """Return a quaternion of length 1; one of length 0 is the identity."""
+    """Return a unit quaternion; the zero quaternion becomes the identity."""
     values = (message.x, message.y, message.z, message.w)
     length = math.sqrt(sum(value * value for value in values))
     if not length > 0:
@@ -67,7 +67,7 @@ def pose_of(message: PoseMsg) -> Pose:
 
 
 def time_of(nanoseconds: int) -> Time:
-    """Return the time of the simulation as ROS time."""
+    """Return the simulation's time as ROS time."""
     return Time(*divmod(nanoseconds, _BILLION))
 
 

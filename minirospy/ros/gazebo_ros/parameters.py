@@ -1,4 +1,4 @@
-"""Read the parameters of plugins and sensors: texts, and numbers in the range that their tag allows."""
+"""Read parameters of plugins and sensors: texts, and numbers within the range that their tag allows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAY_BE_INFINITE = {
 
 
 class PluginError(MinirospyError):
-    """Raised by ``load`` if a plugin's parameters cannot be used; the message is one line."""
+    """Raised by ``load`` if a plugin's parameters are invalid. The message is one line."""
 
 
 def text_of(element: XmlElement | None, tag: str, default: str = "") -> str:
@@ -33,13 +33,13 @@ def text_of(element: XmlElement | None, tag: str, default: str = "") -> str:
 
 
 def number_of(element: XmlElement | None, tag: str, default: float) -> float:
-    """Return a child's number, or the default. Raise PluginError if it is not a number, or out of the tag's range."""
+    """Return a child's number, or the default. Raise PluginError if it is not a number or out of the tag's range."""
     text = text_of(element, tag)
     return _number(tag, text, text) if text else default
 
 
 def numbers_of(element: XmlElement | None, tag: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-    """Return a child's numbers, or an empty tuple. Raise PluginError as :func:`number_of` does, or for another count."""
+    """Return a child's numbers, or an empty tuple. Raise PluginError as :func:`number_of` does, or if their count is wrong."""
     text = text_of(element, tag)
     words = text.split()
     if words and len(words) not in counts:

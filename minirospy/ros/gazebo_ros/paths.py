@@ -1,11 +1,11 @@
-"""The folders in which the simulator looks for models, worlds and media, and the files that URIs name.
+"""The folders in which the simulator searches for models, worlds and media, and the files that URIs refer to.
 
 As in gazebo_ros, the folders come from GAZEBO_MODEL_PATH and GAZEBO_RESOURCE_PATH, then from packages that export them::
 
     <export><gazebo_ros gazebo_model_path="${prefix}/models" gazebo_media_path="${prefix}"/></export>
 
-The library of models and worlds beside this module comes last. Nothing is downloaded.
-Source: https://classic.gazebosim.org/tutorials?tut=components, gazebo_ros_paths_plugin.
+The library of models and worlds next to this module comes last. Nothing is downloaded. Source:
+https://classic.gazebosim.org/tutorials?tut=components, gazebo_ros_paths_plugin.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ _MANIFEST = "package.xml"
 _MAX_MANIFEST_BYTES = 1024 * 1024
 
 FindPackage = Callable[[str], "Path | str"]
-"""Return a package's folder, or raise an error of minirospy if it does not exist."""
+"""Returns a package's folder. Raises a MinirospyError if the package does not exist."""
 
 
 @dataclass(frozen=True)
 class ResourcePaths:
-    """Where models, media and worlds are searched, in this order, and the function that finds packages."""
+    """The folders searched for models, media and worlds, in order, and the function that finds packages."""
 
     models: tuple[str, ...]
     media: tuple[str, ...]
     find_package: FindPackage | None = None
 
     def resolve(self, uri: str) -> str | None:
-        """Return the path of the existing file or folder that a URI or a path names, or None."""
+        """Return the path of the existing file or folder that a URI or path refers to, or None."""
         scheme, separator, rest = uri.strip().partition("://")
         if not separator:
             return self._existing(uri.strip())
@@ -62,7 +62,7 @@ class ResourcePaths:
         return _first((os.curdir, *self.media, *self.models), path)
 
     def _model(self, name: str) -> str | None:
-        # Descriptions that were converted from URDF write model:// for package://.
+        # Descriptions converted from URDF contain model:// in place of package://.
         return _first(self.models, name) or self._package(name)
 
     def _package(self, name: str) -> str | None:
@@ -82,9 +82,9 @@ def resource_paths(
     find_package: FindPackage | None = None,
     separator: str = os.pathsep,
 ) -> ResourcePaths:
-    """Return the search paths of an environment. ``package_folders``: those whose package.xml may export folders.
+    """Return an environment's search paths. ``package_folders``: packages whose package.xml may export folders.
 
-    ``~/.gazebo/models``, into which Gazebo downloads models, is searched if HOME is set.
+    ``~/.gazebo/models``, to which Gazebo downloads models, is searched if HOME is set.
     """
     folders = list(package_folders)
     models = [*_split(variables.get("GAZEBO_MODEL_PATH", ""), separator)]
@@ -100,7 +100,7 @@ def resource_paths(
 
 
 def exported_paths(folders: Iterable[Path | str], attribute: str, separator: str = os.pathsep) -> list[str]:
-    """Return the folders that packages export for gazebo_ros in an attribute. Packages that cannot be read export nothing."""
+    """Return the folders that packages export for gazebo_ros in an attribute. Unreadable packages are skipped."""
     found: list[str] = []
     for folder in folders:
         for element in _exports(Path(folder)):
@@ -116,7 +116,7 @@ def _exports(folder: Path) -> list[dict[str, str]]:
         if path.stat().st_size > _MAX_MANIFEST_BYTES:
             return []
         text = path.read_bytes()
-        if b"<gazebo_ros" not in text:  # parsing the manifests of hundreds of packages would take a second
+        if b"<gazebo_ros" not in text:  # parsing hundreds of manifests would take a second
             return []
         root = parse_xml(text)
     except (OSError, XmlError):
@@ -129,7 +129,7 @@ def _split(text: str, separator: str) -> list[str]:
 
 
 def _first(folders: Iterable[str], name: str) -> str | None:
-    """Return the path of the first folder that contains a file or folder of this name."""
+    """Return the path in the first folder that contains a file or folder of this name."""
     name = name.strip("/")
     paths = (os.path.normpath(os.path.join(folder, name)) for folder in folders)
     return next((path for path in paths if name and os.path.exists(path)), None)

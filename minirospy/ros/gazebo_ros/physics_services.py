@@ -1,6 +1,6 @@
 """Services for the properties of links, joints and lights, for forces, and for the world's physics.
 
-Source: http://wiki.ros.org/gazebo_ros, gazebo_msgs. A request that cannot be served gets ``success`` false and ROS's text.
+Source: http://wiki.ros.org/gazebo_ros, gazebo_msgs. The response to an invalid request has ``success`` false and ROS's text.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ __all__ = ["PhysicsServices"]
 
 
 class PhysicsServices:
-    """Offers the services of properties, forces and physics.
+    """Offers the services for properties, forces and physics.
 
     ode: the parameters of Gazebo's engine, which are kept and reported, and have no effect here.
     """
@@ -138,7 +138,7 @@ class PhysicsServices:
             offset = difference(compose(base, Pose(point)).position, pose.position)
             point = rotate_back(pose.orientation, offset)
         elif request.reference_frame in WORLD_FRAMES:
-            # In ROS, too, the point counts from the body's origin, in world axes, although the frame is the world.
+            # As in ROS, the point is relative to the body's origin, in world axes, even if the frame is the world.
             point = rotate_back(pose.orientation, point)
         else:
             rospy.logerr("ApplyBodyWrench: reference_frame is not a valid entity name")

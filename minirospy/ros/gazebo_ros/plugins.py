@@ -1,11 +1,11 @@
-"""The base classes of plugins, and how a library's name in SDF or URDF leads to a class.
+"""The base classes of plugins, and the lookup of a plugin's class by the library's name in SDF or URDF.
 
-A package with a plugin in Python exports it in its package.xml::
+A package that contains a Python plugin exports it in its package.xml::
 
     <export><gazebo_ros library="libmy_plugin.so" python="my_package.plugins.MyPlugin"/></export>
 
-and a model uses it as ``<plugin name="..." filename="libmy_plugin.so">``. All methods of a plugin run in the simulation's
-thread, between two steps, except callbacks of subscribers and services that it creates: those use ``self.call``.
+and a model uses it as ``<plugin name="..." filename="libmy_plugin.so">``. All methods of a plugin run in the simulation's thread,
+between two steps. Callbacks of its subscribers and services run in other threads, and use ``self.call``.
 """
 
 from __future__ import annotations
@@ -83,11 +83,11 @@ LIBRARIES = {
     "hector_gazebo_ros_gps": f"{_PLUGINS}.hector:HectorGps",
     "hector_gazebo_ros_sonar": f"{_PLUGINS}.hector:HectorSonar",
 }
-"""Dict from library, without ``lib`` and ``.so``, to module and class."""
+"""Maps a library, without ``lib`` and ``.so``, to a module and class."""
 
 
 class PluginBase:
-    """A plugin of the world.
+    """The base class of all plugins.
 
     loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's. due_ns: the time of the
     simulation before which :meth:`update` has nothing to do.
@@ -105,34 +105,34 @@ class PluginBase:
         self._closing: list[Callable[[], object]] = []
 
     def load(self) -> None:
-        """Read the parameters, and create publishers and subscribers. Raise PluginError if that is impossible."""
+        """Read the parameters, and create publishers and subscribers. Raise PluginError if that fails."""
 
     def update(self) -> None:
-        """Do the work of one step, before it."""
+        """Do the plugin's work for a step; called before the step."""
 
     def reset(self) -> None:
-        """Return to the state after ``load``; is called by reset_simulation, after the time was set to 0."""
+        """Return to the state after ``load``. Called by reset_simulation, after the time has been set to 0."""
 
     def close(self) -> None:
-        """Unregister the publishers and subscribers that :meth:`publish_to` and :meth:`subscribe_to` created."""
+        """Unregister the publishers and subscribers that :meth:`publish_to` and :meth:`subscribe_to` have created."""
         for function in self._closing:
             function()
         self._closing.clear()
 
     @property
     def title(self) -> str:
-        """Return the plugin's name and library, for messages."""
+        """Return the plugin's name and library, for log messages."""
         return _title(self.plugin, "the world")
 
     @property
     def namespace(self) -> str:
-        """Return ``<robotNamespace>``, which is resolved in the node's namespace, or the default, without a final slash."""
+        """Return ``<robotNamespace>``, resolved in the node's namespace, or the default; without a trailing slash."""
         text = self.text("robotNamespace", self.default_namespace)
         return "" if text in ("", "/") else "/" + text.strip("/")
 
     @property
     def now(self) -> Time:
-        """Return the time of the simulation."""
+        """Return the simulation's time."""
         return time_of(self.simulation.time_ns)
 
     def header(self, frame_id: str) -> Header:
@@ -140,7 +140,7 @@ class PluginBase:
         return Header(0, self.now, frame_id)
 
     def call(self, function: Callable[[], _T]) -> _T:
-        """Run a function between two steps; for the callbacks of subscribers and services."""
+        """Run a function between two steps. For use in callbacks of subscribers and services."""
         return self.loop.call(function)
 
     def text(self, tag: str, default: str = "") -> str:
@@ -154,9 +154,9 @@ class PluginBase:
         return text
 
     def number(self, tag: str, default: float) -> float:
-        """Return a parameter's number. Raise PluginError if it is not a number, or out of the tag's range.
+        """Return a parameter's number. Raise PluginError if it is not a number or out of the tag's range.
 
-        A negative rate means each step, as in Gazebo, and is named.
+        As in Gazebo, a negative rate means each step; a warning names it.
         """
         value = number_of(self.element, tag, default)
         if value < 0 and tag in _RATES:
@@ -165,7 +165,7 @@ class PluginBase:
         return value
 
     def numbers(self, tag: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        """Return a parameter's numbers, as many as the default has. Raise PluginError as :meth:`number` does."""
+        """Return a parameter's numbers, as many as in the default. Raise PluginError as :meth:`number` does."""
         return numbers_of(self.element, tag, (len(default),)) or default
 
     def flag(self, tag: str, default: bool) -> bool:
@@ -174,7 +174,7 @@ class PluginBase:
         return text in ("true", "1") if text else default
 
     def frame(self, tag: str, default: str) -> str:
-        """Return a parameter's name of a frame, without the slash at its start."""
+        """Return a parameter's frame name, without a leading slash."""
         return self.text(tag, default).lstrip("/")
 
     def noisy(self, values: Iterable[float], deviation: float) -> list[float]:
@@ -186,7 +186,7 @@ class PluginBase:
         return [value + error for value, error in zip(exact, noise, strict=True)]
 
     def resolve(self, topic: str) -> str:
-        """Return a topic's name in the plugin's namespace."""
+        """Return a topic's name, resolved in the plugin's namespace."""
         return topic if topic.startswith("/") else f"{self.namespace}/{topic}"
 
     def publish_to(
@@ -206,10 +206,10 @@ class PluginBase:
         return subscriber
 
     def serve(self, name: str, kind: type, handler: Callable[..., object]) -> None:
-        """Offer a service in the plugin's namespace. If this node offers it already, log an error, as in ROS."""
+        """Offer a service in the plugin's namespace. As in ROS, log an error if this node already offers it."""
         try:
             service: rospy.Service[Any] = rospy.Service(self.resolve(name), kind, handler)
-        except rospy.ServiceException:  # the same robot was spawned before, in the same namespace
+        except rospy.ServiceException:  # the same robot was already spawned in this namespace
             rospy.logerr(
                 "Tried to advertise a service that is already advertised in this node [%s]",
                 self.resolve(name),
@@ -231,20 +231,20 @@ class ModelPlugin(PluginBase):
 
     @property
     def title(self) -> str:
-        """Return the name and library of the plugin, and the model, for messages."""
+        """Return the plugin's name and library, and the model, for log messages."""
         return _title(self.plugin, f"model '{self.model.name}'")
 
     def joint(self, name: str) -> SimJoint:
-        """Return a joint that can move. Raise PluginError if the model has none of this name."""
+        """Return a movable joint. Raise PluginError if the model has none with this name."""
         joint = self.model.joints.get(name)
         if joint is None:
             raise PluginError(f"model '{self.model.name}' has no joint '{name}'")
         return joint
 
     def link(self, name: str) -> tuple[SimLink, Pose]:
-        """Return a link, and the pose in it of the named one, which may have been merged into it by a fixed joint.
+        """Return a link, and the named link's pose in it: a fixed joint may have merged the named link into another one.
 
-        Raise PluginError if there is none.
+        Raise PluginError if the link does not exist.
         """
         name = name.removeprefix(f"{self.model.name}::")
         if name in self.model.links:
@@ -256,7 +256,7 @@ class ModelPlugin(PluginBase):
 
 
 class Timer:
-    """Tells when a period of simulated time has passed. A rate of 0 means each step."""
+    """Reports when a period of simulated time has passed. A rate of 0 means every step."""
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate > 0 else 0
@@ -345,13 +345,13 @@ class SensorPlugin(PeriodicPlugin):
 
 
 class PluginHost:
-    """Loads and runs the plugins of the world and of its models."""
+    """Loads and runs the plugins of the world and its models."""
 
     def __init__(self, loop: SimulationLoop) -> None:
         self._loop = loop
-        self._plugins: dict[str, list[PluginBase]] = {}  # by the model's name; "" is the world
+        self._plugins: dict[str, list[PluginBase]] = {}  # by model name; "" is the world
         self._running: list[PluginBase] = []
-        self._named: set[str] = set()  # libraries that are missing, after the line that says so
+        self._named: set[str] = set()  # missing libraries that have already been logged
         self._exported: dict[str, tuple[str, Path]] | None = None
 
     def add_world(self, plugins: tuple[Plugin, ...]) -> None:
@@ -404,7 +404,7 @@ class PluginHost:
                 self._fail(plugin, error)
 
     def ray_sensors(self) -> list[SensorPlugin]:
-        """Return the sensors that have rays."""
+        """Return the sensors with rays."""
         return [
             each for each in self._running if isinstance(each, SensorPlugin) and each.shown_rays is not None
         ]
@@ -456,7 +456,7 @@ class PluginHost:
             rospy.logerr("%s failed at its end: %s", plugin.title, error)
 
     def _find(self, plugin: Plugin, owner: str) -> type[PluginBase] | None:
-        """Return the class of a plugin's library, or None after one line that names what is missing."""
+        """Return the class for a plugin's library. If it is missing, log a line once and return None."""
         library = plugin.library
         try:
             if target := LIBRARIES.get(library):
@@ -515,7 +515,7 @@ def _load_python(python: str, folder: Path) -> type[PluginBase]:
             sys.path.append(str(place))
     try:
         found: object = getattr(importlib.import_module(module), name)
-    except Exception as error:  # the user's module may raise anything
+    except Exception as error:  # the user's module may raise any exception
         raise PluginError(f"cannot import {python}: {type(error).__name__}: {error}") from error
     if not (isinstance(found, type) and issubclass(found, PluginBase)):
         raise PluginError(f"{python} is not a subclass of ModelPlugin, SensorPlugin or WorldPlugin")

@@ -1,4 +1,4 @@
-"""The simulation with its plugins and what it publishes: /clock, the states of models and links, markers for the 3D view."""
+"""The simulation with its plugins and publishers: /clock, the states of models and links, markers for the 3D view."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from minirospy.ros.gazebo_ros.window import Window
 
 __all__ = ["Server"]
 
-METRICS_SECONDS = 1.0  # of simulated time, between two messages on /gazebo/performance_metrics
+METRICS_SECONDS = 1.0  # of simulated time, between messages on /gazebo/performance_metrics
 
 
 class Server:
     """The running world.
 
-    lights: by name; they have no effect on the physics. clock: this process's own, or None if it uses wall time.
+    lights: by name; they do not affect the physics. clock: this process's own clock, or None if it uses wall time.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Server:
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
         self._published_ns = -1
-        self._told = len(loop.simulation.warnings)  # those that gzserver logs itself
+        self._told = len(loop.simulation.warnings)  # gzserver itself logs these
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         self._window: Window | None = None
@@ -57,28 +57,28 @@ class Server:
         loop.on_failure = self._fail
 
     def start(self, world: World) -> None:
-        """Load the plugins of the world file, and publish the markers. Call it in the loop's thread."""
+        """Load the world file's plugins, and publish the markers. Call this in the loop's thread."""
         self.plugins.add_world(world.plugins)
         for model in list(self.loop.simulation.models.values()):
             self.plugins.add_model(model)
         self._changed()
 
     def add_model(self, model: Model, pose: Pose, name: str) -> None:
-        """Add a model and load its plugins. Raise SimulationError if it cannot be added. Call it in the loop's thread."""
+        """Add a model and load its plugins. Raise SimulationError if that fails. Call this in the loop's thread."""
         added: SimModel = self.loop.simulation.add_model(model, pose, name)
         self.plugins.add_model(added)
         self._changed()
 
     def remove_model(self, name: str) -> None:
-        """Remove a model and its plugins. Call it in the loop's thread."""
+        """Remove a model and its plugins. Call this in the loop's thread."""
         self.plugins.remove_model(name)
         self.loop.simulation.remove_model(name)
         self._changed()
 
     def moved(self, name: str, before: Pose) -> None:
-        """Publish the states now if the simulation is paused. Call it in the loop's thread.
+        """If the simulation is paused, publish the states now. Call this in the loop's thread.
 
-        The shapes of a static model are published if the pose before was another one.
+        A static model's shapes are published if its pose has changed.
         """
         model = self.loop.simulation.models[name]
         if self._window is not None and model.is_static and model.pose != before:
@@ -87,14 +87,14 @@ class Server:
             self._publish_states()
 
     def set_physics(self, step: float, update_rate: float, gravity: Vector) -> None:
-        """Set the engine's parameters. Raise SimulationError if one is invalid. Call it in the loop's thread."""
+        """Set the engine's parameters. Raise SimulationError if one is invalid. Call this in the loop's thread."""
         simulation = self.loop.simulation
         physics = simulation.physics._replace(step=step, update_rate=update_rate, gravity=gravity)
         simulation.set_physics(physics)
         self.loop.set_update_rate(update_rate)
 
     def reset(self, *, with_time: bool) -> None:
-        """Reset the models, and with the time also the plugins. Call it in the loop's thread."""
+        """Reset the models; with the time, also reset the plugins. Call this in the loop's thread."""
         self.loop.reset(with_time=with_time)
         if self._window is not None:
             self._window.changed()  # static models may have been moved
@@ -102,7 +102,7 @@ class Server:
             self.plugins.reset()
 
     def close(self) -> None:
-        """Close the plugins and end the loop."""
+        """Close the plugins and stop the loop."""
         if self._window is not None:
             self._window.close()
         try:
@@ -133,7 +133,7 @@ class Server:
         now = self.loop.simulation.time_ns
         if self._clock is not None:
             self._clock.set(now)
-        # Nothing is published while paused, except the new time after a reset or a single step.
+        # While paused, nothing is published except the new time after a reset or a single step.
         if now != self._published_ns:
             self._published_ns = now
             self._clock_publisher.publish(Clock(time_of(now)))
@@ -150,7 +150,7 @@ class Server:
 
 
 class _StatePublishers:
-    """Publishes states if there are subscribers."""
+    """Publishes states while they have subscribers."""
 
     def __init__(self, loop: SimulationLoop) -> None:
         self._loop = loop

@@ -1,6 +1,6 @@
-"""`rosrun gazebo_ros spawn_model`: adds a model to the simulation. Source: http://wiki.ros.org/gazebo_ros.
+"""`rosrun gazebo_ros spawn_model`: add a model to the simulation. Source: http://wiki.ros.org/gazebo_ros.
 
-Exit statuses: 0 after success, 1 if the model cannot be read or spawned, 2 for wrong arguments.
+Exit statuses: 0 for success, 1 if the model cannot be read or spawned, 2 for wrong arguments.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DATABASE = """<sdf version="1.4">
 
 
 def new_parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
+    """Return the command line's parser."""
     parser = argparse.ArgumentParser(
         prog="spawn_model", description="Spawn a model in gazebo using the ROS API"
     )
@@ -176,7 +176,7 @@ def _run(arguments: argparse.Namespace, joints: list[tuple[str, float]]) -> int:
 
 
 def _wait_for_model(namespace: str, name: str) -> bool:
-    """Wait until a model exists. Return False if the node was shut down before."""
+    """Wait until a model exists. Return False if the node shuts down first."""
     found = SignalSafeEvent()
 
     def on_states(states: ModelStates) -> None:
@@ -192,7 +192,7 @@ def _wait_for_model(namespace: str, name: str) -> bool:
 
 
 def _read(arguments: argparse.Namespace) -> str | None:
-    """Return the model's text, or None after an error was logged."""
+    """Return the model's text, or log an error and return None."""
     if arguments.file:
         return _read_file(arguments.file)
     if arguments.param:

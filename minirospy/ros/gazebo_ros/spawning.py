@@ -1,4 +1,4 @@
-"""Models from the text in a request: URDF or SDF, with the request's name and namespace."""
+"""Create models from the URDF or SDF text in a request, with the request's name and namespace."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _PACKAGE = re.compile(r"package://([^/\"'<]+)/")
 
 
 class WrongFormat(Exception):
-    """The text is not of the format that the service expects."""
+    """Raised if the text's format is not the one that the service expects."""
 
 
 class UnknownPackage(Exception):
-    """The text refers to a package that does not exist; ``str()`` is its name."""
+    """Raised if the text refers to a package that does not exist; ``str()`` is the package's name."""
 
 
 def read_urdf_request(text: str, name: str, namespace: str, resources: ResourcePaths) -> Model:
-    """Return the model of a URDF. Raise WrongFormat without ``<robot>``, UnknownPackage, or SdfError."""
+    """Return the model in a URDF. Raise WrongFormat if it has no ``<robot>``, UnknownPackage, or SdfError."""
     if _root(text).tag != "robot":
         raise WrongFormat
     for package in dict.fromkeys(_PACKAGE.findall(text)):
@@ -38,7 +38,7 @@ def read_urdf_request(text: str, name: str, namespace: str, resources: ResourceP
 
 
 def read_sdf_request(text: str, name: str, namespace: str, resources: ResourcePaths) -> Model:
-    """Return the model of SDF or URDF text. Raise WrongFormat if it is neither, SdfError if it cannot be used."""
+    """Return the model in SDF or URDF text. Raise WrongFormat if it is neither, SdfError if it is unusable."""
     if _root(text).tag not in ("sdf", "gazebo", "robot"):
         raise WrongFormat
     return with_namespace(parse_model(text, resources.resolve, file=name, name=name), namespace)
@@ -52,7 +52,7 @@ def _root(text: str) -> Element:
 
 
 def with_namespace(model: Model, namespace: str) -> Model:
-    """Return the model with ``<robotNamespace>`` in each plugin that has none, as Gazebo's services do."""
+    """Return the model with ``<robotNamespace>`` added to each plugin that lacks it, as Gazebo's services do."""
     if not namespace:
         return model
     links = {}

@@ -1,6 +1,6 @@
 """Services that spawn, delete and move models and links, and the topics set_model_state and set_link_state.
 
-Source: http://wiki.ros.org/gazebo_ros, gazebo_msgs. A request that cannot be served gets ``success`` false and ROS's text.
+Source: http://wiki.ros.org/gazebo_ros, gazebo_msgs. The response to an invalid request has ``success`` false and ROS's text.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Reader = Callable[[str, str, str, ResourcePaths], Model]
 
 
 class StateServices:
-    """Offers the services of models and of the states of links."""
+    """Offers the services for models and for the states of links."""
 
     def __init__(self, server: Server) -> None:
         self._server = server
@@ -141,7 +141,7 @@ class StateServices:
         return response
 
     def _relative(self, state: State, frame_name: str) -> State | None:
-        """Return a state in a frame, or None if the frame does not exist."""
+        """Return a state relative to a frame, or None if the frame does not exist."""
         frame = find_entity(self._simulation, frame_name)
         if frame is not None:
             return relative_state(state, frame.state)

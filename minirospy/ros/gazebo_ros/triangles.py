@@ -1,4 +1,4 @@
-"""Triangles of shapes that a marker cannot name by a URI: files outside packages, sub-meshes, prisms, terrains. Pure."""
+"""Triangles of shapes that no marker URI can name: files outside packages, sub-meshes, prisms, terrains. Pure."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from minirospy.core.sdf.model import Color, Heightmap, MeshShape, Polyline
 
 __all__ = ["MAX_TRIANGLES", "Triangles", "read_triangles"]
 
-MAX_TRIANGLES = 20_000  # of one shape; each one takes 36 to 84 bytes in every message with the world's shapes
-MAX_CELLS = 80  # on a side of a terrain
+MAX_TRIANGLES = 20_000  # per shape; each takes 36 to 84 bytes in every message with the world's shapes
+MAX_CELLS = 80  # per side of a terrain
 
 
 class Triangles(NamedTuple):
-    """The corners (3 n, 3) in m, and their colours (3 n, 4), or None if the file has none."""
+    """The corners (3 n, 3) in m, and their colours (3 n, 4), or None if the file has no colours."""
 
     corners: NDArray[np.float64]
     colors: NDArray[np.float64] | None
 
 
 def read_triangles(shape: MeshShape | Polyline | Heightmap) -> Triangles:
-    """Return a shape's triangles. Raise MeshError if it cannot be read, or has more than MAX_TRIANGLES."""
+    """Return a shape's triangles. Raise MeshError if it is unreadable or has more than MAX_TRIANGLES."""
     if isinstance(shape, Heightmap):
         return Triangles(_terrain_corners(shape), None)
     if isinstance(shape, Polyline):

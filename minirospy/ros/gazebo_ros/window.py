@@ -1,6 +1,6 @@
-"""Topics of the simulation's window, the view Simulation of the dashboard, below /gazebo/window.
+"""Topics for the simulation's window, which is the dashboard's view Simulation, below /gazebo/window.
 
-Gazebo's window gets these from Gazebo's own transport:
+Gazebo's window receives the same data through Gazebo's own transport:
 
 ========== ================================ ================================================================================
 shapes     visualization_msgs/MarkerArray   the visible shapes, latched; frames are ``world`` (models that are static) and
@@ -14,8 +14,8 @@ rays       visualization_msgs/MarkerArray   the rays of laser scanners and range
 step       std_msgs/UInt32 (subscribed)     advances a paused simulation by so many steps
 ========== ================================ ================================================================================
 
-The service ``list_models`` (std_srvs/Trigger) returns the names of the models that can be inserted, one in a line.
-All rates are of wall time. Nothing is computed without subscribers.
+The service ``list_models`` (std_srvs/Trigger) returns the names of the models that can be inserted, one per line. All rates are
+in wall time. Nothing is computed without subscribers.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Window", "model_names", "ray_lengths"]
 
-PERIOD_SECONDS = 1 / 30  # between two messages with poses
-SLOW_SECONDS = 0.1  # between two messages with joints, contacts or rays
-STATE_SECONDS = 0.2  # between two messages with the state
-MAX_STEPS = 1_000_000  # of one message
-STEPS_AT_ONCE = 50  # then the simulation serves others
-MAX_CONTACTS = 2000  # that are shown
-MAX_RAYS = 360  # of one sensor that are shown
-ENDLESS_RAY = 100.0  # m, drawn of a ray that hits nothing if its maximum range is infinite
+PERIOD_SECONDS = 1 / 30  # between messages with poses
+SLOW_SECONDS = 0.1  # between messages with joints, contacts or rays
+STATE_SECONDS = 0.2  # between messages with the state
+MAX_STEPS = 1_000_000  # per message
+STEPS_AT_ONCE = 50  # steps after which other requests are handled
+MAX_CONTACTS = 2000  # number of contacts shown
+MAX_RAYS = 360  # number of rays shown per sensor
+ENDLESS_RAY = 100.0  # m; drawn length of a ray that hits nothing if its maximum range is infinite
 NORMAL_LENGTH = 0.12  # m
 POINT_SIZE = 0.022  # m
 RAY_WIDTH = 0.01  # m
@@ -68,7 +68,7 @@ RAY_COLOR = ColorRGBA(0.1, 0.45, 1.0, 0.45)
 
 
 class Window:
-    """Publishes in a separate thread, which asks the simulation's thread for its data between two steps."""
+    """Publishes in a separate thread, which requests its data from the simulation's thread between two steps."""
 
     def __init__(
         self, loop: SimulationLoop, plugins: PluginHost, world: World, model_folders: Iterable[str]
@@ -84,9 +84,9 @@ class Window:
         self._contacts = _publisher("contacts", MarkerArray)
         self._rays = _publisher("rays", MarkerArray)
         self._is_stale = True  # whether models were added, removed or, if static, moved since the last shapes
-        self._known: dict[SimModel, list[Marker]] = {}  # in the last message with shapes
-        self._moving: list[tuple[str, int]] = []  # the scoped names of moving links, and their rows
-        self._generation = -1  # of the rows
+        self._known: dict[SimModel, list[Marker]] = {}  # the markers in the last message with shapes
+        self._moving: list[tuple[str, int]] = []  # scoped names of the moving links, and their rows
+        self._generation = -1  # the engine's generation for which the rows are valid
         self._last: NDArray[np.float64] = np.zeros((0, 7))  # the poses in the last message
         self._is_closed = threading.Event()
         folders = tuple(model_folders)
@@ -98,7 +98,7 @@ class Window:
         self._thread.start()
 
     def changed(self) -> None:
-        """Publish the shapes again soon. May be called from any thread."""
+        """Make the thread publish the shapes again soon. Thread-safe."""
         self._is_stale = True
 
     def close(self) -> None:
@@ -117,7 +117,7 @@ class Window:
                     self._publish_slow()
             except LoopClosed:
                 return
-            except SimulationError as error:  # such as rays from a pose that is NaN
+            except SimulationError as error:  # for example rays from a NaN pose
                 rospy.logerr_throttle(10, "the window: %s", error)
             if now >= next_state and _has_subscribers(self._state):
                 next_state = now + STATE_SECONDS
@@ -125,7 +125,7 @@ class Window:
 
     def _publish_shapes_and_poses(self) -> None:
         if self._is_stale and _has_subscribers(self._shapes):
-            # Before the shapes are read: a change after that is a new one.
+            # Clear the flag before reading the shapes, so that later changes are not lost.
             self._is_stale = False
             self._shapes.publish(MarkerArray(self._loop.call(self._read_shapes)))
         if _has_subscribers(self._poses):
@@ -246,7 +246,7 @@ class Window:
     # ---- requests
 
     def _on_step(self, message: UInt32) -> None:
-        """Advance a paused simulation. It serves other requests meanwhile, and one that unpauses it ends the steps."""
+        """Advance a paused simulation. Other requests are handled in between, and unpausing ends the steps."""
         remaining = min(message.data, MAX_STEPS)
         try:
             while remaining > 0 and self._loop.is_paused and not self._is_closed.is_set():
@@ -258,24 +258,24 @@ class Window:
 
 
 def ray_lengths(distances: NDArray[np.float64], max_range: float) -> NDArray[np.float64]:
-    """Return the lengths with which rays are drawn. Those without a hit end at the maximum range if it is finite."""
+    """Return the drawn lengths of rays. Rays that hit nothing end at the maximum range, if that is finite."""
     end = max_range if np.isfinite(max_range) else ENDLESS_RAY
     return np.where(np.isfinite(distances), distances, end).clip(max=max_range)
 
 
 def model_names(folders: Iterable[str]) -> list[str]:
-    """Return the names of the models in some folders: those that have a model.config or a model.sdf."""
+    """Return the names of the models in some folders, which contain a model.config or model.sdf."""
     found = set()
     for folder in folders:
         try:
             found |= {each.name for each in Path(folder).iterdir() if _is_model(each)}
-        except OSError:  # a folder of a search path need not exist
+        except OSError:  # a folder on a search path need not exist
             continue
     return sorted(found)
 
 
 def _is_model(folder: Path) -> bool:
-    # Path.is_file raises PermissionError for a file in a folder that cannot be read.
+    # Path.is_file raises PermissionError for files in unreadable folders.
     return any(os.path.isfile(folder / name) for name in ("model.config", "model.sdf"))
 
 
@@ -294,7 +294,7 @@ def _has_subscribers(publisher: rospy.Publisher[Any]) -> bool:
 
 
 def _shapes(model: SimModel) -> list[Marker]:
-    """Return the shapes of a model: of a static one where they are, of another one in the frames of its links."""
+    """Return a model's shapes: for a static model at their poses in the world, otherwise in the frames of its links."""
     if model.is_static:
         return model_markers(model)
     found = []

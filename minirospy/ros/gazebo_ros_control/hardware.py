@@ -1,4 +1,4 @@
-"""The joints of a simulated model as the hardware of ros_control."""
+"""The joints of a simulated model as ros_control hardware."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 __all__ = ["SimulatedHardware"]
 
 FindPid = Callable[[str], "Pid | None"]
-"""Return the PID controller of a joint whose gains are parameters, or None."""
+"""Returns the PID controller of a joint if the joint's gains are set as parameters, else None."""
 
 
 class SimulatedHardware(RobotHardware):
-    """Reads and moves the joints that have a transmission, as gazebo_ros_control's DefaultRobotHWSim does.
+    """Reads and moves the joints that have a transmission, like gazebo_ros_control's DefaultRobotHWSim.
 
-    A joint without a PID controller is moved to a position, or held at a velocity, by a motor. ``is_stopped``: the emergency
-    stop, which holds positions and sets velocities and efforts to 0.
+    A motor moves a joint without a PID controller to a position, or holds its velocity. ``is_stopped``: the emergency stop, which
+    holds positions and sets velocities and efforts to 0.
     """
 
     def __init__(
@@ -46,13 +46,13 @@ class SimulatedHardware(RobotHardware):
             self._drives.append(_Drive(simulated, joint, each.interfaces[0], turns, pid, loop))
 
     def set_limits(self, limits: Mapping[str, JointLimits]) -> None:
-        """Set the largest efforts of the motors."""
+        """Set the motors' maximum efforts."""
         for drive in self._drives:
             if drive.joint.name in limits:
                 drive.max_effort = abs(limits[drive.joint.name].effort)
 
     def read(self, _time: Time, _period: Duration) -> None:
-        """Set the state of the joints."""
+        """Update the joints' states."""
         for drive in self._drives:
             drive.read()
 
@@ -64,7 +64,7 @@ class SimulatedHardware(RobotHardware):
 
 
 class _Drive:
-    """A joint, and the way in which it is moved."""
+    """A joint, and the method that moves it."""
 
     def __init__(
         self,
@@ -82,20 +82,20 @@ class _Drive:
         self._turns = turns
         self._pid = pid
         self._loop = loop
-        self._held: float | None = None  # the position at the emergency stop
-        self._target = joint.position  # the last commanded position that was finite
+        self._held: float | None = None  # the position at the time of the emergency stop
+        self._target = joint.position  # the last finite position command
 
     def read(self) -> None:
         position = self._simulated.position
         joint = self.joint
-        # Positions of joints that turn are continuous over any number of turns, also after a jump.
+        # The position of a rotating joint is continuous over any number of turns, even after a jump.
         way = position - joint.position
         joint.position += math.remainder(way, math.tau) if self._turns else way
         joint.velocity = self._simulated.velocity
         joint.effort = self._simulated.effort
 
     def write(self, seconds: float, is_stopped: bool) -> None:
-        """Send the command. One that is not finite, which a controller may write after the limits were enforced, is not sent."""
+        """Send the command, unless it is not finite: a controller may write such a command after the limits were enforced."""
         joint, simulated = self.joint, self._simulated
         kind = joint.active or self._first
         if kind is Interface.EFFORT:
@@ -117,7 +117,7 @@ class _Drive:
             self._target = joint.position_command
         position = self._target if self._held is None else self._held
         if self._pid is None:
-            # As in Gazebo, the position is reached whatever the effort is.
+            # As in Gazebo, the position is reached regardless of the effort.
             simulated.set_position(position + simulated.position - joint.position)
         else:
             error = self._loop.error(position) if self._loop is not None else position - joint.position

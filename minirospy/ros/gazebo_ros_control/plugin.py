@@ -29,15 +29,15 @@ from minirospy.ros.gazebo_ros_control.hardware import SimulatedHardware
 __all__ = ["GazeboRosControl"]
 
 _DEFAULT_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
-_WARN_SECONDS = 10.0  # between two warnings about commands that are not finite
-_POLL_SECONDS = 0.1  # between two looks for the robot description
+_WARN_SECONDS = 10.0  # between warnings about commands that are not finite
+_POLL_SECONDS = 0.1  # between checks for the robot description
 
 
 class GazeboRosControl(ModelPlugin):
     """Reads the joints, updates the controllers and writes the joints in each control period."""
 
     def load(self) -> None:
-        """Start as soon as the parameter with the robot description exists."""
+        """Start once the parameter with the robot description exists."""
         rospy.loginfo("Loading gazebo_ros_control plugin")
         self.default_namespace = self.model.name
         kind = self.text("robotSimType", _DEFAULT_TYPE)
@@ -107,7 +107,7 @@ class GazeboRosControl(ModelPlugin):
         rospy.loginfo("Loaded gazebo_ros_control.")
 
     def _usable(self, transmissions: list[Transmission]) -> list[Transmission]:
-        """Return one transmission for each joint that the model has."""
+        """Return one transmission for each joint in the model."""
         found: dict[str, Transmission] = {}
         for each in transmissions:
             joint = self.model.joints.get(each.joint)
@@ -163,12 +163,12 @@ class GazeboRosControl(ModelPlugin):
         self._last_write = now_ns
 
     def reset(self) -> None:
-        """Start the periods again, and restart the controllers."""
+        """Restart the periods and the controllers."""
         self._last_update = self._last_write = self.simulation.time_ns
         self._is_reset = True
 
     def close(self) -> None:
-        """Stop the controllers, and end the controller manager's services."""
+        """Stop the controllers, and shut down the controller manager's services."""
         self._is_closed.set()
         if self._manager is not None:
             self._manager.close(self.now)

@@ -1,1 +1,1 @@
-"""Controllers of grippers with one joint."""
+"""Controllers for grippers with one joint."""

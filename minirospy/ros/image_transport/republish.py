@@ -81,7 +81,7 @@ def main() -> int:
 def _warn_without_library() -> None:
     """Warn if the image library is missing.
 
-    Otherwise nothing would report it, because images are only encoded for subscribers.
+    Without the warning, the fault would go unnoticed until a subscriber arrives, because only then are images encoded.
     """
     try:
         require_library()

@@ -1,1 +1,1 @@
-"""Hardware for the controller manager: a loopback, which needs no robot."""
+"""Hardware for the controller manager: a loopback that needs no robot."""

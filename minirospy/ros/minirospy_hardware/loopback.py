@@ -1,7 +1,7 @@
-"""The node ``rosrun minirospy_hardware loopback``: controllers without a robot.
+"""The node ``rosrun minirospy_hardware loopback``: runs controllers without a robot.
 
-The joints are those of ``robot_description``, which is searched in the node's namespace and above. Private parameters: rate
-(100 Hz), initial (``{joint: position}``), imus and force_torque_sensors (``{sensor: frame}``).
+The joints are those of ``robot_description``, searched upwards from the node's namespace. Private parameters: rate (100 Hz),
+initial (``{joint: position}``), imus and force_torque_sensors (``{sensor: frame}``).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["main"]
 
 
 def main() -> int:
-    """Run the node until it shuts down; return the exit status, 1 if a parameter is invalid."""
+    """Run the node until it shuts down; return the exit status: 1 if a parameter is invalid."""
     rospy.init_node("loopback")
     try:
         rate = rospy.get_param("~rate", 100.0)
@@ -55,7 +55,7 @@ def _hardware() -> LoopbackHardware:
 
 
 def _mapping(name: str, kinds: tuple[type, ...], meaning: str) -> dict[str, Any]:
-    """Return a private parameter that is a map. Raise HardwareError if it has another type."""
+    """Return a private parameter that must be a dictionary. Raise HardwareError if it has another type."""
     value = rospy.get_param(f"~{name}", {})
     if not isinstance(value, dict) or not all(isinstance(each, kinds) for each in value.values()):
         raise HardwareError(f"parameter ~{name} must be a map {meaning}, not {value!r}")

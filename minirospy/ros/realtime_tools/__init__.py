@@ -1,1 +1,1 @@
-"""Publishers and action servers for loops that must not wait."""
+"""Publishers and action servers for control loops, which must not block."""

@@ -94,7 +94,7 @@ class StateValues:
 class JointStates:
     """The joints, in the order of the robot description.
 
-    ``free`` has those that the user can move; the others mimic another joint.
+    ``free``: the joints that the user can move; all others mimic another joint.
     """
 
     def __init__(

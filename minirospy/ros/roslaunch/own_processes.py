@@ -1,4 +1,4 @@
-"""Watches a program's own processes: objects of classes that programs derive from roslaunch.pmon.Process.
+"""Watches processes that a program defines, as objects of subclasses of roslaunch.pmon.Process.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -27,7 +27,7 @@ class ProcessListener:
 
 
 class Process:
-    """A process that a ProcessMonitor watches: programs override start(), stop() and is_alive()."""
+    """A process that a ProcessMonitor watches. Programs override start(), stop() and is_alive()."""
 
     def __init__(
         self,
@@ -122,7 +122,7 @@ class DeadProcess(Process):
 
 
 class OwnProcesses:
-    """The program's own processes of a ProcessMonitor. A thread polls them, and restarts those that respawn."""
+    """The processes that a program has added to a ProcessMonitor. A thread polls them, and restarts those that respawn."""
 
     def __init__(
         self,
@@ -140,7 +140,7 @@ class OwnProcesses:
         self._closing = threading.Event()
         self._on_exit = on_exit  # called with a process's name and exit status
         self._on_required_exit = on_required_exit
-        self._on_last_exit = on_last_exit  # called at each poll while none is left and none will come
+        self._on_last_exit = on_last_exit  # called at each poll when none is left and none will come
 
     def start(self, name: str) -> None:
         """Start the thread, with this name, if it is not running and there is a process to poll."""
@@ -155,12 +155,12 @@ class OwnProcesses:
             self.is_stopping = True
             polling = self.thread
         self._closing.set()
-        # Wait without the lock, because the program's methods that this thread calls may use the monitor.
+        # Wait without holding the lock: the thread calls methods of the program, which may use the monitor.
         if polling and polling is not threading.current_thread():
             polling.join()
 
         errors: list[str] = []
-        # Terminate the core's processes last, the others in the reverse order of their registration.
+        # Terminate the core processes last, and the others in the reverse order of their registration.
         others = [each for each in reversed(self.watched) if each not in core]
         for process in (*others, *(each for each in core if each in self.watched)):
             Output(title=False).print(f"[{process.name}] killing on exit")
@@ -203,7 +203,7 @@ class OwnProcesses:
             respawning.discard(process)
             Output(title=False).print(f"[{process.name}] restarting process")
             process.stop([])
-            # If the shutdown begins after this check, close() waits for start() and then terminates the process.
+            # If the shutdown starts after this check, close() waits for start() and then terminates the process.
             if not self.is_stopping:
                 process.start()
         else:

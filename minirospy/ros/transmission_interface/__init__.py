@@ -1,1 +1,1 @@
-"""Maps between actuators and joints."""
+"""Conversions between actuators and joints."""

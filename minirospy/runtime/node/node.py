@@ -319,7 +319,7 @@ class Node:
         except (OSError, WireError):
             if not self._closed:
                 raise
-            sock.close()  # the master has already told the peer that this node is leaving
+            sock.close()  # the master has already notified the peer that this node is leaving
             return
 
         if "service" in fields:

@@ -35,7 +35,7 @@ class Publication:
         tcp_nodelay: bool = False,
         on_link: Callable[[OutLink, bool], None] | None = None,
     ) -> None:
-        """Create the publication. Queues up to ``queue_size`` frames for a slow subscriber (0: no limit; None: publish blocks).
+        """Create the publication. Queue up to ``queue_size`` frames for a slow subscriber (0: no limit; None: publish blocks).
 
         ``on_link(link, is_up)`` is called on the loop when a subscriber has connected or disconnected.
         """
@@ -46,14 +46,14 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[OutLink, ...] = ()
-        # Total bytes of the messages that had any subscriber, including length prefixes; each message counts once
+        # Total bytes of messages sent to at least one subscriber, with length prefixes. Each message counts once.
         self.sent_bytes = 0
         # number of subscribers that the master listed when the publication was registered
         self.expected = 0
         self._on_link = on_link
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
-        # the shared memory for large messages, from the first subscriber that can read it
+        # the shared memory for large messages; created for the first subscriber that can read it
         self._ring: shared_memory.SharedRing | None = None
 
     @property

@@ -74,7 +74,7 @@ class InLink:
     received_bytes: int = 0
     closed: bool = field(default=False)
     latched: Frame | None = None  # the last message from a latching publisher
-    shares_memory: bool = False  # whether the header said to the publisher that this side can map its memory
+    shares_memory: bool = False  # the header declared that this process can map the publisher's memory
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
     # True if the master's list dropped the publisher and listed it again while the link was open

@@ -1,4 +1,4 @@
-"""Log lines about publishers that cannot be reached, each with advice."""
+"""Log publishers that cannot be reached, with advice."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ MAX_TOPICS_SHOWN = 5  # maximum number of topics named in one log line about an 
 
 
 class Unreachable:
-    """Logs unreachable publishers. One line covers all topics of a node, such as those of a killed bridge.
+    """Logs unreachable publishers. One line covers all topics of a node, for example of a bridge that was killed.
 
-    Use it on the loop only.
+    Use this class on the loop only.
     """
 
     def __init__(self) -> None:
-        # A list may contain a thousand publishers that refuse; logging them all would block the loop for 0.2 s.
+        # A list may contain a thousand publishers that refuse connections; logging each would block the loop for 0.2 s.
         self._limited_log = RateLimitedLogger(_log, _MAX_LINES)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """For each publisher, by URI: its topics, and the error and the advice for the first topic."""
+        """For each publisher, by URI: its topics, and the first topic's error and advice."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher after a short delay, in one line with its other unreachable topics."""
+        """Log an unreachable publisher after a short delay, in one line for all its unreachable topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
 
     def close(self) -> None:
-        """Log the pending lines and the number of omitted lines. Idempotent."""
+        """Log the lines still pending and the number of omitted lines. Idempotent."""
         if self._timer:
             self._timer.cancel()
         self._report()
@@ -63,7 +63,7 @@ class Unreachable:
 
 
 def advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return advice that names the host with the wrong address, and the variable that sets the address."""
+    """Return advice that names the host with the wrong address and the variable that sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     if isinstance(error, RpcTimeout):

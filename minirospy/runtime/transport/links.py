@@ -231,7 +231,7 @@ class OutLink:
         if self._outbox and self._has_to_wait(buffers):
             return
         if sharing and self.ring:
-            # Announce it only if the outbox is empty: announcements and frames arrive in the order of the messages.
+            # Announce it only if the outbox is empty, because announcements and frames must arrive in message order.
             try:
                 if self.ring.announce(sharing, may_wait=self._may_stay()):
                     return
@@ -339,7 +339,7 @@ class OutLink:
             outbox.popleft()
 
     def _readable(self) -> None:
-        """Close the link at the end of file. A subscriber sends no data but its answers about shared memory."""
+        """Close the link at end of file. A subscriber sends no data except answers about shared memory."""
         try:
             if data := self._sock.recv(4096):
                 if self.ring:

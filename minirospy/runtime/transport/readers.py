@@ -77,9 +77,9 @@ def read_frames(
 ) -> None:
     """Read frames in the calling thread until the peer closes, then close the socket.
 
-    If several frames are ready when the thread reads, only the newest ``size.newest`` of them are delivered (0: all), so
-    that a slow receiver gets recent data. ``shares_memory``: the header said that this side can map the publisher's memory.
-    Raise OSError if the connection fails, WireError if the data is invalid.
+    If several frames are ready when the thread reads, only the newest ``size.newest`` of them are delivered (0: all), so that a
+    slow receiver gets recent data. ``shares_memory``: the header declared that this process can map the publisher's memory. Raise
+    OSError if the connection fails, WireError if the data is invalid.
     """
     source = _FrameSource(sock, readers, shares_memory=shares_memory)
     try:
@@ -105,7 +105,7 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop, for receivers so quick that a thread for each would cost more.
+    """Read frames on the loop, for receivers so fast that a thread per receiver would cost more.
 
     ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
@@ -188,7 +188,7 @@ class _FrameSource:
         self._was_large = False
         self._may_busy_poll = may_busy_poll(sock)
         self._is_fast = False
-        # On a Unix socket, a reset is the end: Linux reports it after all data if the publisher closed before it had read an
+        # On a Unix socket, a reset means end of file: Linux reports it after all data if the publisher closed before reading an
         # answer about shared memory.
         self._is_unix = sock.family not in FAMILIES
         self._ring = RingReceiver() if shares_memory else None

@@ -1,8 +1,8 @@
-"""The memory of a topic's ring, and both ends of a connection that uses it: Linux only, between processes of one user.
+"""The memory of a topic's ring, and both ends of a connection that uses it. Linux only; both processes have the same user.
 
-:class:`SharedRing` is the publisher's, one per topic; :class:`RingSender` its end of one connection; :class:`RingReceiver` the
-subscriber's end. The decisions are in :mod:`minirospy.core.wire.ring`. The ring is an anonymous file without a name, so nothing
-is left behind when a process is killed. Source: docs/shared_memory.md.
+:class:`SharedRing` belongs to the publisher, one per topic. :class:`RingSender` is the publisher's end of one connection,
+:class:`RingReceiver` the subscriber's end. :mod:`minirospy.core.wire.ring` makes the decisions. The ring is an anonymous file, so
+nothing is left behind when a process is killed. Source: docs/shared_memory.md.
 """
 
 from __future__ import annotations
@@ -39,27 +39,27 @@ __all__ = [
 ]
 
 FIELD = "shared_memory"
-"""The connection header's field by which a subscriber says that it can read from a ring."""
+"""The field of the connection header by which a subscriber declares that it can read from a ring."""
 
-QUIET_SECONDS = 5.0  # seconds without a large message after which a ring's memory is given back
+QUIET_SECONDS = 5.0  # time without a large message after which a ring's memory is given back
 
-# Seconds for which a publishing thread waits for a subscriber to release a place: as long as it pushes to a full socket
+# Seconds for which a publishing thread waits for a subscriber to release a place: the same as for a full socket.
 _WAIT_SECONDS = 0.005
 _WAIT_MS = 1  # milliseconds per wait during that time
-_FILES = 2  # file descriptors that come with an offer: the ring, the counter of released places
+_FILES = 2  # file descriptors sent with an offer: the ring, and the counter of released places
 
 _log = logging.getLogger(__name__)
 
 
 def is_possible() -> bool:
-    """Return whether this system has what a ring needs."""
+    """Return whether this system supports everything that a ring needs."""
     return sys.platform == "linux" and hasattr(os, "memfd_create") and hasattr(os, "eventfd")
 
 
 def may_share(sock: socket.socket) -> bool:
-    """Return whether the process at the other end of ``sock`` is on this machine and belongs to this process's user.
+    """Return whether the peer of ``sock`` is a process on this machine, and belongs to the same user.
 
-    Another user could shrink a ring that this process reads, or read the memory of a topic longer than it is connected.
+    Another user's process could shrink a ring while this process reads it, or read a topic's memory after disconnecting.
     """
     return is_possible() and sock.family == socket.AF_UNIX and peer(sock).user == os.geteuid()
 
@@ -127,19 +127,19 @@ def _pass_a_message() -> str:
 
 
 class _Memory:
-    """One ring's memory at the publisher. Use everything but :meth:`fill` with the lock of the :class:`SharedRing` held."""
+    """The memory of one ring at the publisher. Hold the lock of the :class:`SharedRing` for everything except :meth:`fill`."""
 
     def __init__(self, layout: Layout) -> None:
-        """Create the file and map it. It has no memory yet. Raise OSError if that is not possible."""
+        """Create and map the file, which has no memory at first. Raise OSError if that fails."""
         self.layout = layout
         self.places = Places(layout.places)
-        self._backed = [0] * layout.places  # bytes at the start of each place that have memory
+        self._backed = [0] * layout.places  # bytes with allocated memory at the start of each place
         self.file = os.memfd_create("minirospy-ring", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
         self.read_only = -1
         try:
             os.ftruncate(self.file, layout.size)
             _seal(self.file)
-            # Subscribers receive a descriptor with which the ring cannot be written.
+            # Subscribers receive a read-only descriptor.
             self.read_only = os.open(f"/proc/self/fd/{self.file}", os.O_RDONLY | os.O_CLOEXEC)
             self._map = mmap.mmap(self.file, layout.size)
         except BaseException:
@@ -147,11 +147,11 @@ class _Memory:
             raise
 
     def take(self, size: int) -> int | None:
-        """Return a free place with memory for ``size`` bytes, or None. Raise OSError if the machine has no memory."""
+        """Return a free place with memory for ``size`` bytes, or None. Raise OSError if the machine is out of memory."""
         place = self.places.take()
         if place is not None and self._backed[place] < size:
             try:
-                # Without this, a write beyond the machine's memory would end the process with SIGBUS.
+                # Allocate first: otherwise, writing when the machine is out of memory would kill the process with SIGBUS.
                 os.posix_fallocate(self.file, place * self.layout.place_size, size)
             except BaseException:
                 self.places.let_go(place)
@@ -168,7 +168,7 @@ class _Memory:
             start = end
 
     def give_back(self) -> None:
-        """Return the memory of free places to the system. They receive new memory when they are used again."""
+        """Return the memory of free places to the system. It is allocated again when they are reused."""
         for place in self.places.free:
             if self._backed[place]:
                 self._map.madvise(mmap.MADV_REMOVE, place * self.layout.place_size, self.layout.place_size)
@@ -176,11 +176,11 @@ class _Memory:
 
     @property
     def backed_bytes(self) -> int:
-        """Return the number of bytes that have memory."""
+        """Return the number of bytes with allocated memory."""
         return sum(self._backed)
 
     def close(self) -> None:
-        """Close the files. The memory stays mapped while a thread fills a place or a subscriber reads one."""
+        """Close the files. The mapping remains while a thread fills a place or a subscriber reads one."""
         for file in (self.file, self.read_only):
             if file >= 0:
                 os.close(file)
@@ -188,10 +188,10 @@ class _Memory:
 
 
 class SharedRing:
-    """A topic's ring at the publisher: it is created by the first large message, and replaced if its places are too small.
+    """A topic's ring at the publisher. The first large message creates it; larger messages may replace it.
 
-    A ring is also replaced if a connection closes before it has released its places: its subscriber may still read them, so
-    they must not be written again. ``senders`` are the connections that may use it. Thread-safe.
+    A ring is also replaced if a connection closes before it has released its places: the subscriber may still read them, so they
+    must not be overwritten. ``senders``: the connections that may use the ring. Thread-safe.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -202,7 +202,7 @@ class SharedRing:
         self._senders: set[RingSender] = set()
         self._retired: list[
             _Memory
-        ] = []  # replaced memories that a connection still uses, and that still have memory
+        ] = []  # replaced memories that a connection still uses, and that are still allocated
         self._is_off = False
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
@@ -218,7 +218,7 @@ class SharedRing:
             return sum(memory.backed_bytes for memory in memories)
 
     def share(self, frame: LargeFrame) -> Sharing:
-        """Return the object that writes ``frame`` into the ring when the first connection needs it."""
+        """Return an object that writes ``frame`` into the ring once the first connection needs it."""
         with self.lock:
             self.collect()
         return Sharing(self, frame)
@@ -231,7 +231,7 @@ class SharedRing:
         return sender
 
     def remove(self, sender: RingSender) -> None:
-        """Forget a closed connection. Call this with the lock held."""
+        """Remove a closed connection. Call this with the lock held."""
         self._senders.discard(sender)
         if not self._senders:
             self.retire()
@@ -279,18 +279,18 @@ class SharedRing:
             self.give_back_retired()
 
     def give_back_retired(self) -> None:
-        """Give back the free places of replaced memories, because nobody writes them again. Call this with the lock held."""
+        """Give back the free places of replaced memories, which will not be written again. Call this with the lock held."""
         used = {sender.memory for sender in self._senders}
         for memory in self._retired:
-            # If the system cannot do this, the memory is freed when its last user unmaps it.
+            # If the system does not support this, the memory is freed when its last user unmaps it.
             with contextlib.suppress(OSError):
                 memory.give_back()
         self._retired = [memory for memory in self._retired if memory in used and memory.backed_bytes]
 
     def fitting(self, size: int) -> _Memory | None:
-        """Return the memory if a message of ``size`` bytes fits into its places; replace it if not.
+        """Return the memory, after replacing it if its places are too small for ``size`` bytes.
 
-        Return None if there is no memory. Call this with the lock held.
+        Return None if memory cannot be allocated. Call this with the lock held.
         """
         if self.memory and size <= self.memory.layout.place_size:
             return self.memory
@@ -304,14 +304,14 @@ class SharedRing:
         return self.memory
 
     def turn_off(self, error: Exception) -> None:
-        """Use sockets only from now on. Call this with the lock held."""
+        """Use only sockets from now on. Call this with the lock held."""
         _log.debug("no shared memory for a topic's large messages: %s", error)
         self.trouble = f"the publisher has no memory for it: {_text_of(error)}"
         self._is_off = True
         self.retire()
 
     def retire(self) -> None:
-        """Stop using the current memory. Subscribers that have mapped it keep it. Call this with the lock held."""
+        """Stop using the current memory; it remains for subscribers that have mapped it. Call this with the lock held."""
         if self.memory:
             self.memory.close()
             self._retired.append(self.memory)
@@ -319,7 +319,7 @@ class SharedRing:
             self.give_back_retired()
 
     def close(self) -> None:
-        """Use sockets only from now on, and stop the timer. Call this on the loop. Idempotent."""
+        """Use only sockets from now on, and stop the timer. Call this on the loop. Idempotent."""
         with self.lock:
             self._is_off = True
             self.retire()
@@ -330,7 +330,7 @@ class SharedRing:
             self._timer.cancel()
 
     def note_use(self) -> None:
-        """Keep the memory for a while. Call this with the lock held."""
+        """Record that the memory is in use, which postpones giving it back. Call this with the lock held."""
         self._was_used = True
         if not self._is_watched:
             self._is_watched = True
@@ -342,7 +342,7 @@ class SharedRing:
             self._timer = self._loop.call_later(QUIET_SECONDS, self._look)
 
     def _look(self) -> None:
-        """Give memory back if no place was used since the last look."""
+        """Give back memory if no place was used since the last call."""
         with self.lock:
             self.collect()
             if self._was_used:
@@ -361,17 +361,17 @@ class SharedRing:
 
 
 class Sharing:
-    """One message on its way to all subscribers: written once, into a place that it holds until :meth:`close`."""
+    """One message that is being sent to all subscribers. It is written once, into a place that is held until :meth:`close`."""
 
     def __init__(self, shared: SharedRing, frame: LargeFrame) -> None:
         self.frame = frame
         self._ring = shared
-        # the place, and its memory: an old one if the ring was replaced in the meantime
+        # the place and its memory, which may meanwhile have been replaced by another one
         self._memory: _Memory | None = None
         self._place = 0
 
     def place_in(self, memory: _Memory) -> int | None:
-        """Return the message's place in ``memory``; write it first if it is not there. None if no place is free."""
+        """Return the message's place in ``memory``, after writing it there if necessary; None if no place is free."""
         if self._memory is memory:
             return self._place
         self.close()
@@ -391,7 +391,7 @@ class Sharing:
         return place
 
     def close(self) -> None:
-        """Stop holding the place; subscribers hold it until they have read it."""
+        """Release the place. Subscribers hold it until they have read it."""
         memory, self._memory = self._memory, None
         if memory:
             with self._ring.lock:
@@ -409,7 +409,7 @@ class Sharing:
 
 
 class RingSender:
-    """The publisher's end of one connection. Use it with the link's lock held, except :meth:`answered` and :meth:`collect`."""
+    """The publisher's end of one connection. Hold the link's lock, except for :meth:`answered` and :meth:`collect`."""
 
     def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
         self.step = Step.NEW
@@ -436,9 +436,9 @@ class RingSender:
         return "the subscriber reads more slowly than it is sent to" if 2 * self.announced < large else ""
 
     def announce(self, sharing: Sharing, *, may_wait: bool) -> bool:
-        """Announce a message in the ring. Return False if it has to go through the socket.
+        """Announce a message in the ring. Return False if the message must be sent through the socket.
 
-        ``may_wait``: wait some milliseconds for the subscriber to release a place. Raise OSError if the connection has failed.
+        ``may_wait``: wait a few milliseconds for the subscriber to release a place. Raise OSError if the connection has failed.
         """
         step = self.step
         if step is Step.IN_USE:
@@ -448,7 +448,7 @@ class RingSender:
                 return self._announce(memory, sharing, may_wait=may_wait)
             step = self.step = Step.NEW
         try:
-            # Take the step first: the answer may arrive before this thread continues.
+            # Change the step first, because the answer may arrive before this thread continues.
             if step is Step.NEW:
                 self.step = Step.ASKED
                 self._send(ring.prepare())
@@ -459,10 +459,10 @@ class RingSender:
         return False
 
     def answered(self, data: bytes) -> None:
-        """Handle what the subscriber has sent. Call this on the loop."""
+        """Handle bytes that the subscriber has sent. Call this on the loop."""
         for byte in data:
             after = ring.ANSWERS.get((self.step, bytes((byte,))))
-            # A publishing thread may take another step meanwhile, but none from a step that waits for an answer.
+            # A publishing thread may change the step at the same time, but not from a step that waits for an answer.
             if after:
                 self._trouble = (
                     "the subscriber cannot map the publisher's memory" if after is Step.OFF else ""
@@ -527,9 +527,9 @@ class RingSender:
         return True
 
     def _wait_for_room(self, places: Places, size: int) -> bool:
-        """Wait briefly for the subscriber to release a place; return whether it may hold one more.
+        """Wait briefly for the subscriber to release a place; return whether it may now hold one more.
 
-        Return False immediately if it released none during the last wait and none since.
+        Return False immediately if the subscriber released no place during the last wait, and none since.
         """
         if not self._is_releasing:
             return False
@@ -574,7 +574,7 @@ class RingSender:
         self.step = Step.OFF
 
     def _forget_memory(self) -> None:
-        """Release all places of the previous ring: the subscriber had read them before it answered :data:`ring.READY`."""
+        """Release all places of the previous ring, which the subscriber had read before it answered :data:`ring.READY`."""
         memory, self.memory = self.memory, None
         if memory:
             memory.places.release(self, memory.places.held_by(self))
@@ -585,7 +585,7 @@ class RingSender:
         """Send a few bytes. Raise OSError if the connection has failed, BlockingIOError if its buffer is full."""
         sent = self._sock.sendmsg([data], ancillary) if ancillary else self._sock.send(data)
         if sent != len(data):
-            # Linux accepts so few bytes all or not at all.
+            # Linux sends such a small number of bytes completely or not at all.
             raise OSError("a Unix socket has accepted a part of some bytes")
 
     def _close_counter(self) -> None:
@@ -595,22 +595,22 @@ class RingSender:
 
 
 class RingReceiver:
-    """The subscriber's end of one connection. Use it in the thread that reads the socket."""
+    """The subscriber's end of one connection. Use it only in the thread that reads the socket."""
 
     def __init__(self) -> None:
-        self.expects_files = False  # whether the next bytes may come with file descriptors
-        self._files: list[int] = []  # file descriptors that have arrived
+        self.expects_files = False  # whether file descriptors may arrive with the next bytes
+        self._files: list[int] = []  # file descriptors received and not used yet
         self._map: mmap.mmap | None = None
         self._size = 0
         self._counter = -1
 
     def prepare(self, sock: socket.socket) -> None:
-        """Answer the publisher's request: from now on, file descriptors are received."""
+        """Answer the publisher's request, and receive file descriptors from now on."""
         self.expects_files = True
         _answer(sock, ring.READY)
 
     def receive(self, sock: socket.socket, count: int, flags: int = 0) -> bytes:
-        """Receive up to ``count`` bytes and any file descriptors that come with them."""
+        """Receive up to ``count`` bytes, and any file descriptors sent with them."""
         space = socket.CMSG_SPACE(_FILES * array.array("i").itemsize)
         data, ancillary, _, _ = sock.recvmsg(count, space, flags | socket.MSG_CMSG_CLOEXEC)
         for level, kind, payload in ancillary:
@@ -621,13 +621,13 @@ class RingReceiver:
         return data
 
     def take_offer(self, sock: socket.socket, data: bytes) -> None:
-        """Map the ring that the publisher offers, and answer. Raise WireError if the offer is invalid."""
+        """Map the offered ring, and answer. Raise WireError if the offer is invalid."""
         size = ring.parse_offer(data)
         self.expects_files = False
         files, self._files = self._files, []
         self._release_ring()
         try:
-            # Descriptors are missing if this process has reached its limit of open files.
+            # Descriptors are missing if this process has reached its limit on open files.
             if len(files) == _FILES and may_share(sock) and _is_sealed(files[0], size):
                 self._map = mmap.mmap(files[0], size, mmap.MAP_SHARED, mmap.PROT_READ)
                 self._size, self._counter = size, files.pop()
@@ -680,13 +680,13 @@ def _text_of(error: Exception) -> str:
 
 
 def _answer(sock: socket.socket, byte: bytes) -> None:
-    # A publisher that has closed may have sent messages before: they are read, and then the end.
+    # The publisher may have sent messages before closing the connection: read them, then report the end.
     with contextlib.suppress(OSError):
         sock.send(byte)
 
 
 def _seal(file: int) -> None:
-    """Fix a file's size, so that no process that maps it can be killed by another one that shrinks it."""
+    """Seal a file's size. Otherwise a process that has mapped the file is killed if another process shrinks it."""
     import fcntl
 
     fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)

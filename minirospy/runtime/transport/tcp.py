@@ -287,7 +287,7 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header if it has already arrived completely, else None. Most have, which saves a task and a timer."""
+    """Return a header if it has already arrived completely, as most have, else None. This saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):

@@ -305,7 +305,7 @@ class BagSession(JsonSession):
         name, topics, format_ = self._opened().name, texts_of(fields, "topics"), text_of(fields, "format")
         if not topics:
             raise UsageError("no topic is chosen")
-        # Do not wait for it: the player remains usable.
+        # Do not wait for the export, so that the player remains usable.
         self._endpoint.spawn(self._write_tables(name, topics, format_))
 
     async def _write_tables(self, name: str, topics: Sequence[str], format_: str) -> None:
@@ -339,7 +339,7 @@ class BagSession(JsonSession):
         last = 0.0
 
         def report(share: float) -> None:
-            """Report the progress to the page, in the session's thread. Raise BagError if the page has left."""
+            """Report the progress to the page, in the session's thread. Raise BagError if the page has disconnected."""
             nonlocal last
             if self.is_ended:
                 raise BagError("the page has left")

@@ -1,6 +1,6 @@
-"""The data of the first view besides the graph: the findings of `minirospy doctor`, running boards, and the last log lines.
+"""Data of the start view, besides the graph: the findings of `minirospy doctor`, running boards, and the last log lines.
 
-The doctor runs as a child process, so that its checks, which block, do not delay the page's data.
+The doctor runs in a child process, because its checks block and must not delay the page's data.
 """
 
 from __future__ import annotations
@@ -22,15 +22,13 @@ from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, end_proc
 
 __all__ = ["Examiner", "last_log_lines", "running_boards"]
 
-_KEPT_SECONDS = (
-    5.0  # findings younger than this are returned again, so that several pages cost one examination
-)
-_TIMEOUTS = Timeouts(interrupt=3.0, terminate=1.0)  # SIGINT lets the doctor unregister its node
-_TAIL_BYTES = 64 * 1024  # of rosout.log: some 500 lines
+_KEPT_SECONDS = 5.0  # findings younger than this are reused, so that several pages share them
+_TIMEOUTS = Timeouts(interrupt=3.0, terminate=1.0)  # SIGINT gives the doctor time to unregister its node
+_TAIL_BYTES = 64 * 1024  # of rosout.log: about 500 lines
 
 
 class Examiner:
-    """Runs `minirospy doctor` for the pages, one examination at a time. May be used from any thread."""
+    """Runs `minirospy doctor` for the pages, one examination at a time. Thread-safe."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -41,7 +39,7 @@ class Examiner:
         self._finished = -_KEPT_SECONDS
 
     def findings(self) -> list[Mapping[str, str]]:
-        """Return the findings: check, status, text and advice. Raise MinirospyError if the doctor fails."""
+        """Return the findings: check, status, text and advice of each. Raise MinirospyError if the doctor fails."""
         with self._running:
             if time.monotonic() - self._finished >= _KEPT_SECONDS:
                 self._found = self._examine()
@@ -49,14 +47,14 @@ class Examiner:
             return self._found
 
     def close(self) -> None:
-        """End a running examination. Idempotent; blocks for seconds at most."""
+        """Stop a running examination. Idempotent. Blocks for a few seconds at most."""
         self._is_closed = True
         process = self._process
         if process:
             end_processes([process], _TIMEOUTS, lambda _: None)
 
     def _examine(self) -> list[Mapping[str, str]]:
-        # Run in an empty folder, because `python -m` imports from the working folder first.
+        # Run in an empty folder, because `python -m` searches the working folder first.
         with tempfile.TemporaryDirectory(prefix="minirospy-doctor-", ignore_cleanup_errors=True) as folder:
             process = start_process(
                 "minirospy doctor",
@@ -80,7 +78,7 @@ class Examiner:
 
 
 def running_boards() -> list[str]:
-    """Return the names of this machine's boards that a program uses now."""
+    """Return the names of the boards on this machine that a program is using."""
     try:
         own = BoardDirectory.find()
         found = [BoardDirectory(name, own.folder) for name in own.names()]
@@ -90,7 +88,7 @@ def running_boards() -> list[str]:
 
 
 def last_log_lines(log_dir: Path, run_id: object) -> str:
-    """Return the end of a run's rosout.log, from the start of a line; "" if this machine has no such file."""
+    """Return the end of a run's rosout.log, from the start of a line; "" if the file is not on this machine."""
     folder = run_folder(log_dir, run_id)
     if folder is None:
         return ""

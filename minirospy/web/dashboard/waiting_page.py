@@ -1,4 +1,4 @@
-"""The page while there is no ROS master yet: the same files, without data. It says how to start a master."""
+"""The page while there is no ROS master: the same files, without data. It explains how to start a master."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["WaitingPage"]
 
 
 class WaitingPage:
-    """Serves the page until the dashboard takes over its port. Pages try to connect again until then."""
+    """Serves the page until the dashboard takes over the port. Until then, the pages keep trying to connect."""
 
     def __init__(
         self, master_uri: str, codes: Codes, options: BridgeOptions, *, embeds: bool = False
@@ -35,7 +35,7 @@ class WaitingPage:
 
     @property
     def port(self) -> int:
-        """Return the page's port, after :meth:`open`."""
+        """Return the page's port. Call this after :meth:`open`."""
         return self._listener.port
 
     async def open(self) -> None:

@@ -1,4 +1,4 @@
-"""The goals that a rosbridge client sends to action servers, as in rosbridge 2 for ROS 2, for servers of ROS 1 (actionlib).
+"""The goals that a rosbridge client sends to ROS 1 action servers (actionlib), as rosbridge 2 does for ROS 2.
 
 Source: ROSBRIDGE_PROTOCOL.md in https://github.com/RobotWebTools/rosbridge_suite, branch ros2, sections 3.2.12 to 3.2.15.
 """
@@ -28,11 +28,11 @@ __all__ = ["ClientActions"]
 
 _log = logging.getLogger(__name__)
 
-_MAX_GOALS = 100  # maximum number of running goals of one client
-_MAX_ACTIONS = 50  # maximum number of actions that one client may use; each has five topics
-SERVER_SECONDS = 5.0  # maximum time until a server is connected; rosbridge gives up then, too
+_MAX_GOALS = 100  # maximum number of running goals per client
+_MAX_ACTIONS = 50  # maximum number of actions per client; each action has five topics
+SERVER_SECONDS = 5.0  # maximum wait for a server's connection, as in rosbridge
 
-_UNKNOWN = 0  # values of action_msgs/GoalStatus of ROS 2
+_UNKNOWN = 0  # values of ROS 2's action_msgs/GoalStatus
 _STATUSES = {
     GoalState.SUCCEEDED: 4,
     GoalState.PREEMPTED: 5,
@@ -43,7 +43,7 @@ _STATUSES = {
 
 @dataclass
 class _Running:
-    """A goal that has no result yet. ``goal``: set once it can be sent. ``is_cancelled``: set if that comes too late."""
+    """A goal without a result. ``goal``: set once it can be sent. ``is_cancelled``: whether a cancellation was requested."""
 
     goal: ClientGoal[Message, Message] | None = None
     is_cancelled: bool = False
@@ -56,26 +56,26 @@ class _Running:
 
 @dataclass
 class _Action:
-    """An action's client, and the number of its goals that have no result yet."""
+    """The client of an action, and the number of the action's goals without a result."""
 
     client: ActionClient[Any, Message, Message]
     goals: int = 0
 
 
 class ClientActions:
-    """The actions that one client uses. Its methods are called in the order of the client's operations."""
+    """The actions that one rosbridge client uses. Call the methods in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self.goals_size = 0
-        """Bytes of memory used by the running goals."""
+        """Memory used by the running goals, in bytes."""
         self._session = session
         self._actions: dict[tuple[str, Any], _Action] = {}  # by (name, class)
-        self._goals: dict[object, _Running] = {}  # by the id of the operation
-        self._count = 0  # number of running goals, also of those without an id
+        self._goals: dict[object, _Running] = {}  # by the operation's id
+        self._count = 0  # number of running goals, including those without an id
         self._reporter = ErrorReporter(_log, "a client's goal")
 
     def close(self) -> None:
-        """Leave the topics of the actions. Goals that are running continue."""
+        """Leave the actions' topics. Running goals continue."""
         for action in self._actions.values():
             self._session.graph.spawn(action.client.close())
         self._actions.clear()
@@ -102,7 +102,7 @@ class ClientActions:
 
         work = self._send(event, running, is_large=self._session.is_large)
         self._session.spawn(work).add_done_callback(ended)
-        # Report the memory last: if the limit is exceeded, this disconnects the client and cancels the goal's task.
+        # Report the memory last: if it exceeds the limit, this disconnects the client and cancels the goal's task.
         self._session.count()
 
     def cancel_goal(self, event: protocol.CancelActionGoal) -> None:
@@ -180,15 +180,16 @@ class ClientActions:
             try:
                 client = ActionClient(self._session.graph.node, name, class_)
             except ValueError as error:
-                # Another goal uses the action with another type.
+                # Another goal uses this action with a different type.
                 raise BridgeError(str(error)) from error
             self._actions[key] = _Action(client)
         return self._actions[key]
 
     def _check_type(self, name: str, class_: Any) -> None:
-        """Raise BridgeError if the action's server has another type.
+        """Raise BridgeError if the action's server has a different type.
 
-        The type of the goals' topic may be that of an earlier client, but only the server publishes results.
+        Check the type of the result topic: only the server publishes results, while an earlier client may have set the goal
+        topic's type.
         """
         topic, wanted = f"{name}/result", class_().action_result._type
         snapshot = self._session.graph.snapshot
@@ -197,7 +198,7 @@ class ClientActions:
             raise type_conflict(topic, wanted, known)
 
     async def _leave(self, name: str, class_: Any) -> None:
-        """Leave an action's topics, so that they can have another type."""
+        """Leave an action's topics, so that the action can be used with another type."""
         if action := self._actions.pop((name, class_), None):
             await asyncio.wait([self._session.graph.spawn(action.client.close())])
 
@@ -224,7 +225,7 @@ class ClientActions:
             "values": conversion.values(feedback),
         }
         messages = await self._encoded(event, fields)
-        # A slow client misses feedback, but no result.
+        # A slow client may miss feedback, but not results.
         client, key = self._session.client, ("feedback", goal_id)
         if texts := [each for each in messages if isinstance(each, str)]:
             client.send_texts(key, texts, newest_only=True)
@@ -257,7 +258,7 @@ class ClientActions:
 async def _cancel_without_server(
     client: ActionClient[Any, Message, Message], goal: ClientGoal[Message, Message]
 ) -> Exception | None:
-    """Wait for a server. If there is none, cancel the goal, so that it is not sent later, and return the error."""
+    """Wait for a server. If none appears, cancel the goal, so that it is not sent later, and return the error."""
     try:
         await client.wait_for_server(SERVER_SECONDS)
     except Exception as error:  # noqa: BLE001 - the caller raises it once the goal has ended
@@ -267,7 +268,7 @@ async def _cancel_without_server(
 
 
 def _action_class(type_: str) -> type[Message]:
-    """Return the class of an action. Names of ROS 2 are accepted, too. Raise UnknownTypeError if it is not installed."""
+    """Return the class of an action. ROS 2 names are accepted, too. Raise UnknownTypeError if it is not installed."""
     package, _, short = type_.replace("/action/", "/", 1).partition("/")
     name = f"{package}/{short}" if short.endswith("Action") else f"{package}/{short}Action"
     try:

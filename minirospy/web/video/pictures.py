@@ -26,8 +26,8 @@ MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarg
 _LENGTH = struct.Struct("<I")
 _DEPTH_HEADER = struct.Struct(
     "<iff"
-)  # of compressedDepth: an enum, and the floats that make depths of inverse depths
-_ALIASES = {"uyvy": "yuv422"}  # names of ROS 2 for encodings of ROS 1
+)  # header of compressedDepth: an enum, and two floats that convert inverse depths to depths
+_ALIASES = {"uyvy": "yuv422"}  # ROS 2's names for ROS 1 encodings
 _YUYV = ("yuv422_yuy2", "yuyv")
 # cv_bridge shows numbers of three or four channels as colors in OpenCV's order
 _AS_COLORS = {"8UC4": "bgr8", "16UC3": "bgr16", "16UC4": "bgr16"}
@@ -83,7 +83,7 @@ def _is_as_wanted(data: bytes, picture: Picture) -> bool:
     is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
     found = _content_type(data)
     if found == "image/png" and data[24:25] == b"\x10" and picture.format:
-        return False  # 16 bits per channel: browsers show only the upper ones
+        return False  # browsers show only the upper 8 of the 16 bits per channel
     return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
 
 
@@ -108,7 +108,7 @@ def _decompressed(data: bytes, format_: str) -> Pixels:
 def _depths(data: bytes, encoding: str) -> Pixels:
     """Return the depths of a compressed depth image: in millimetres, or in metres if ``encoding`` is 32FC1.
 
-    Raise ValueError if it is not one.
+    Raise ValueError if it is not a compressed depth image.
     """
     import numpy as np
 

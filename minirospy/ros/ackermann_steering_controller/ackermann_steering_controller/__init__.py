@@ -1,4 +1,4 @@
-"""The controller of a base with Ackermann steering: ``from ackermann_steering_controller import AckermannSteeringController``.
+"""The controller for a base with Ackermann steering: ``from ackermann_steering_controller import AckermannSteeringController``.
 
 Source: http://wiki.ros.org/ackermann_steering_controller.
 """
@@ -23,7 +23,7 @@ __all__ = ["AckermannSteeringController"]
 
 
 class AckermannSteeringController(MobileBase):
-    """Drives ``rear_wheel`` and steers ``front_steer``. As in ROS, the angle of the steering is ``angular.z`` of ``cmd_vel``."""
+    """Drives ``rear_wheel`` and steers ``front_steer``. As in ROS, ``angular.z`` of ``cmd_vel`` is the steering angle."""
 
     interfaces = (Interface.POSITION, Interface.VELOCITY)
 
@@ -58,11 +58,11 @@ class AckermannSteeringController(MobileBase):
         self.log_info("Finished controller initialization")
 
     def create_odometry(self, window: int) -> Odometry:
-        """Return the odometry of a steered base."""
+        """Return the odometry for a steered base."""
         return AckermannOdometry(window)
 
     def measure(self, odometry: Odometry, time: int) -> bool:
-        """Add the motion of the rear wheel."""
+        """Add the rear wheel's motion."""
         assert isinstance(odometry, AckermannOdometry)
         wheel, steering = self._rear.position, self._front.position * self._steering_factor
         if not (math.isfinite(wheel) and math.isfinite(steering)):
@@ -71,13 +71,13 @@ class AckermannSteeringController(MobileBase):
         return True
 
     def drive(self, linear: float, angular: float) -> None:
-        """Command the wheel and the steering. As in ROS, the radius is not multiplied here."""
+        """Command the wheel and the steering. As in ROS, the radius multiplier is not applied here."""
         velocity = linear / self._radius
         self._rear.velocity_command = velocity if math.isfinite(velocity) else 0.0
         self._front.position_command = angular
 
     def _read_geometry(self, context: ControllerContext, rear: str, front: str) -> tuple[float, float]:
-        """Return wheelbase and radius of the parameters, or of the robot's description if they are not set."""
+        """Return the wheelbase and the radius from the parameters, or from the robot's description if they are not set."""
         parameters = context.parameters
         wheelbase = parameters.finite("wheel_separation_h", 0.0)
         radius = parameters.finite("wheel_radius", 0.0)

@@ -1,4 +1,4 @@
-"""catkin.environment_cache: writes a script that repeats the changes that another one makes to the environment."""
+"""catkin.environment_cache: generates a script that repeats the environment changes of another script."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ _IS_WINDOWS = sys.platform == "win32"
 
 
 def generate_environment_script(env_script: str) -> list[str]:
-    """Return the lines of a script that sets the variables which ``env_script`` adds or changes.
+    """Return the lines of a script that sets the variables that ``env_script`` adds or changes.
 
-    ``env_script`` runs the command in its arguments; devel/env.sh is one. A value that ends with the old one refers to it. Raise
-    subprocess.CalledProcessError if ``env_script`` fails, OSError if it cannot be run.
+    ``env_script``, such as devel/env.sh, runs the command in its arguments. If a new value ends with the old value, the script
+    refers to the old value by its variable. Raise subprocess.CalledProcessError if ``env_script`` fails, OSError if it cannot be
+    run.
     """
     program = "import json, os; print(json.dumps(dict(os.environ)))"
     output = subprocess.run(
@@ -51,7 +52,7 @@ def _changed(name: str, old: str, new: str) -> str:
 
 
 def _quoted(value: str) -> str:
-    """Return a value for the shell. As in catkin, one in double quotes stays as it is."""
+    """Return a value quoted for the shell. As in catkin, a value in double quotes stays unchanged."""
     if _IS_WINDOWS or (value.startswith('"') and value.endswith('"')):
         return value
     return "'" + value.replace("'", "'\\''") + "'"

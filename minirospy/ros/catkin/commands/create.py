@@ -132,7 +132,7 @@ def create_package_here(
 
 
 def _existing(name: str) -> str:
-    """Return the folder of minirospy's package of this name, or the file of Python's module; an empty string if there is none."""
+    """Return the folder of minirospy's package, or the file of Python's module, with this name; else an empty string."""
     import importlib.util
 
     from minirospy.workspace.packages import OF_THE_WORKSHOP, built_in_roots, package_name
@@ -142,7 +142,7 @@ def _existing(name: str) -> str:
     for root in built_in_roots():
         if package_name(root / name) == name:
             return str(root / name)
-    # A package's messages are a Python package of its name.
+    # A package's messages form a Python package with the same name.
     spec = importlib.util.find_spec(name) if name.isidentifier() else None
     return str(spec.origin) if spec and spec.origin else ""
 

@@ -1,6 +1,6 @@
 """PID controllers whose gains are parameters: ``from control_toolbox import Pid``.
 
-ROS's package has this class in C++ only. Source: http://wiki.ros.org/control_toolbox.
+In ROS, this class exists only in C++. Source: http://wiki.ros.org/control_toolbox.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ __all__ = ["Pid", "PidGains"]
 
 
 class Pid(pid.Pid):
-    """A PID controller; :meth:`serve` lets dynamic_reconfigure change its gains, and publishes its terms."""
+    """A PID controller. After :meth:`serve`, dynamic_reconfigure can change its gains, and its terms may be published."""
 
     _server: Server | None = None
     _state: RealtimePublisher[PidState] | None = None
 
     @classmethod
     def read(cls, parameters: Parameters) -> Pid:
-        """Return a controller with the gains of a namespace. It has no topics yet.
+        """Return a controller with the gains from a namespace. It does not have topics yet.
 
         Raise ControllerError if ``p`` is missing, ValueError if a gain is not finite.
         """
@@ -39,34 +39,34 @@ class Pid(pid.Pid):
 
     @classmethod
     def open(cls, parameters: Parameters, opened: ExitStack) -> Pid:
-        """Return what :meth:`read` returns, after :meth:`serve`; ``opened`` closes it."""
+        """Return a controller from :meth:`read` after calling its :meth:`serve`. Closing ``opened`` closes the controller."""
         found = cls.read(parameters)
         opened.callback(found.close)
         found.serve(parameters)
         return found
 
     def serve(self, parameters: Parameters) -> None:
-        """Offer dynamic_reconfigure in the namespace; publish its topic ``state`` if its parameter ``publish_state`` is true."""
+        """Offer dynamic_reconfigure in the namespace; publish the topic ``state`` if its parameter ``publish_state`` is true."""
         if parameters.flag("publish_state", False):
             self._state = RealtimePublisher(f"{parameters.namespace}/state", PidState)
             self.on_computed = self._publish
         self._server = Server(ParametersConfig, self._reconfigure, parameters.namespace)
 
     def set_gains(self, gains: PidGains) -> None:
-        """Change the gains, also those that dynamic_reconfigure shows. It calls the master: do not call it in ``update``."""
+        """Change the gains, also in dynamic_reconfigure. Do not call this in ``update``, because it calls the master."""
         self.gains = gains
         if self._server is not None:
             self._server.update_configuration(_config(gains))
 
     def close(self) -> None:
-        """Close the topics and the service."""
+        """Close the topics and services."""
         if self._server is not None:
             close_server(self._server)
         if self._state is not None:
             self._state.close()
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # the server has not yet read those gains that are not parameters
+        is_first = level == ~0  # the server has not read the gains that are not parameters yet
         if is_first:
             config.update(_config(self.gains))
             return config
@@ -104,7 +104,7 @@ class Pid(pid.Pid):
 
 
 def _config(gains: PidGains) -> dict[str, float | bool]:
-    """Return the gains with the names that dynamic_reconfigure uses."""
+    """Return the gains under the names that dynamic_reconfigure uses."""
     return {
         "p": gains.p,
         "i": gains.i,

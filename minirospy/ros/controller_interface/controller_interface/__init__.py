@@ -1,6 +1,6 @@
-"""Base class of controllers: ``from controller_interface import Controller``.
+"""The base class of controllers: ``from controller_interface import Controller``.
 
-ROS's package has only C++ headers; the names are the same. Source: http://wiki.ros.org/controller_interface.
+ROS's package has only C++ headers; the names are the same here. Source: http://wiki.ros.org/controller_interface.
 """
 
 from minirospy.core.control.controller import (

@@ -1,4 +1,4 @@
-"""The controller manager for a node of the user's own: ``from controller_manager import run``.
+"""The controller manager, for use in a user's node: ``from controller_manager import run``.
 
 Source: http://wiki.ros.org/controller_manager.
 """

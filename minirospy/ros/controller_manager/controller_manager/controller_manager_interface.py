@@ -1,4 +1,4 @@
-"""Call the services of a controller manager, and print the results.
+"""Call a controller manager's services, and print the results.
 
 Source: http://wiki.ros.org/controller_manager.
 """

@@ -1,4 +1,4 @@
-"""Find controller managers, list and filter their controllers, and find parameters that describe controllers.
+"""Find controller managers, list and filter their controllers, and find the parameters of controllers.
 
 Source: http://docs.ros.org/en/noetic/api/controller_manager_msgs/html/.
 """
@@ -46,7 +46,7 @@ Controllers = Iterable[ControllerState]
 def get_controller_managers(namespace: str = "/", initial_guess: Sequence[str] | None = None) -> list[str]:
     """Return the sorted namespaces of controller managers, such as ``/controller_manager``, below a namespace.
 
-    ``initial_guess``: an earlier answer, whose managers are checked with fewer calls.
+    ``initial_guess``: an earlier result; checking its managers again takes fewer calls.
     """
     present = _namespaces_with_list(namespace)
     known = [each for each in initial_guess or () if each in present]
@@ -54,7 +54,7 @@ def get_controller_managers(namespace: str = "/", initial_guess: Sequence[str] |
 
 
 def is_controller_manager(namespace: str) -> bool:
-    """Return whether all services of a controller manager are in a namespace."""
+    """Return whether a namespace offers all services of a controller manager."""
     prefix = namespace if namespace.endswith("/") else namespace + "/"
     return all(get_service_type(prefix + name) == kind for name, kind in cm_services.items())
 
@@ -68,7 +68,7 @@ def _namespaces_with_list(namespace: str) -> list[str]:
 
 
 class ControllerManagerLister:
-    """Call it for the list of controller managers below a namespace; repeated calls are cheaper."""
+    """Callable that returns the controller managers below a namespace; repeated calls are cheaper."""
 
     def __init__(self, namespace: str = "/") -> None:
         self._namespace = namespace
@@ -80,7 +80,7 @@ class ControllerManagerLister:
 
 
 class ControllerLister:
-    """Call it for the list of a manager's controllers, which is empty without the manager."""
+    """Callable that returns a manager's controllers; the list is empty if the manager is not running."""
 
     def __init__(self, namespace: str = "/controller_manager") -> None:
         self._name = f"{namespace}/{_LIST}"
@@ -101,28 +101,28 @@ class ControllerLister:
 def filter_by_name(
     ctrl_list: Controllers, ctrl_name: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers with a name, or with a name that contains it."""
+    """Return the controllers whose name equals, or contains, a string."""
     return _filter(ctrl_list, "name", ctrl_name, match_substring)
 
 
 def filter_by_type(
     ctrl_list: Controllers, ctrl_type: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers with a type, or with a type that contains it."""
+    """Return the controllers whose type equals, or contains, a string."""
     return _filter(ctrl_list, "type", ctrl_type, match_substring)
 
 
 def filter_by_state(
     ctrl_list: Controllers, ctrl_state: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers in a state, or in a state that contains it."""
+    """Return the controllers whose state equals, or contains, a string."""
     return _filter(ctrl_list, "state", ctrl_state, match_substring)
 
 
 def filter_by_hardware_interface(
     ctrl_list: Controllers, hardware_interface: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers that use a hardware interface, or one whose name contains it."""
+    """Return the controllers that use a hardware interface, whose name equals, or contains, a string."""
     return [
         each
         for each in ctrl_list
@@ -139,9 +139,9 @@ def filter_by_resources(
     hardware_interface: str | None = None,
     match_any: bool = False,
 ) -> list[ControllerState]:
-    """Return the controllers that claim these resources in one hardware interface, which may be given.
+    """Return the controllers that claim all these resources through one hardware interface, which may be specified.
 
-    ``match_any``: one of the resources is enough.
+    ``match_any``: one matching resource is enough.
     """
     enough = any if match_any else all
     return [
@@ -156,7 +156,7 @@ def filter_by_resources(
 
 
 def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
-    """Return the sorted names in a namespace that have a parameter ``type`` directly below, as controllers have."""
+    """Return the sorted names in a namespace that contain a parameter ``type``, as the names of controllers do."""
     prefix = namespace if namespace.endswith("/") else namespace + "/"
     below = [name.split(prefix, 1)[1].split("/") for name in list_params(namespace) if prefix in name]
     return sorted(parts[0] for parts in below if len(parts) == 2 and parts[1] == "type")

@@ -1,4 +1,4 @@
-"""The controller of a base with differential drive: ``from diff_drive_controller import DiffDriveController``.
+"""The controller for a base with differential drive: ``from diff_drive_controller import DiffDriveController``.
 
 Source: http://wiki.ros.org/diff_drive_controller.
 """
@@ -48,7 +48,7 @@ DynamicParams:
 
 
 class _Wheels(NamedTuple):
-    """The geometry of the wheels in metres, or factors that correct it."""
+    """The geometry of the wheels in metres, or correction factors for it."""
 
     separation: float
     left_radius: float
@@ -56,7 +56,7 @@ class _Wheels(NamedTuple):
 
 
 class DiffDriveController(MobileBase):
-    """Drives the wheels of ``left_wheel`` and ``right_wheel``, each a name or a list of names."""
+    """Drives the wheels in ``left_wheel`` and ``right_wheel``; each parameter is a name or a list of names."""
 
     interfaces = (Interface.VELOCITY,)
 
@@ -106,7 +106,7 @@ class DiffDriveController(MobileBase):
         self.opened.callback(close_server, server)
 
     def create_odometry(self, window: int) -> Odometry:
-        """Return the odometry of two rows of wheels."""
+        """Return the odometry for two rows of wheels."""
         return DiffDriveOdometry(window)
 
     def measure(self, odometry: Odometry, time: int) -> bool:
@@ -134,7 +134,7 @@ class DiffDriveController(MobileBase):
                 joint.velocity_command = velocity
 
     def driven(self, time: Time, period: Duration, linear: float, angular: float) -> None:
-        """Publish the velocities that were commanded, and the state of the wheels."""
+        """Publish the commanded velocities and the wheel states."""
         if self._cmd_vel_out:
             message = TwistStamped()
             message.header.stamp = time
@@ -145,7 +145,7 @@ class DiffDriveController(MobileBase):
             self._wheel_states.publish(time, period, self._speeds(linear, angular))
 
     def _speeds(self, linear: float, angular: float) -> tuple[float, float]:
-        """Return the velocities of the left and right wheels in rad/s."""
+        """Return the speeds of the left and right wheels in rad/s."""
         separation, left_radius, right_radius = self._wheels
         left = (linear - angular * separation / 2.0) / left_radius
         right = (linear + angular * separation / 2.0) / right_radius
@@ -164,7 +164,7 @@ class DiffDriveController(MobileBase):
         return _Wheels(separation, left, right)
 
     def _read_geometry(self, context: ControllerContext, left: str, right: str) -> _Wheels:
-        """Return the geometry of the parameters, or of the robot's description if they are not set."""
+        """Return the geometry from the parameters, or from the robot's description if they are not set."""
         parameters = context.parameters
         separation = parameters.finite("wheel_separation", 0.0)
         radius = parameters.finite("wheel_radius", 0.0)
@@ -183,7 +183,7 @@ class DiffDriveController(MobileBase):
         return _Wheels(*(value * factor for value, factor in zip(self._described, factors, strict=True)))
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # the server has not yet read those values that are not parameters
+        is_first = level == ~0  # the server has not read the values that are not parameters yet
         if is_first:
             config.update(self._config)
             return config
@@ -204,7 +204,7 @@ class DiffDriveController(MobileBase):
 
 
 class _WheelStates:
-    """Publishes the state of the wheels, the left ones first."""
+    """Publishes the wheel states, left wheels first."""
 
     def __init__(
         self,
@@ -216,12 +216,12 @@ class _WheelStates:
         self._joints = [*left, *right]
         self._names = [joint.name for joint in self._joints]
         self._wanted_positions = [0.0] * len(self._joints)
-        self._velocities = [0.0] * len(self._joints)  # of the last cycle
+        self._velocities = [0.0] * len(self._joints)  # velocities in the last cycle
         self._wanted_before = (0.0, 0.0)
         self._time: Time | None = None
 
     def publish(self, time: Time, period: Duration, wanted: tuple[float, float]) -> None:
-        """Publish the state of a cycle; ``wanted``: the velocities of the left and right wheels."""
+        """Publish the states of a cycle. ``wanted``: the commanded velocities of the left and right wheels."""
         joints, wheels = self._joints, len(self._joints) // 2
         dt = period.to_sec()
         elapsed = (time - self._time).to_sec() if self._time else 0.0
@@ -242,7 +242,7 @@ class _WheelStates:
             position + velocity * dt
             for position, velocity in zip(self._wanted_positions, wanted_velocities, strict=True)
         ]
-        # As in ROS, the change of the velocity is multiplied by the time, not divided.
+        # As in ROS, the change in velocity is multiplied, not divided, by the time.
         changes = [(now - before) * dt for now, before in zip(wanted, self._wanted_before, strict=True)]
         desired = JointTrajectoryPoint(
             positions=self._wanted_positions,
@@ -269,7 +269,7 @@ def _minus(left: Sequence[float], right: Sequence[float]) -> list[float]:
 
 
 def _wheel_names(parameters: Parameters, key: str) -> list[str]:
-    """Return the wheels of one side. Raise ControllerError if the parameter is missing or invalid."""
+    """Return the names of the wheels on one side. Raise ControllerError if the parameter is missing or invalid."""
     value = parameters.get(key)
     if value is None:
         raise ControllerError(f"Couldn't retrieve wheel param '{key}'.")

@@ -26,30 +26,30 @@ __all__ = [
 
 
 class JointPositionController(PidJointPositionController):
-    """Reaches the position of a joint by its effort."""
+    """Controls a joint's position through its effort."""
 
     interfaces = (Interface.EFFORT,)
 
 
 class JointVelocityController(PidJointVelocityController):
-    """Reaches the velocity of a joint by its effort."""
+    """Controls a joint's velocity through its effort."""
 
     interfaces = (Interface.EFFORT,)
 
 
 class JointEffortController(ForwardCommandController):
-    """Passes efforts on to a joint."""
+    """Forwards effort commands to a joint."""
 
     interfaces = (Interface.EFFORT,)
 
 
 class JointGroupEffortController(ForwardJointGroupCommandController):
-    """Passes efforts on to joints."""
+    """Forwards effort commands to several joints."""
 
     interfaces = (Interface.EFFORT,)
 
 
 class JointGroupPositionController(PidJointGroupPositionController):
-    """Reaches the positions of joints by their efforts."""
+    """Controls several joints' positions through their efforts."""
 
     interfaces = (Interface.EFFORT,)

@@ -17,7 +17,7 @@ __all__ = ["ForceTorqueSensorController"]
 
 
 class ForceTorqueSensorController(Controller):
-    """Publishes each sensor of the hardware on the topic of its name."""
+    """Publishes each sensor of the hardware on the topic with the sensor's name."""
 
     interfaces = (Interface.FORCE_TORQUE,)
 
@@ -34,11 +34,11 @@ class ForceTorqueSensorController(Controller):
             self._topics.append((hardware.force_torque_sensor(name), publisher))
 
     def starting(self, time: Time) -> None:
-        """Publish after a period."""
+        """Schedule the first message after one period."""
         self._rate.start(time)
 
     def update(self, time: Time, period: Duration) -> None:
-        """Publish the sensors."""
+        """Publish the sensors' measurements."""
         if self._rate.is_due(time):
             for sensor, publisher in self._topics:
                 message = WrenchStamped()

@@ -1,4 +1,4 @@
-"""Base classes of controllers that pass commands on: ``from forward_command_controller import ForwardCommandController``.
+"""Base classes of controllers that forward commands: ``from forward_command_controller import ForwardCommandController``.
 
 Source: http://wiki.ros.org/forward_command_controller.
 """
@@ -18,17 +18,17 @@ __all__ = ["ForwardCommandController", "ForwardJointGroupCommandController"]
 
 
 class ForwardCommandController(Controller):
-    """Passes the numbers of the topic ``command`` on to a joint. Its first command is the position at the start, or 0.
+    """Forwards numbers from the topic ``command`` to a joint. The first command is the joint's position at the start, or 0.
 
-    A subclass sets ``interfaces`` to the one that it commands.
+    A subclass sets ``interfaces`` to the interface that it commands.
     """
 
-    is_group: ClassVar[bool] = False  # several joints, whose commands are in one message
+    is_group: ClassVar[bool] = False  # True if the controller commands several joints with one message
 
     _joints: list[Joint]
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joints, open the topic."""
+        """Claim the joints and open the topic."""
         (interface,) = self.interfaces
         self._field = COMMAND_FIELDS[interface]
         if self.is_group:
@@ -56,6 +56,6 @@ class ForwardCommandController(Controller):
 
 
 class ForwardJointGroupCommandController(ForwardCommandController):
-    """Passes the numbers of the topic ``command`` on to the joints of the parameter ``joints``."""
+    """Forwards numbers from the topic ``command`` to the joints in the parameter ``joints``."""
 
     is_group = True

@@ -1,4 +1,4 @@
-"""A controller that is not supported: loading it fails with a line that says so.
+"""A controller that is not supported. Loading it fails with an error that says so.
 
 Source: http://wiki.ros.org/four_wheel_steering_controller.
 """

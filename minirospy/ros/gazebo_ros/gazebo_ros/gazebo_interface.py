@@ -1,4 +1,4 @@
-"""gazebo_ros.gazebo_interface: clients of the services that add models. Source: http://wiki.ros.org/gazebo_ros."""
+"""gazebo_ros.gazebo_interface: clients of the services that spawn models. Source: http://wiki.ros.org/gazebo_ros."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def spawn_sdf_model_client(
     reference_frame: str,
     gazebo_namespace: str,
 ) -> bool | None:
-    """Spawn a model of SDF text, after waiting for the service; return its ``success``, or None if the call failed."""
+    """Wait for the service, and spawn a model from SDF; return the response's ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/spawn_sdf_model"
     return _spawn(service, model_name, model_xml, robot_namespace, initial_pose, reference_frame)
 
@@ -34,7 +34,7 @@ def spawn_urdf_model_client(
     reference_frame: str,
     gazebo_namespace: str,
 ) -> bool | None:
-    """Spawn a model of a URDF, after waiting for the service; return its ``success``, or None if the call failed."""
+    """Wait for the service, and spawn a model from URDF; return the response's ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/spawn_urdf_model"
     return _spawn(service, model_name, model_xml, robot_namespace, initial_pose, reference_frame)
 
@@ -46,7 +46,7 @@ def set_model_configuration_client(
     joint_positions: Sequence[float],
     gazebo_namespace: str,
 ) -> bool | None:
-    """Set the positions of joints, after a second; return the service's ``success``, or None if the call failed."""
+    """Set joint positions after one second; return the response's ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/set_model_configuration"
     rospy.loginfo(f"Waiting for service {service}")
     rospy.wait_for_service(service)

@@ -1,4 +1,4 @@
-"""gazebo_ros.plugins: the base classes of minirospy's plugins in Python. See docs/simulation.md."""
+"""gazebo_ros.plugins: the base classes of minirospy's Python plugins. See docs/simulation.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The physics of the simulation: one class over MuJoCo, built from the records of ``minirospy.core.sdf.model``."""
+"""The physics of the simulation: a class based on MuJoCo, built from the records of ``minirospy.core.sdf.model``."""
 
 from minirospy.ros.gazebo_ros.physics.handles import SimJoint, SimLink, SimModel
 from minirospy.ros.gazebo_ros.physics.library import SimulationError

@@ -1,4 +1,4 @@
-"""Models' records become bodies, joints and geoms of an MjSpec."""
+"""Converts the records of models to bodies, joints and geoms of an MjSpec."""
 
 from __future__ import annotations
 
@@ -38,22 +38,22 @@ __all__ = [
 ]
 
 FIXED_KINDS = ("fixed",)
-MAX_LIMIT = 1e15  # SDF writes 1e16 for "no limit"
-MIN_RANGE = 1e-5  # MuJoCo refuses a range of length zero
-MAX_LIGHTS = 8  # of OpenGL
-MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer ones MuJoCo softens contacts, and wheels slip
+MAX_LIMIT = 1e15  # SDF writes 1e16 to mean no limit
+MIN_RANGE = 1e-5  # MuJoCo rejects ranges of length zero
+MAX_LIGHTS = 8  # OpenGL's maximum
+MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer substeps, MuJoCo softens contacts, and wheels slip
 VISUAL = "\tvisual"  # separates the names of visuals from those of collisions
 MOTOR_DAMPING = (
-    0.9999  # MuJoCo's largest impedance: rows of joint friction and motors are as hard as it allows
+    0.9999  # MuJoCo's maximum impedance: friction rows of joints, and motors, are as stiff as possible
 )
 
 
 @dataclass
 class BuiltModel:
-    """The parts that a model added to the spec.
+    """The parts that were added to the spec for a model.
 
-    ``roots``: the bodies below the world by the links' names; ``free``: those with six degrees of freedom; ``joints``: those
-    in the tree of bodies; ``others``: excluded contacts and equalities.
+    ``roots``: the bodies directly below the world, by link name. ``free``: those with six degrees of freedom. ``joints``: the
+    joints in the body tree. ``others``: contact exclusions and equalities.
     """
 
     roots: dict[str, Any] = field(default_factory=dict)
@@ -76,19 +76,19 @@ class Builder:
         option = self.spec.option
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        option.impratio = 10.0  # friction creeps less: 0.5 mm in 2 s on a slope
+        option.impratio = 10.0  # reduces creep in friction: 0.5 mm in 2 s on a slope
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.set_physics(physics)
-        self.has_visuals = False  # they cost time and memory, and only cameras need them
+        self.has_visuals = False  # visuals cost time and memory, and only cameras need them
 
     def set_physics(self, physics: Physics) -> None:
-        """Set the step and the gravity of the next compilation."""
+        """Set the time step and gravity for the next compilation."""
         self._substep = physics.step / count_substeps(physics.step)
         self.spec.option.timestep = self._substep
         self.spec.option.gravity = physics.gravity
 
     def add(self, model: Model, name: str, pose: Pose) -> BuiltModel:
-        """Add a model at a pose. Raise SimulationError if a part of it cannot be simulated; then nothing is added."""
+        """Add a model at a pose. If a part cannot be simulated, add nothing and raise SimulationError."""
         built = BuiltModel()
         try:
             tree = LinkTree(order=list(model.links)) if model.is_static else plan_tree(model)
@@ -101,7 +101,7 @@ class Builder:
                 self._add_mimics(built, model, name)
         except Exception as error:
             self.delete(built)
-            self.shapes.warnings.clear()  # they would name the next model
+            self.shapes.warnings.clear()  # they would be attributed to the next model
             if isinstance(error, SimulationError):
                 raise SimulationError(f"model '{name}': {error}") from error.__cause__
             if isinstance(error, (ValueError, TypeError, OSError)):
@@ -110,7 +110,7 @@ class Builder:
         return built
 
     def add_scene(self, world: World) -> None:
-        """Add the background and the lights of a world, and from now on the visuals of models."""
+        """Add a world's background and lights, and add visuals for all models added from now on."""
         self.has_visuals = True
         mujoco = self._mujoco
         red, green, blue, _ = world.background
@@ -143,7 +143,7 @@ class Builder:
                 row.type = names.get(light.kind, kinds.mjLIGHT_POINT)
 
     def add_visuals(self, built: BuiltModel, model: Model, name: str) -> list[str]:
-        """Add a model's visuals. Return a line for each one that cannot be read: the picture lacks it."""
+        """Add a model's visuals. Return a line for each unreadable one, which pictures will lack."""
         warnings: list[str] = []
         for link in model.links.values():
             for visual in link.visuals:
@@ -161,7 +161,7 @@ class Builder:
                 self.spec.delete(geom)
 
     def take_warnings(self, name: str) -> list[str]:
-        """Return the lines about shapes of a model that was just added."""
+        """Return and clear the warnings about the shapes of a model that was just added."""
         lines = [f"model '{name}': {line}" for line in self.shapes.warnings]
         self.shapes.warnings.clear()
         return lines
@@ -233,7 +233,7 @@ class Builder:
             self.set_axis(axis_name, joint.kind, axis)
 
     def set_axis(self, name: str, kind: str, axis: Axis) -> None:
-        """Set the limits and the passive forces of one of MuJoCo's joints."""
+        """Set the limits and passive forces of a MuJoCo joint."""
         row = self.spec.joint(name)
         _set_first(row, "damping", max(axis.damping, 0.0))
         _set_first(row, "stiffness", max(axis.spring_stiffness, 0.0))
@@ -247,7 +247,7 @@ class Builder:
             row.range = [max(lower, -MAX_LIMIT), min(upper, MAX_LIMIT)]
 
     def _add_excludes(self, built: BuiltModel, model: Model, name: str) -> None:
-        """Exclude contacts within the model, or those of links that a joint connects if the model collides with itself."""
+        """Exclude contacts within the model or, if the model collides with itself, between links that a joint connects."""
         with_shapes = [link for link in model.links.values() if link.collisions]
         joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
         for index, first in enumerate(with_shapes):
@@ -262,7 +262,7 @@ class Builder:
                 )
 
     def _add_loop(self, built: BuiltModel, model: Model, name: str, joint: Joint) -> None:
-        """Close a kinematic loop with an equality: a weld, or connections at one or two points of the axis."""
+        """Close a kinematic loop with an equality: a weld, or connections at one or two points on the axis."""
         child = model.links[joint.child].pose
         parent = IDENTITY if joint.parent == WORLD else model.links[joint.parent].pose
         first = f"{name}::{joint.child}"
@@ -271,7 +271,7 @@ class Builder:
             raise SimulationError(f"joint '{joint.name}' closes a loop: a prismatic joint cannot do that")
         equality = self._mujoco.mjtEq
         if joint.kind == "fixed":
-            pose = relative(child, parent)  # of the parent in the child
+            pose = relative(child, parent)  # of the parent, in the child's frame
             data = [0.0] * 11
             data[3:6] = pose.position
             data[6:10] = to_wxyz(pose.orientation)
@@ -313,19 +313,19 @@ class Builder:
 
 
 def set_inertial(body: Any, inertial: Inertial) -> None:
-    """Set the mass and the inertia of one of MuJoCo's bodies."""
+    """Set the mass and inertia of a MuJoCo body."""
     inertia = principal_inertia(inertial)
     body.mass, body.inertia = inertia.mass, inertia.moments
     body.ipos, body.iquat = inertia.pose.position, to_wxyz(inertia.pose.orientation)
 
 
 def count_substeps(step: float) -> int:
-    """Return the number of MuJoCo's steps in a step (s) of the world."""
+    """Return the number of MuJoCo steps per step (s) of the world."""
     return max(1, math.ceil(step / MAX_SUBSTEP - 1e-9))
 
 
 def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
-    """Return the names of MuJoCo's joints for a joint: one for each axis, none for a fixed joint."""
+    """Return the names of the MuJoCo joints for a joint: one per axis, none for a fixed joint."""
     if joint.kind in FIXED_KINDS:
         return ()
     return (scoped, f"{scoped}/1") if joint.kind == "universal" else (scoped,)
@@ -337,12 +337,12 @@ def has_limits(axis: Axis) -> bool:
 
 
 def _turns_freely(joint: Joint) -> bool:
-    """Return whether a joint turns without limits."""
+    """Return whether a joint rotates without limits."""
     return joint.kind == "continuous" or (joint.kind == "revolute" and not has_limits(joint.axis))
 
 
 def _is_wheel(joint: Joint, collision: Collision) -> bool:
-    """Return whether a collision is a short cylinder that a joint without limits turns about its own axis."""
+    """Return whether a collision is a short cylinder that a joint without limits rotates about its own axis."""
     shape = collision.geometry
     if not _turns_freely(joint) or not isinstance(shape, Cylinder) or shape.length > 2 * shape.radius:
         return False
@@ -356,7 +356,7 @@ def _is_wheel(joint: Joint, collision: Collision) -> bool:
 
 
 def _is_steep(pose: Pose, collision: Collision) -> bool:
-    """Return whether a collision is a plane that is nearer to a wall than to the ground. ``pose``: in the world."""
+    """Return whether a collision is a plane that is closer to vertical than to horizontal. ``pose``: its pose in the world."""
     shape = collision.geometry
     if not isinstance(shape, Plane):
         return False
@@ -365,7 +365,7 @@ def _is_steep(pose: Pose, collision: Collision) -> bool:
 
 
 def _check_numbers(link: Link, joint: Joint | None) -> None:
-    """Raise SimulationError if a number is not finite, or a joint's limit is NaN: MuJoCo accepts NaN."""
+    """Raise SimulationError if a number is not finite, or a joint's limit is NaN, because MuJoCo accepts NaN."""
     inertial = link.inertial
     values = [*link.pose.position, *link.pose.orientation, inertial.mass, *inertial.inertia]
     values += [*inertial.pose.position, *inertial.pose.orientation]
@@ -397,7 +397,7 @@ def _direction(joint: Joint, axis: Axis) -> Vector:
 
 
 def _set_first(row: Any, name: str, value: float) -> None:
-    """Set a coefficient that is a polynomial's first one since MuJoCo 4, and a number before."""
+    """Set a coefficient: a plain number before MuJoCo 4, the first coefficient of a polynomial since then."""
     if isinstance(getattr(row, name), float):
         setattr(row, name, value)
     else:

@@ -1,9 +1,9 @@
-"""MuJoCo's compiled model and data, one substep at a time, with motors as in ODE.
+"""MuJoCo's compiled model and data, advanced in substeps, with motors that behave like ODE's.
 
-A step of the world consists of substeps, because MuJoCo's contacts become soft if its step is long.
+A step of the world consists of several substeps, because contacts become soft if MuJoCo's time step is long.
 
-After each substep the positions of bodies, the contacts and the velocities belong to the new time: a substep is the second half
-of ``mj_step`` (forces, solver, integration) and the first half of the next one.
+After each substep, body positions, contacts and velocities are those of the new time. A substep is therefore the second half of
+one ``mj_step`` (forces, solver, integration) and the first half of the next.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ MIN_SWING = 0.5  # rad/s; Coriolis forces of slower joints need no correction
 MIN_GRAIN = 0.1  # sine of the angle to the normal; a direction of friction that is nearer to it is none: bodies tilt a little
 MIN_FRICTION = 1e-5  # MuJoCo's own
 MAX_FORCE = 1e9  # N or N m; a motor without a limit
-MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster targets of motors would make contacts explode
+MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster motor targets would make contacts explode
 
 
 class Engine:
     """The compiled world.
 
-    A motor is a row of joint friction whose target velocity is not zero, as ODE's motors are: the solver holds the velocity with
-    at most the maximum force. MuJoCo computes the reference acceleration of such a row as ``-b * velocity``; this class adds
-    ``b * target`` between the two halves of a step.
+    A motor is a row of joint friction with a nonzero target velocity, like ODE's motors: the solver maintains the velocity with
+    at most the maximum force. MuJoCo computes such a row's reference acceleration as ``-b * velocity``; this class adds ``b *
+    target`` between the two halves of a step.
     """
 
     def __init__(self, builder: Builder, physics: Physics) -> None:
@@ -42,9 +42,9 @@ class Engine:
         self._set_step(physics)
         self.model: Any = builder.spec.compile()
         self.data: Any = self.mujoco.MjData(self.model)
-        self.generation = 0  # grows with each compilation: ids of bodies and joints change
+        self.generation = 0  # grows with each compilation, which changes the ids of bodies and joints
         self.is_stale = True  # whether positions have changed since the last forward computation
-        self.records_details = False  # whether forces of contacts and joints are kept for the readers
+        self.records_details = False  # whether contact and joint forces are recorded for readers
         self.contacts: NDArray[np.int32] = np.zeros((0, 2), np.int32)
         self.contact_points: NDArray[np.float64] = np.zeros((0, 3))
         self.contact_frames: NDArray[np.float64] = np.zeros((0, 9))
@@ -56,18 +56,18 @@ class Engine:
 
     def _set_step(self, physics: Physics) -> None:
         self.physics = physics
-        self.substeps = count_substeps(physics.step)  # in a step of the world
+        self.substeps = count_substeps(physics.step)  # number per step of the world
         self.substep = physics.step / self.substeps  # s
 
     def _size_arrays(self) -> None:
         count = self.model.nv
         self.target_velocity: NDArray[np.float64] = np.zeros(count)
-        self.motor_force: NDArray[np.float64] = np.zeros(count)  # of the last step
+        self.motor_force: NDArray[np.float64] = np.zeros(count)  # in the last step
         self.target_position: NDArray[np.float64] = np.zeros(count)
         self.max_velocity: NDArray[np.float64] = np.full(count, MAX_MOTOR_SPEED)
         self.follows_position: NDArray[np.bool_] = np.zeros(count, np.bool_)
         self.motor_limit: NDArray[np.float64] = np.zeros(count)  # of motors on damped joints
-        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # of these joints, 0 for all others
+        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # of these joints; 0 for all others
         self._damped: NDArray[np.intp] = np.zeros(0, np.intp)
         self._followers: NDArray[np.intp] = np.zeros(0, np.intp)
         self._follower_positions: NDArray[np.intp] = np.zeros(0, np.intp)
@@ -87,7 +87,7 @@ class Engine:
         self.model.dof_solimp[:] = (MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0)
 
     def recompile(self) -> None:
-        """Compile the changed spec; the states of what stays, and the time, are kept. Raise ValueError if it is invalid."""
+        """Compile the changed spec, keeping the time and the states of remaining models. Raise ValueError if it is invalid."""
         self.model, self.data = self._builder.spec.recompile(self.model, self.data)
         self.generation += 1
         self.is_stale = True
@@ -95,7 +95,7 @@ class Engine:
         self._forget_details()
 
     def set_physics(self, physics: Physics) -> None:
-        """Set the step and the gravity."""
+        """Set the time step and gravity."""
         self._set_step(physics)
         self.model.opt.timestep = self.substep
         self.model.opt.gravity[:] = physics.gravity
@@ -105,7 +105,7 @@ class Engine:
         self.is_stale = True
 
     def motors_changed(self) -> None:
-        """Note that targets of motors have changed."""
+        """Record that the motors' targets have changed."""
         self._bias = self.target_velocity * self._rate
         self._damped = np.flatnonzero(self.motor_damping)
         self._followers = np.flatnonzero(self.follows_position)
@@ -117,14 +117,14 @@ class Engine:
         self._bias[dof] = velocity * self._rate
 
     def refresh(self) -> None:
-        """Compute the positions, contacts and velocities of bodies if the state has changed."""
+        """If the state has changed, compute the bodies' positions, contacts and velocities."""
         if self.is_stale:
             self.is_stale = False
             self._begin()
             self._forget_details()
 
     def advance(self, left: int = 1) -> None:
-        """Advance by one substep; ``left`` is the number of substeps until the end of the world's step, with this one."""
+        """Advance by one substep; ``left`` is the number of substeps left in the world's step, including this one."""
         model, data, mujoco = self.model, self.data, self.mujoco
         self.refresh()
         if self._followers.size:
@@ -209,10 +209,11 @@ class Engine:
         max_range: float,
         excluded_body: int,
     ) -> None:
-        """Write each ray's first geom and its distance, or -1. ``vectors`` are (n, 3) unit vectors in world axes."""
+        """Write the first geom that each ray hits, and its distance or -1. ``vectors``: (n, 3) unit vectors in world axes."""
         # Newer versions have an argument for normals.
         normals = (None,) if self._has_normals else ()
-        # MuJoCo looks at all geoms of a body for each ray. A room that is one mesh has thousands for contacts, after the mesh.
+        # MuJoCo checks all geoms of a body for each ray. A room that is one mesh has thousands of geoms for contacts, after the
+        # mesh.
         counts = self.model.body_geomnum
         all_counts = counts.copy()
         counts[:] = self._ray_counts
@@ -235,7 +236,7 @@ class Engine:
             counts[:] = all_counts
 
     def _count_ray_geoms(self) -> NDArray[np.int32]:
-        """Return how many of each body's geoms rays need: those until the last one that they can hit."""
+        """Return, for each body, the number of geoms that rays must check: up to the last one that they can hit."""
         model = self.model
         counts = np.zeros(model.nbody, np.int32)
         geoms = np.flatnonzero(RAY_GROUPS[model.geom_group])
@@ -244,17 +245,17 @@ class Engine:
         return counts
 
     def geoms_within(self, point: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
-        """Return the geoms that lie within a distance (m) of a point in the world."""
-        radii = self.model.geom_rbound  # 0: the geom is infinite
+        """Return the geoms within a distance (m) of a point in the world."""
+        radii = self.model.geom_rbound  # 0 means an infinite geom
         away = np.linalg.norm(self.data.geom_xpos - point, axis=1)
         return np.flatnonzero((radii > 0) & (away + radii < distance))
 
     def _coriolis_correction(self) -> NDArray[np.float64] | None:
-        """Return the difference of Coriolis and centrifugal forces between the last velocities and those half a step later.
+        """Return the change in Coriolis and centrifugal forces from the last velocities to those half a step later.
 
-        MuJoCo's velocities are those half a step before its positions. With forces of that time, a double pendulum loses a
-        quarter of its energy in a minute; with this correction, less than 0.1 %. Return None if joints are slow, or if an
-        impact makes the extrapolation invalid.
+        MuJoCo's velocities lag its positions by half a step. With forces of that time, a double pendulum loses a quarter of its
+        energy in one minute; with this correction, it loses less than 0.1 %. Return None if joints are slow, or if an impact
+        makes the extrapolation invalid.
         """
         data, swinging = self.data, self._swinging
         speed = abs(data.qvel[swinging]).max()
@@ -274,7 +275,7 @@ class Engine:
         return correction
 
     def _find_swinging(self) -> NDArray[np.intp]:
-        """Return the degrees of freedom of joints whose links are not balanced like wheels."""
+        """Return the degrees of freedom of joints whose links are not balanced as wheels are."""
         model = self.model
         result: list[int] = []
         for joint in np.flatnonzero(model.jnt_type == self.mujoco.mjtJoint.mjJNT_HINGE).tolist():
@@ -287,7 +288,7 @@ class Engine:
         return np.array(result, np.intp)
 
     def _follow(self, left: int) -> None:
-        """Give position motors the velocity that reaches the target with the last of ``left`` substeps."""
+        """Give position motors the velocity that reaches the target at the last of ``left`` substeps."""
         dofs = self._followers
         lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
         limit = self.max_velocity[dofs]
@@ -296,8 +297,9 @@ class Engine:
     def _limit_damped(self) -> None:
         """Set the damping of joints with motors, and the force that their motors have left.
 
-        MuJoCo integrates damping implicitly: on a light wheel it slows a motor for many steps, and its reaction pushes the
-        robot back. While a motor is stronger than the damping, the damping is a part of the motor's force instead.
+        MuJoCo integrates damping implicitly: on a light wheel, this slows a motor for many steps, and the reaction pushes the
+        robot back. As long as a motor is stronger than the damping, the damping is therefore included in the motor's force
+        instead.
         """
         dofs, damping = self._damped, self.motor_damping[self._damped]
         velocity, limit = self.data.qvel[dofs], self.motor_limit[dofs]
@@ -311,7 +313,7 @@ class Engine:
         self.model.dof_frictionloss[dofs] = np.where(is_strong, left, limit)
 
     def _record(self) -> None:
-        """Keep the contacts and forces of the step before the next one's replace them."""
+        """Save the step's contacts and forces before those of the next step overwrite them."""
         data = self.data
         contact = data.contact
         self.contacts = contact.geom.copy()

@@ -1,6 +1,6 @@
-"""Models, links and joints of the running simulation. They stay valid until their model is removed.
+"""Models, links and joints of the running simulation. They remain valid until their model is removed.
 
-They are obtained from :class:`Simulation`, and are used in the same thread as it.
+:class:`Simulation` provides them; use them only in its thread.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Owner(Protocol):
 
 @dataclass
 class TimedWrench:
-    """A wrench in world axes at a point of the link, while ``start`` <= time < ``end`` (s)."""
+    """A wrench in world axes at a point of the link, active while ``start`` <= time < ``end`` (s)."""
 
     force: Vector
     torque: Vector
@@ -63,7 +63,7 @@ class TimedWrench:
 
 @dataclass
 class TimedForce:
-    """A joint's force or torque while ``start`` <= time < ``end`` (s)."""
+    """A joint's force or torque, active while ``start`` <= time < ``end`` (s)."""
 
     force: float
     start: float
@@ -78,7 +78,7 @@ class SimLink:
         self.model = model
         self.record = record
         self.name = record.name
-        self.id = 0  # MuJoCo's, which changes with each compilation
+        self.id = 0  # MuJoCo's id, which changes with each compilation
         self.wrenches: list[TimedWrench] = []
         self.has_damping = (record.linear_damping > 0 or record.angular_damping > 0) and not model.is_static
 
@@ -96,7 +96,7 @@ class SimLink:
 
     @property
     def state(self) -> State:
-        """Return the pose and the velocity of the link's origin."""
+        """Return the pose of the link's origin, and its velocity."""
         pose = self.pose
         engine = self.engine
         velocity = np.zeros(6)
@@ -106,7 +106,7 @@ class SimLink:
         return State(pose, (vx, vy, vz), (wx, wy, wz))
 
     def set_state(self, state: State) -> None:
-        """Move the whole model so that this link has the state, with joint angles kept and joint velocities zero."""
+        """Move the whole model so that this link has the state. Joint positions stay, and joint velocities become zero."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         self.model.move(self.pose, state)
 
@@ -132,7 +132,7 @@ class SimLink:
             self.model.simulation.recompile()
 
     def set_inertial(self, inertial: Inertial) -> None:
-        """Change the mass and the inertia; the world is compiled again. A static model has none."""
+        """Change the mass and inertia, and recompile the world. A static model has none."""
         _check(self, inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
         if inertial.mass <= 0:
             raise SimulationError(f"{self.scoped_name}: a mass must be positive")
@@ -150,25 +150,25 @@ class SimLink:
         start: float = 0.0,
         duration: float = math.inf,
     ) -> None:
-        """Apply a force and a torque in world axes at a point of the link's frame.
+        """Apply a force and torque in world axes at a point in the link's frame.
 
-        ``start``: time of the simulation in seconds; a time in the past means now. A negative duration means for ever.
+        ``start``: simulation time in seconds; a time in the past means now. A negative duration means forever.
         """
         _check(self, *force, *torque, *point)
         start, end = self.model.force_changes(start, duration)
         self.wrenches.append(TimedWrench(force, torque, point, start, end))
 
     def push(self, force: Vector = ZERO, torque: Vector = ZERO, *, point: Vector = ZERO) -> None:
-        """Apply a force and a torque in world axes at a point of the link's frame for the next step."""
+        """Apply a force and torque in world axes at a point in the link's frame, for the next step only."""
         _check(self, *force, *torque, *point)
         self.wrenches.append(TimedWrench(force, torque, point, *self.model.force_changes(0.0, 0.0)))
 
     def clear_wrenches(self) -> None:
-        """Remove all wrenches of :meth:`add_wrench`."""
+        """Remove all wrenches added by :meth:`add_wrench`."""
         self.wrenches.clear()
 
     def apply_wrenches(self, now: float) -> bool:
-        """Add the forces of this step to MuJoCo's, and drop those that have ended. Return whether some remain."""
+        """Add this step's forces to MuJoCo's, and drop expired ones. Return whether some remain."""
         step = self.engine.physics.step
         row = self.engine.data.xfrc_applied[self.id]
         position, orientation = self.pose
@@ -180,7 +180,7 @@ class SimLink:
                 row[3:] += add(each.torque, cross(arm, each.force))
         self.wrenches = [each for each in self.wrenches if each.end > now + 1.5 * step]
         if self.has_damping:
-            # As in ODE, a share of the velocity is lost in each step.
+            # As in ODE, a fraction of the velocity is lost in each step.
             _, linear, angular = self.state
             mass = float(self.engine.model.body_mass[self.id])
             moments = self.engine.model.body_inertia[self.id].tolist()
@@ -192,7 +192,7 @@ class SimLink:
 
 
 class SimJoint:
-    """A joint, or one axis of a universal joint. A fixed or a ball joint has no axis: its position is 0.
+    """A joint, or one axis of a universal joint. A fixed or ball joint has no axis; its position is 0.
 
     Positions are in rad or m, velocities in rad/s or m/s, forces in N m or N.
     """
@@ -205,7 +205,7 @@ class SimJoint:
         self.name = record.name
         self.scoped = scoped  # MuJoCo's name, or an empty string
         self.second: SimJoint | None = None  # the second axis of a universal joint
-        self.dof = -1  # MuJoCo's, which changes with each compilation
+        self.dof = -1  # MuJoCo's index, which changes with each compilation
         self._address = -1
         self._force = 0.0
         self._timed: list[TimedForce] = []
@@ -231,14 +231,14 @@ class SimJoint:
 
     @property
     def effort(self) -> float:
-        """Return the force of the last step: what was applied, and that of the motor or of the joint's friction."""
+        """Return the force in the last step: the applied force, plus that of the motor or of the joint's friction."""
         if self.dof < 0:
             return 0.0
         engine = self.engine
         return float(engine.data.qfrc_applied[self.dof] + engine.motor_force[self.dof])
 
     def set_state(self, position: float, velocity: float = 0.0) -> None:
-        """Set position and velocity at once."""
+        """Set position and velocity immediately."""
         _check(self, position, velocity)
         if self.dof >= 0:
             self.engine.data.qpos[self._address] = position
@@ -246,7 +246,7 @@ class SimJoint:
             self.engine.is_stale = True
 
     def set_axis(self, axis: Axis) -> None:
-        """Change limits, damping, friction and spring, but not the direction; the world is compiled again.
+        """Change limits, damping, friction and spring, but not the direction, and recompile the world.
 
         Raise SimulationError if damping or friction is not finite, or a limit is NaN.
         """
@@ -260,30 +260,30 @@ class SimJoint:
             self.model.simulation.set_axis(self.scoped, self.record.kind, self.axis)
 
     def set_velocity_now(self, velocity: float) -> None:
-        """Set the velocity at once."""
+        """Set the velocity immediately."""
         if self.dof >= 0:
             self.engine.data.qvel[self.dof] = velocity
             self.engine.is_stale = True
 
     def set_force(self, force: float) -> None:
-        """Apply a force in each step until another one is set. The joint's limits of effort and velocity reduce it."""
+        """Apply a force in each step until another one is set. The joint's effort and velocity limits may reduce it."""
         _check(self, force)
         self._force = force
         self.model.force_changes()
 
     def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
-        """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: for ever)."""
+        """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: forever)."""
         _check(self, force)
         self._timed.append(TimedForce(force, *self.model.force_changes(start, duration)))
 
     def clear_forces(self) -> None:
-        """Remove the forces of :meth:`set_force` and :meth:`add_force`."""
+        """Remove the forces set by :meth:`set_force` and :meth:`add_force`."""
         self._force = 0.0
         self._timed.clear()
         self.model.force_changes()
 
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
-        """Start or change a motor that holds a velocity with at most a force."""
+        """Start or change a motor that holds a velocity with a limited force."""
         _check(self, velocity)
         self._velocity, self._target = min(max(velocity, -MAX_MOTOR_SPEED), MAX_MOTOR_SPEED), None
         self._start_motor(max_force)
@@ -291,14 +291,14 @@ class SimJoint:
     def set_position(
         self, position: float, max_force: float = math.inf, max_velocity: float = math.inf
     ) -> None:
-        """Start or change a motor that moves to a position, with at most a force and a velocity."""
+        """Start or change a motor that moves to a position with limited force and velocity."""
         _check(self, position)
         self._velocity, self._target = 0.0, position
         self._max_velocity = min(max_velocity, MAX_MOTOR_SPEED)
         self._start_motor(max_force)
 
     def stop_motor(self) -> None:
-        """Remove the motor: the joint moves freely."""
+        """Remove the motor, so that the joint moves freely."""
         self._max_force, self._target, self._velocity = 0.0, None, 0.0
         self._write_motor()
 
@@ -325,7 +325,7 @@ class SimJoint:
         engine.motor_limit[dof] = self._max_force
         engine.motor_damping[dof] = damping if self._max_force else 0.0
         engine.model.dof_damping[dof] = 0.0 if self._max_force else damping
-        # Without a motor the row is the joint's friction, whose target is to stand still.
+        # Without a motor, the row is the joint's friction, with a target velocity of 0.
         engine.target_velocity[dof] = self._velocity if self._max_force else 0.0
         engine.follows_position[dof] = self._target is not None and self._max_force > 0
         if self._target is not None:
@@ -335,7 +335,7 @@ class SimJoint:
         engine.is_stale = True
 
     def bind(self) -> None:
-        """Find MuJoCo's ids after a compilation, and write the motor again."""
+        """Look up MuJoCo's ids after a compilation, and set the motor again."""
         if not self.scoped or self.record.kind == "ball":
             return
         row = self.engine.model.joint(self.scoped)
@@ -344,7 +344,7 @@ class SimJoint:
             self._write_motor()
 
     def apply_forces(self, now: float) -> bool:
-        """Write this step's force. Return whether a force remains for later steps."""
+        """Apply this step's force. Return whether a force remains for later steps."""
         if self.dof < 0:
             return False
         force = self._force
@@ -363,7 +363,7 @@ class SimJoint:
         return bool(self._force or self._timed)
 
     def reset(self) -> None:
-        """Return to the initial position without forces and motor."""
+        """Return to the initial position, and remove forces and the motor."""
         self.clear_forces()
         self.stop_motor()
         self.set_state(self.axis.initial_position)
@@ -371,7 +371,7 @@ class SimJoint:
     def wrench(self) -> Wrench:
         """Return the force and torque that the child exerts on the parent at the joint, in the child link's axes.
 
-        It belongs to the last step, and needs ``Simulation.records_details``.
+        They belong to the last step, and require ``Simulation.records_details``.
         """
         engine = self.engine
         link = self.model.links[self.record.child]
@@ -436,12 +436,12 @@ class SimModel:
         return State(pose, add(state.linear, cross(state.angular, arm)), state.angular)
 
     def set_state(self, state: State) -> None:
-        """Move the model; joint angles are kept, joint velocities become zero."""
+        """Move the model. Joint positions stay, and joint velocities become zero."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         self.move(self.pose, state)
 
     def set_velocity(self, linear: Vector, angular: Vector) -> None:
-        """Set the velocity of the model's origin in world axes; the pose and the joints stay as they are."""
+        """Set the velocity of the model's origin in world axes. The pose and the joints stay unchanged."""
         _check(self, *linear, *angular)
         origin = self.pose.position
         self._set_free_velocities(linear, angular, origin)
@@ -459,12 +459,12 @@ class SimModel:
         self._set_free_velocities(state.linear, state.angular, state.pose.position)
 
     def _rest_pose(self, root: str) -> Pose:
-        """Return the pose in the world of a root body that is not free, with its joint at position 0."""
+        """Return a non-free root body's pose in the world, with its joint at position 0."""
         model, body = self.engine.model, self.links[root].id
         return _pose(model.body_pos[body], model.body_quat[body])
 
     def _place(self, root: str, pose: Pose) -> None:
-        """Set a root body's pose, with its joint at position 0 if it has one."""
+        """Set a root body's pose, with its joint, if any, at position 0."""
         engine = self.engine
         body = self.links[root].id
         x, y, z, w = normalized(pose.orientation)
@@ -472,7 +472,7 @@ class SimModel:
             address = int(engine.model.jnt_qposadr[engine.model.body_jntadr[body]])
             engine.data.qpos[address : address + 7] = (*pose.position, w, x, y, z)
             return
-        spec = self.built.roots[root]  # the next compilation reads the pose here
+        spec = self.built.roots[root]  # the next compilation reads the pose from here
         spec.pos, spec.quat = pose.position, (w, x, y, z)
         engine.model.body_pos[body] = pose.position
         engine.model.body_quat[body] = (w, x, y, z)
@@ -488,21 +488,21 @@ class SimModel:
         engine.is_stale = True
 
     def all_joints(self) -> Iterator[SimJoint]:
-        """Yield each axis."""
+        """Yield each joint, followed by the second axis if the joint is universal."""
         for joint in self.joints.values():
             yield joint
             if joint.second is not None:
                 yield joint.second
 
     def bind(self) -> None:
-        """Find MuJoCo's ids after a compilation."""
+        """Look up MuJoCo's ids after a compilation."""
         for link in self.links.values():
             link.id = int(self.engine.model.body(link.scoped_name).id)
         for joint in self.all_joints():
             joint.bind()
 
     def reset(self) -> None:
-        """Return to the pose and joint positions of the start, at rest, without forces and motors."""
+        """Return to the initial pose and joint positions, at rest, without forces and motors."""
         for link in self.links.values():
             link.clear_wrenches()
         for joint in self.all_joints():
@@ -513,7 +513,7 @@ class SimModel:
         self.set_velocity(ZERO, ZERO)
 
     def apply_forces(self, now: float) -> bool:
-        """Write the forces of one step. Return whether the next step has forces, too."""
+        """Apply the forces of one step. Return whether forces remain for the next step."""
         remains = False
         for link in self.links.values():
             if link.wrenches or link.has_damping:
@@ -530,7 +530,7 @@ class SimModel:
 
 
 def _check(owner: SimLink | SimJoint | SimModel, *values: float) -> None:
-    """Raise SimulationError if a value for the owner is infinite or NaN."""
+    """Raise SimulationError, which names the owner, if a value is infinite or NaN."""
     if not all(map(math.isfinite, values)):
         name = owner.name if isinstance(owner, SimModel) else f"{owner.model.name}::{owner.name}"
         raise SimulationError(f"{name}: a force, position or velocity is not finite")

@@ -1,4 +1,4 @@
-"""Inertias that MuJoCo accepts: principal moments that are positive and satisfy the triangle inequality."""
+"""Inertias that MuJoCo accepts: their principal moments are positive and satisfy the triangle inequality."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from minirospy.core.urdf.poses import quaternion_from_matrix
 
 __all__ = ["PrincipalInertia", "principal_inertia"]
 
-MIN_MASS = 1e-6  # kg; MuJoCo refuses moving bodies without mass
+MIN_MASS = 1e-6  # kg; MuJoCo rejects moving bodies without mass
 MIN_MOMENT = 1e-10  # kg m^2
 
 
@@ -42,7 +42,7 @@ def principal_inertia(inertial: Inertial) -> PrincipalInertia:
 
 
 def _valid(moments: Vector) -> Vector:
-    """Raise the moments until each is positive and at most the sum of the others."""
+    """Increase the moments until each is positive and at most the sum of the other two."""
     a, b, c = (max(value, MIN_MOMENT) for value in moments)
     lacking = max(a - b - c, b - a - c, c - a - b, 0.0)
     return a + lacking, b + lacking, c + lacking

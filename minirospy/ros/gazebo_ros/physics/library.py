@@ -1,4 +1,4 @@
-"""The only module that imports MuJoCo. Its types are ``Any``: the library has no complete annotations."""
+"""The only module that imports MuJoCo. Its types are ``Any``, because the library's annotations are incomplete."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["SimulationError", "import_context", "load_mujoco"]
 
 
 class SimulationError(MinirospyError):
-    """Raised if a model cannot be simulated, if a name does not exist, or if a library is missing."""
+    """Raised if a model cannot be simulated, a name does not exist, or a library is missing."""
 
 
 @cache
 def load_mujoco() -> Any:
-    """Return the module ``mujoco``. Raise SimulationError with the command that installs it if it is missing."""
+    """Return the module ``mujoco``. If it is missing, raise SimulationError with the command that installs it."""
     try:
         mujoco = importlib.import_module("mujoco")
     except ImportError as error:
@@ -26,15 +26,15 @@ def load_mujoco() -> Any:
         raise SimulationError(
             f"the simulation needs MuJoCo: {install_command('minirospy[sim]')} ({error})"
         ) from None
-    # Invalid states are found after each step. By default, warnings are printed and written to MUJOCO_LOG.TXT.
+    # Invalid states are detected after each step. By default, MuJoCo also prints warnings and writes them to MUJOCO_LOG.TXT.
     mujoco.set_mju_user_warning(lambda text: None)
     return mujoco
 
 
 def import_context(backend: str) -> Any:
-    """Return the class of OpenGL contexts of ``egl``, ``osmesa``, ``glfw`` or ``cgl``.
+    """Return the OpenGL context class of ``egl``, ``osmesa``, ``glfw`` or ``cgl``.
 
-    Raise any exception: the libraries of OpenGL raise ImportError, AttributeError or errors of their own.
+    May raise any exception: the OpenGL libraries raise ImportError, AttributeError or their own errors.
     """
     load_mujoco()
     return importlib.import_module(f"mujoco.{backend}").GLContext

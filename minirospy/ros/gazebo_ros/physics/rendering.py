@@ -1,7 +1,7 @@
-"""Colour and depth pictures of the world, rendered off screen.
+"""Colour and depth pictures of the world, rendered off-screen.
 
-A :class:`Renderer` belongs to the thread that creates it. Only ``capture`` reads the simulation: it runs in the simulation's
-thread, and uses no OpenGL. ``color`` and ``depth`` only draw, and may run at the same time as steps of the simulation.
+A :class:`Renderer` belongs to the thread that creates it. Only ``capture`` reads the simulation; it runs in the simulation's
+thread and does not use OpenGL. ``color`` and ``depth`` only draw, and may run while the simulation steps.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from minirospy.ros.gazebo_ros.physics.shapes import GROUP_VISUAL
 
 __all__ = ["MAX_PIXELS", "Renderer"]
 
-MAX_GEOMS = 20_000  # in one picture
-MAX_PIXELS = 4096  # on a side
+MAX_GEOMS = 20_000  # per picture
+MAX_PIXELS = 4096  # per side
 SPARE_GEOMS = 100  # for shapes that are not geoms, such as lights
 _VARIABLE = "MUJOCO_GL"
 
@@ -32,7 +32,7 @@ class Renderer:
     """Renders pictures of one size."""
 
     def __init__(self, engine: Engine, width: int, height: int) -> None:
-        """Open an OpenGL context. Raise SimulationError that names the library to install if there is none."""
+        """Open an OpenGL context. If that fails, raise SimulationError, which names the library to install."""
         if not (0 < width <= MAX_PIXELS and 0 < height <= MAX_PIXELS):
             raise SimulationError(f"a picture of {width}x{height} is not possible: at most {MAX_PIXELS}")
         self.engine = engine
@@ -41,7 +41,7 @@ class Renderer:
         self.backend, self._gl = open_context(width, height)
         self._generation = -1
         self._model: Any = None  # the compiled model of the scene
-        self._loaded: Any = None  # the one whose meshes the context has
+        self._loaded: Any = None  # the model whose meshes the context has loaded
         self._scene: Any = None
         self._context: Any = None
         self._near, self._far = 0.1, 100.0
@@ -51,7 +51,7 @@ class Renderer:
         self._option.geomgroup[GROUP_VISUAL] = 1
 
     def capture(self, pose: Pose, horizontal_fov: float, near: float = 0.1, far: float = 100.0) -> None:
-        """Copy the world as seen from a pose: x looks forward, z up; the angle is in radians, distances in metres."""
+        """Copy the world as seen from a pose: x points forward, z up. The angle is in radians, distances in metres."""
         engine, mujoco = self.engine, self._mujoco
         engine.refresh()
         if self._generation != engine.generation:
@@ -75,18 +75,18 @@ class Renderer:
             each.frustum_near, each.frustum_far = near, far
 
     def color(self) -> NDArray[np.uint8]:
-        """Return the captured picture (height, width, 3), red first, the upper row first."""
+        """Return the captured picture (height, width, 3) as RGB, top row first."""
         picture: NDArray[np.uint8] = np.empty((self.height, self.width, 3), np.uint8)
         self._draw()
         self._mujoco.mjr_readPixels(picture, None, self._area, self._context)
         return picture[::-1]
 
     def depth(self) -> NDArray[np.float32]:
-        """Return the distances along the camera's axis (height, width) in metres; infinite where nothing is."""
+        """Return the distances along the camera's axis (height, width) in metres; infinite where there is nothing."""
         values = np.empty((self.height, self.width), np.float32)
         self._draw(has_background=False)
         self._mujoco.mjr_readPixels(None, values, self._area, self._context)
-        # The buffer has 1 at the near plane and 0 at the far one.
+        # The buffer is 1 at the near plane and 0 at the far plane.
         near, far = self._near, self._far
         with np.errstate(divide="ignore"):
             distances = near * far / (near + values[::-1].astype(np.float64) * (far - near))
@@ -110,7 +110,7 @@ class Renderer:
             self._context.free()
         model.vis.global_.offwidth = self.width
         model.vis.global_.offheight = self.height
-        # With multisampling, depths belong to points beside the middle of the pixel.
+        # With multisampling, depths belong to points next to the pixel's centre.
         model.vis.quality.offsamples = 0
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
@@ -128,7 +128,7 @@ class Renderer:
 
 
 def open_context(width: int, height: int) -> tuple[str, Any]:
-    """Return the first backend that works, and its context. ``MUJOCO_GL`` selects one."""
+    """Return the first backend that works, and its context. ``MUJOCO_GL`` selects a specific one."""
     wanted = os.environ.get(_VARIABLE, "").lower()
     backends = [wanted] if wanted in ("egl", "osmesa", "glfw") else _backends()
     faults: list[str] = []
@@ -139,7 +139,7 @@ def open_context(width: int, height: int) -> tuple[str, Any]:
             context.make_current()
         except Exception as error:  # noqa: BLE001 (OpenGL's libraries raise errors of many types)
             faults.append(f"{backend}: {' '.join(str(error).split())[:100] or type(error).__name__}")
-            # PyOpenGL selects its platform by this variable; the next backend needs another one.
+            # PyOpenGL selects its platform by this variable, and the next backend needs a different one.
             if before is None:
                 os.environ.pop("PYOPENGL_PLATFORM", None)
             continue

@@ -1,4 +1,4 @@
-"""The shapes of collisions and visuals, as MuJoCo's geoms."""
+"""The shapes of collisions and visuals as MuJoCo geoms."""
 
 from __future__ import annotations
 
@@ -50,26 +50,27 @@ __all__ = [
     "to_wxyz",
 ]
 
-# MuJoCo's groups of geoms, of which a ray or a camera selects some.
+# MuJoCo's geom groups, by which rays and cameras select geoms.
 GROUP_COLLISION = 0
 GROUP_VISUAL = 2
 GROUP_CONTACT_ONLY = 3
 GROUP_RAY_ONLY = 4
 
 SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with steps of 1 to 2.5 ms
-# A contact begins soft and is stiff from 0.6 mm on. If it began stiff, a robot on four supports would rattle: each of them in
-# turn would lose the ground, and the wheels their grip.
+# A contact is soft at first, and stiff from a depth of 0.6 mm. If it were stiff from the start, a robot on four supports would
+# rattle: its supports would lift off in turn, and its wheels would lose their grip.
 SOLIMP = (0.5, 0.99, 0.0006, 0.5, 2.0)
-# A wheel that turns in place is pulled sideways, too: it lost the ground in most steps, and a robot with four of them
-# turned too slowly. This contact begins softer.
+# A wheel that turns in place is also pulled sideways. With the contact above, it would lift off in most steps, and a robot with
+# four such wheels would turn too slowly. This contact is softer at first.
 SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
-# A larger coefficient, such as 1e5, holds no better, and a wheel that touches the ground at two points then resists turning.
+# A larger coefficient, such as 1e5, does not hold better, and a wheel that touches the ground at two points would then resist
+# turning.
 MAX_FRICTION = 2.0
-PART = "\t"  # separates the name of a collision from the number of its geom
-MIN_SIZE = 1e-6  # m; MuJoCo refuses sizes of zero
-MIN_VERTICES = 4  # of a mesh; MuJoCo refuses one with fewer
-MIN_AREA = 1e-14  # m^2; MuJoCo refuses a mesh with less
-WALL_THICKNESS = 0.01  # m; a robot at 10 m/s does not pass it within a step of 1 ms
+PART = "\t"  # separates a collision's name from its geom's number
+MIN_SIZE = 1e-6  # m; MuJoCo rejects sizes of zero
+MIN_VERTICES = 4  # per mesh; MuJoCo rejects a mesh with fewer
+MIN_AREA = 1e-14  # m^2; MuJoCo rejects a mesh with less
+WALL_THICKNESS = 0.01  # m; a robot at 10 m/s does not pass through it in a step of 1 ms
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 
@@ -91,7 +92,7 @@ def grain(collision: Collision) -> Grain | None:
 
 
 def friction(surface: Surface) -> tuple[float, int]:
-    """Return a geom's coefficient and its priority.
+    """Return a geom's friction coefficient and its priority.
 
     The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo's geoms
     have one coefficient for both directions. The smaller one of ``mu`` and ``mu2`` is used: with a larger one, wheels that must
@@ -110,7 +111,7 @@ def _coefficients(surface: Surface) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A geom to add: its type, sizes and pose in the shape's frame, or a mesh or heightmap by name."""
+    """A geom to add: its type, sizes and pose in the shape's frame, or the name of a mesh or heightmap."""
 
     kind: str
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -136,16 +137,16 @@ class Shapes:
         self._textures = Textures(spec, self.warnings)
         self._decomposition = Decomposition(self.warnings)
         self._assets: dict[tuple[object, ...], list[_Piece]] = {}
-        self._elements: dict[int, Any] = {}  # the spec's meshes and heightmaps by their numbers
+        self._elements: dict[int, Any] = {}  # the spec's meshes and heightmaps, by number
         self._count = 0
 
     @property
     def last(self) -> int:
-        """Return the number of the mesh or heightmap that was added last."""
+        """Return the number of the last mesh or heightmap added."""
         return self._count
 
     def delete_after(self, last: int) -> None:
-        """Delete the meshes and heightmaps with greater numbers than ``last``; no geom may use them."""
+        """Delete the meshes and heightmaps with numbers above ``last``, which no geom may use."""
         numbers = [number for number in self._elements if number > last]
         names = {self._elements[number].name for number in numbers}
         for number in numbers:
@@ -167,7 +168,7 @@ class Shapes:
     ) -> None:
         """Add a collision's geoms.
 
-        ``turns``: a joint without limits turns the body. ``is_wheel``: the collision is a cylinder that turns about its axis.
+        ``turns``: a joint without limits rotates the body. ``is_wheel``: the collision is a cylinder that rotates about its axis.
         ``is_wall``: it is a plane that is not level.
         """
         mu, priority = friction(collision.surface)
@@ -190,7 +191,7 @@ class Shapes:
                 geom.contype = geom.conaffinity = 0
 
     def add_visual(self, body: Any, name: str, visual: Visual) -> None:
-        """Add a visual's geoms, which touch nothing."""
+        """Add a visual's geoms, which do not collide."""
         opacity = 1.0 - min(max(visual.transparency, 0.0), 1.0)
         for index, piece in enumerate(self._visible(visual.geometry)):
             geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, visual.pose)
@@ -242,7 +243,7 @@ class Shapes:
         except MeshError as error:
             raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
         is_whole = parts.are_exact
-        if not is_whole:  # first in the body: Engine.cast counts on it
+        if not is_whole:  # first in the body, as Engine.cast expects
             yield _Piece("MESH", asset=self._add_mesh(mesh.vertices, mesh.triangles), group=GROUP_RAY_ONLY)
         for part in parts.meshes:
             asset = self._add_mesh(part.vertices, part.triangles if is_whole else None)
@@ -292,14 +293,15 @@ class Shapes:
             vertices = vertices[used]
             mesh.userface = faces.ravel().astype(np.int32)
             if texcoords is not None:
-                # MuJoCo counts from the picture's upper left corner.
+                # MuJoCo's texture coordinates start at the picture's upper left corner.
                 mesh.usertexcoord = (texcoords * (1, -1) + (0, 1)).astype(np.float32).ravel()
                 mesh.userfacetexcoord = np.arange(faces.size, dtype=np.int32)
         lacking = MIN_VERTICES - len(vertices)
         if lacking > 0:
             vertices = np.concatenate([vertices, vertices[-1:].repeat(lacking, axis=0)])
         mesh.uservert = vertices.astype(np.float32).ravel()
-        # An open or flat mesh has no volume; the bodies' inertias are given, so this only chooses the mesh's own frame.
+        # An open or flat mesh has no volume. The bodies' inertias are given explicitly, so this affects only the mesh's own
+        # frame.
         mesh.inertia = self._mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         return name
 
@@ -308,7 +310,7 @@ class Shapes:
             heights = terrain(shape.path)
         except MeshError as error:
             raise SimulationError(str(error)) from error
-        # MuJoCo scales the lowest point to 0 and the highest one to 1. In SDF, the highest one has the given height.
+        # MuJoCo scales the lowest point to 0 and the highest to 1. In SDF, the highest point has the given height.
         highest = max(float(heights.max()), MIN_SIZE)
         lowest = float(heights.min()) / highest
         self._count += 1
@@ -327,7 +329,7 @@ class Shapes:
 
 
 def _primitive(geometry: Geometry) -> _Piece | None:
-    """Return the geom of a shape that MuJoCo has itself, or None."""
+    """Return the geom of a shape that MuJoCo supports directly, or None."""
     if isinstance(geometry, Box):
         x, y, z = (max(abs(side) / 2, MIN_SIZE) for side in geometry.size)
         return _Piece("BOX", (x, y, z))
@@ -343,8 +345,8 @@ def _primitive(geometry: Geometry) -> _Piece | None:
 def _wheel(shape: Cylinder) -> list[_Piece]:
     """Return an ellipsoid for contacts, and the cylinder for rays.
 
-    A cylinder touches the ground along a line. When a robot turns, one end of that line slips forward and the other one
-    backward, and the effective distance of the wheels depends on the friction. An ellipsoid touches at its middle.
+    A cylinder touches the ground along a line. When a robot turns, one end of that line slips forward and the other backward, so
+    that the effective distance between the wheels depends on the friction. An ellipsoid touches the ground only at its middle.
     """
     radius, half = max(shape.radius, MIN_SIZE), max(shape.length / 2, MIN_SIZE)
     return [
@@ -354,7 +356,7 @@ def _wheel(shape: Cylinder) -> list[_Piece]:
 
 
 def _wall(shape: Plane) -> _Piece:
-    """Return a thin box of the plane's size: posters and walls end, and the ground behind them is free."""
+    """Return a thin box of the plane's size: posters and walls are finite, and leave the ground behind them free."""
     x, y = (max(side / 2, MIN_SIZE) for side in shape.size)
     turn = _turn_to(shape.normal)
     behind = rotate(turn, (0.0, 0.0, -WALL_THICKNESS / 2))

@@ -1,7 +1,7 @@
 """A world in MuJoCo, built from the records of ``minirospy.core.sdf.model``.
 
-A :class:`Simulation` is not thread-safe: its owner calls it from one thread at a time. The same world, seed and calls give
-the same states, bit for bit, on one machine.
+A :class:`Simulation` is not thread-safe: it must be called from one thread at a time. On one machine, the same world, seed and
+calls produce bit-identical states.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Simulation"]
 
-MAX_DISTANCE = 1e5  # m from the origin; a model beyond it has left the world
-MAX_SPEED = 1e5  # m/s or rad/s; a faster model has exploded
+MAX_DISTANCE = 1e5  # m from the origin; a model farther away has left the world
+MAX_SPEED = 1e5  # m/s or rad/s; a faster model has become unstable
 NANOSECONDS = 1_000_000_000
 
 
@@ -36,12 +36,12 @@ class Simulation:
     """The running world."""
 
     def __init__(self, world: World | None = None, *, seed: int = 0) -> None:
-        """Build the world. Raise SimulationError if MuJoCo is missing; a model that is invalid is in ``warnings``."""
+        """Build the world. Raise SimulationError if MuJoCo is missing; invalid models are listed in ``warnings``."""
         world = world or World()
         self.world = world
-        self.random = np.random.default_rng(seed)  # for the noise of sensors
+        self.random = np.random.default_rng(seed)  # for sensor noise
         self.warnings: list[str] = []
-        self.forced: dict[str, None] = {}  # the models on which forces act
+        self.forced: dict[str, None] = {}  # the models to which forces are applied
         self._had_forces = False
         self._time_ns = 0
         self._models: dict[str, SimModel] = {}
@@ -50,9 +50,7 @@ class Simulation:
         self._geom_names: list[str] = []
         self._model_of_dof: list[str] = []
         self._model_of_position: list[str] = []
-        self._farthest: NDArray[np.float64] = np.zeros(
-            0
-        )  # for each of MuJoCo's positions; angles have no limit
+        self._farthest: NDArray[np.float64] = np.zeros(0)  # for each MuJoCo position; angles have no limit
         self._add_all(world.models)
 
     # ---- time and steps
@@ -64,16 +62,16 @@ class Simulation:
 
     @property
     def time_ns(self) -> int:
-        """Return the time in nanoseconds; it is a sum of steps, without rounding errors."""
+        """Return the time in nanoseconds: an exact sum of steps, without rounding errors."""
         return self._time_ns
 
     @property
     def physics(self) -> Physics:
-        """Return the step, the gravity and the other parameters."""
+        """Return the time step, gravity and other parameters."""
         return self.engine.physics
 
     def set_physics(self, physics: Physics) -> None:
-        """Set the step and the gravity. Raise SimulationError if a value is not finite, or the step is below 1 ns."""
+        """Set the time step and gravity. Raise SimulationError if a value is not finite, or the step is below 1 ns."""
         if not (
             MIN_STEP <= physics.step <= 1 and all(map(math.isfinite, (*physics.gravity, physics.update_rate)))
         ):
@@ -84,7 +82,7 @@ class Simulation:
 
     @property
     def records_details(self) -> bool:
-        """Return whether contacts and joints' wrenches of each step are recorded, which takes time."""
+        """Return whether each step's contacts and joint wrenches are recorded, which takes time."""
         return self.engine.records_details
 
     @records_details.setter
@@ -92,7 +90,7 @@ class Simulation:
         self.engine.records_details = value
 
     def step(self, count: int = 1) -> list[LostModel]:
-        """Advance by steps. Return the models that were removed because they became NaN or left the world."""
+        """Advance by a number of steps. Return the models removed because their state was invalid or they left the world."""
         lost: list[LostModel] = []
         for _ in range(count):
             if self.forced or self._had_forces:
@@ -109,7 +107,7 @@ class Simulation:
         engine.refresh()
         positions, velocities = engine.data.qpos.copy(), engine.data.qvel.copy()
         engine.advance(left)
-        # NaN and large values fail this comparison, too.
+        # NaN and very large values also fail this comparison.
         data = engine.data
         if (abs(data.qvel) < MAX_SPEED).all() and (abs(data.qpos) < self._farthest).all():
             return []
@@ -128,7 +126,7 @@ class Simulation:
     def _remove_lost(
         self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
     ) -> list[LostModel]:
-        """Remove the models that caused invalid states; the others return to the state before the substep."""
+        """Remove the models that caused invalid states; all others return to their state before the substep."""
         data = self.engine.data
         broken: dict[str, str] = {}
         fastest = np.full(len(data.qvel), MAX_SPEED)
@@ -149,10 +147,10 @@ class Simulation:
         return result
 
     def _sources(self, broken: Iterable[str], velocities: NDArray[np.float64]) -> list[str]:
-        """Return the models that made some too fast or NaN in the last substep, before which the velocities were given.
+        """Return the models that caused the invalid states of the last substep. ``velocities``: those before it.
 
-        Contacts spread large velocities and NaN to other models. A model's velocity without contacts shows the source: if none
-        is too large, it is that of the fastest of the broken models.
+        Contacts spread large velocities and NaN to other models. The source is the model whose velocity is too large even when
+        computed without contacts. If there is none, it is the fastest of the invalid models.
         """
         with np.errstate(all="ignore"):
             free = abs(velocities + self.engine.data.qacc_smooth * self.engine.substep)
@@ -177,9 +175,9 @@ class Simulation:
             raise SimulationError(f"there is no model '{name}'") from None
 
     def add_model(self, model: Model, pose: Pose | None = None, name: str = "") -> SimModel:
-        """Add a model at a pose (default: the model's own) under a name (default: the model's own).
+        """Add a model at a pose and under a name; the model's own ones are the defaults.
 
-        The states of the others and the time stay. Raise SimulationError if the name is taken or the model is invalid.
+        The time and the other models' states are kept. Raise SimulationError if the name is in use or the model is invalid.
         """
         last = self._builder.shapes.last
         added = self._build(model, pose or model.pose, name or model.name)
@@ -193,22 +191,22 @@ class Simulation:
         return added
 
     def remove_model(self, name: str) -> None:
-        """Remove a model; the states of the others and the time stay. Raise SimulationError if it does not exist."""
+        """Remove a model, keeping the time and the others' states. Raise SimulationError if the model does not exist."""
         self.model(name)
         self._remove([name])
 
     def recompile(self) -> None:
-        """Compile the world again after a change of the spec."""
+        """Recompile the world after a change of the spec."""
         self.engine.recompile()
         self._bind()
 
     def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
-        """Change the limits and passive forces of one of MuJoCo's joints."""
+        """Change the limits and passive forces of a MuJoCo joint."""
         self._builder.set_axis(scoped, kind, axis)
         self.recompile()
 
     def _add_all(self, models: Iterable[Model]) -> None:
-        """Add the world's models with one compilation; if that fails, one by one."""
+        """Add the world's models with one compilation or, if that fails, one by one."""
         added: list[SimModel] = []
         last = self._builder.shapes.last
         for model in models:
@@ -221,7 +219,7 @@ class Simulation:
         except ValueError:
             for each in added:
                 self._drop(each)
-            # An invalid mesh, if it stayed, would make every compilation fail.
+            # An invalid mesh must be removed, because it would make every later compilation fail.
             self._builder.shapes.delete_after(last)
             for each in added:
                 try:
@@ -293,7 +291,7 @@ class Simulation:
     # ---- resets
 
     def reset_models(self) -> None:
-        """Return all models to their poses and joint positions of the start, at rest; the time goes on."""
+        """Return all models to their initial poses and joint positions, at rest. The time continues."""
         for model in self._models.values():
             model.reset()
         self.engine.data.qacc_warmstart[:] = 0
@@ -315,10 +313,10 @@ class Simulation:
         min_range: float = 0.0,
         exclude: str = "",
     ) -> RayHits:
-        """Cast rays from the origin of a pose in the world; ``directions`` are (n, 3) unit vectors in the pose's frame.
+        """Cast rays from a pose's origin; ``directions`` are (n, 3) unit vectors in the pose's frame.
 
-        A ray begins at ``min_range``: what is nearer, such as the sensor's own housing, does not stop it. ``exclude`` is a
-        link (``model::link``) whose collisions are ignored.
+        Rays start at ``min_range``, so that anything closer, such as the sensor's own housing, does not stop them. ``exclude`` is
+        a link (``model::link``) whose collisions are ignored.
         """
         engine = self.engine
         engine.refresh()
@@ -329,14 +327,15 @@ class Simulation:
             origin = np.array(pose.position)
             vectors = np.ascontiguousarray(directions @ _matrix(pose).T)
             body = engine.model.body(exclude).id if exclude else -1
-            # MuJoCo casts many rays from one point only. What lies within the smallest range, such as the housing, is hidden.
+            # MuJoCo can cast many rays only from a single point. Hide geoms that lie completely within the minimum range, such as
+            # the housing.
             inner = engine.geoms_within(origin, min_range)
             groups = engine.model.geom_group
             shown = groups[inner]
             groups[inner] = GROUP_CONTACT_ONLY
             engine.cast(origin, vectors, ids, distances, max_range, body)
             groups[inner] = shown
-            # Another near geom, such as a wall, is passed by single rays that begin at the smallest range.
+            # If another geom, such as a wall, is that close, cast single rays that start at the minimum range.
             for index in np.flatnonzero((distances >= 0) & (distances < min_range)).tolist():
                 start = origin + min_range * vectors[index]
                 found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
@@ -350,7 +349,7 @@ class Simulation:
         return RayHits(distances, tuple(names[each] if each >= 0 else "" for each in ids.tolist()))
 
     def renderer(self, width: int, height: int) -> Renderer:
-        """Return a renderer of pictures, for the calling thread. Raise SimulationError if OpenGL or a library is missing.
+        """Return a renderer for the calling thread. Raise SimulationError if OpenGL or a library is missing.
 
         The first call adds the visuals to the compiled world, which takes time and memory.
         """
@@ -359,7 +358,7 @@ class Simulation:
         return renderer
 
     def open_renderer(self, width: int, height: int) -> Renderer:
-        """Return a renderer for the calling thread, which need not be the simulation's. :meth:`add_visuals` is the caller's work.
+        """Return a renderer for the calling thread, which may be any thread. The caller must call :meth:`add_visuals` itself.
 
         Raise SimulationError if OpenGL or a library is missing.
         """
@@ -368,7 +367,7 @@ class Simulation:
         return Renderer(self.engine, width, height)
 
     def add_visuals(self) -> None:
-        """Add the visible shapes and the lights for cameras, now and for models that come later."""
+        """Add the visible shapes and lights for cameras, also for models that are added later."""
         if self._builder.has_visuals:
             return
         self._builder.add_scene(self.world)
@@ -383,10 +382,10 @@ class Simulation:
         self._bind()
 
     def _add_visuals_one_by_one(self) -> None:
-        """Add the visuals of each model that MuJoCo accepts; the others are in ``warnings``."""
+        """Add the visuals of each model that MuJoCo accepts; the others are listed in ``warnings``."""
         for model in self._models.values():
             last = self._builder.shapes.last
-            self._builder.add_visuals(model.built, model.record, model.name)  # its warnings are known
+            self._builder.add_visuals(model.built, model.record, model.name)  # its warnings are already known
             try:
                 self.engine.recompile()
             except ValueError as error:
@@ -400,20 +399,20 @@ class Simulation:
         self._builder.shapes.delete_after(last)
 
     def body_poses(self) -> NDArray[np.float64]:
-        """Return (n, 7) positions and orientations (x, y, z, w) in the world, by the ids of links."""
+        """Return (n, 7) positions and orientations (x, y, z, w) in the world, indexed by link id."""
         self.engine.refresh()
         data = self.engine.data
         return np.concatenate((data.xpos, data.xquat[:, (1, 2, 3, 0)]), axis=1)
 
     def contact_points(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the (n, 3) points and unit normals of all contacts, in the world."""
+        """Return the points and unit normals, both (n, 3), of all contacts, in the world."""
         self.engine.refresh()
         contact = self.engine.data.contact
         touching = contact.dist <= 0
         return contact.pos[touching].copy(), contact.frame[touching, :3].copy()
 
     def contacts(self) -> list[Contact]:
-        """Return the contacts of the last step; ``records_details`` must have been set before it."""
+        """Return the last step's contacts; ``records_details`` must have been set before that step."""
         engine = self.engine
         pairs: dict[tuple[str, str], list[int]] = {}
         for index, (first, second) in enumerate(engine.contacts.tolist()):
@@ -423,7 +422,7 @@ class Simulation:
 
     def _contact(self, first: str, second: str, rows: list[int]) -> Contact:
         engine = self.engine
-        # MuJoCo's normals point from the first geom to the second one, and its forces act on the second one.
+        # MuJoCo's normals point from the first geom to the second, and its forces act on the second.
         frames = engine.contact_frames[rows].reshape(-1, 3, 3)
         local = engine.contact_wrenches[rows].reshape(-1, 2, 3)
         wrenches = -np.einsum("nij,nki->nkj", frames, local)

@@ -1,4 +1,4 @@
-"""Records of what the simulation reports. All vectors are in world axes if not stated otherwise."""
+"""Records that the simulation returns. All vectors are in world axes unless stated otherwise."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Wrench(NamedTuple):
 class Contact(NamedTuple):
     """The contact points between two collisions, named ``model::link::collision``.
 
-    The normals point from the second collision to the first one. The forces act on the first one, and the torques are those
-    forces' about the contact points.
+    The normals point from the second collision to the first. The forces act on the first one, and the torques are the torques of
+    these forces about the contact points.
     """
 
     collision1: str
@@ -52,7 +52,7 @@ class RayHits(NamedTuple):
 
 
 class LostModel(NamedTuple):
-    """A model that the simulation removed, with the reason in one line."""
+    """A model that the simulation has removed, and the reason in one line."""
 
     name: str
     reason: str

@@ -1,4 +1,4 @@
-"""Pictures on visible shapes, as MuJoCo's materials."""
+"""Pictures on visible shapes, as MuJoCo materials."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from minirospy.ros.gazebo_ros.physics.library import load_mujoco
 
 __all__ = ["Textures"]
 
-MAX_PIXELS = 1024  # on a side; larger pictures are reduced, because cameras show less of them
+MAX_PIXELS = 1024  # per side; larger pictures are scaled down, because cameras show less detail
 SIDES = (90, 270, 180, 0, 0, 180)  # degrees, for upright pictures at x, -x, y, -y, z and -z
-MAX_AREA = 60_000_000  # pixels of a file; reading a larger one takes seconds
+MAX_AREA = 60_000_000  # pixels per file; reading more takes seconds
 
 
 class Textures:
-    """Adds pictures to an MjSpec, each once. A picture that cannot be read is in the warnings once, and its shapes are plain."""
+    """Adds pictures to an MjSpec, each once. An unreadable picture causes one warning, and its shapes have no picture."""
 
     def __init__(self, spec: Any, warnings: list[str]) -> None:
         self._spec = spec
@@ -22,9 +22,10 @@ class Textures:
         self._warnings = warnings
 
     def material(self, path: str, *, is_flat: bool) -> str:
-        """Return the name of the material with a picture, or an empty string if there is none.
+        """Return the name of the material with a picture, or an empty string if the picture is unreadable.
 
-        ``is_flat``: the picture is put on a plane, or on a mesh by its texture coordinates. On other shapes it is on six sides.
+        ``is_flat``: the picture is applied to a plane, or to a mesh by its texture coordinates. On all other shapes it is
+        repeated on six sides.
         """
         key = (path, is_flat)
         if path and key not in self._names:
@@ -38,7 +39,7 @@ class Textures:
         return self._names.get(key, "")
 
     def _add(self, path: str, is_flat: bool) -> str:
-        """Add a texture and its material. Raise OSError, ValueError or SyntaxError, as Pillow does, if it cannot be read."""
+        """Add a texture and its material. Raise OSError, ValueError or SyntaxError, as Pillow does, if it is unreadable."""
         try:
             from PIL import Image
         except ImportError:

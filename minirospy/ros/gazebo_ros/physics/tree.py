@@ -1,4 +1,4 @@
-"""The order in which a model's links become MuJoCo's tree of bodies."""
+"""The order in which a model's links become MuJoCo's body tree."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ WORLD = "world"
 
 @dataclass
 class LinkTree:
-    """The bodies of a model: parents come before their children.
+    """The bodies of a model; parents precede their children.
 
-    ``joint_of``: the joint that connects a link to its parent in the tree; a link without one moves freely.
-    ``loops``: the joints that close kinematic loops.
+    ``joint_of``: the joint that connects a link to its parent in the tree; a link without one moves freely. ``loops``: the joints
+    that close kinematic loops.
     """
 
     order: list[str] = field(default_factory=list)
@@ -26,7 +26,7 @@ class LinkTree:
 
 
 def plan_tree(model: Model) -> LinkTree:
-    """Return the tree of a model's links. Raise SimulationError if a joint names a link that does not exist."""
+    """Return the tree of a model's links. Raise SimulationError if a joint refers to a missing link."""
     tree = LinkTree()
     for joint in model.joints.values():
         for link in (joint.parent, joint.child):

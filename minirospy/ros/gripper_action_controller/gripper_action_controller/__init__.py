@@ -1,6 +1,6 @@
-"""Controllers of grippers with one joint: ``from gripper_action_controller import GripperActionController``.
+"""Controllers for grippers with one joint: ``from gripper_action_controller import GripperActionController``.
 
-ROS's package has these classes in C++ only. Their decisions are in `minirospy/core/control/gripper.py`. Source:
+ROS's package has these classes in C++ only. Their decisions are made in `minirospy/core/control/gripper.py`. Source:
 http://wiki.ros.org/gripper_action_controller.
 """
 
@@ -29,8 +29,8 @@ _NOT_RUNNING = "Can't accept new action goals. Controller is not running."
 class GripperActionController(Controller):
     """Executes the action ``gripper_cmd``. A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`.
 
-    As in ROS it publishes no feedback. A result has the values of the cycle that decided it; in ROS it has those of the
-    time at which it is sent, up to a period of ``action_monitor_rate`` later.
+    As in ROS, it publishes no feedback. A result contains the values of the cycle that decided the outcome. In ROS, it contains
+    the values at the time it is sent, up to one period of ``action_monitor_rate`` later.
     """
 
     joint: Joint
@@ -38,7 +38,7 @@ class GripperActionController(Controller):
 
     def __init__(self) -> None:
         self.is_running = False
-        self._effort = 0.0  # the last one that was commanded
+        self._effort = 0.0  # last commanded effort
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
         """Read the parameters, claim the joint, and open the action."""
@@ -85,14 +85,14 @@ class GripperActionController(Controller):
         self.is_running = True  # only now, so that the action is ready for each accepted goal
 
     def update(self, time: Time, period: Duration) -> None:
-        """Send the command of this cycle, and a goal's result when it is due."""
+        """Send this cycle's command, and the goal's result when it is due."""
         joint, now = self.joint, time.to_nsec()
         command = self.gripper.check(now, joint.position, joint.velocity, self._effort)
         self._effort = self.send(command, period.to_nsec() / _SECOND)
         self._action.report(now)
 
     def send(self, command: GripperCommand, dt: float) -> float:
-        """Set the joint's command; return the effort that a goal's result shows. ``dt``: s since the last cycle."""
+        """Set the joint's command; return the effort to report in a goal's result. ``dt``: s since the last cycle."""
         raise NotImplementedError
 
     def stopping(self, time: Time) -> None:
@@ -123,7 +123,7 @@ class GripperActionController(Controller):
 
 
 class PositionGripperActionController(GripperActionController):
-    """position_controllers/GripperActionController: the command is the goal's position; its effort is only reported."""
+    """position_controllers/GripperActionController: commands the goal's position, and only reports its effort."""
 
     interfaces = (Interface.POSITION,)
 
@@ -134,19 +134,19 @@ class PositionGripperActionController(GripperActionController):
 
 
 class EffortGripperActionController(GripperActionController):
-    """effort_controllers/GripperActionController: the command comes from a PID with ``gains/JOINT``.
+    """effort_controllers/GripperActionController: computes the effort with a PID controller, from ``gains/JOINT``.
 
-    As in ROS, a goal whose max_effort is 0 allows no effort at all.
+    As in ROS, a goal with max_effort 0 allows no effort at all.
     """
 
     interfaces = (Interface.EFFORT,)
 
     def read_gains(self, context: ControllerContext) -> None:
-        """Read the gains, and let dynamic_reconfigure change them."""
+        """Read the gains, and allow dynamic_reconfigure to change them."""
         self._pid = Pid.open(context.parameters.below(f"gains/{self.joint.name}"), self.opened)
 
     def starting(self, time: Time) -> None:
-        """Hold the present position, without effort until the first update."""
+        """Hold the present position, with zero effort until the first update."""
         self._pid.reset()
         self.joint.effort_command = 0.0
         super().starting(time)

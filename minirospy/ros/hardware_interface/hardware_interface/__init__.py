@@ -1,4 +1,4 @@
-"""Base class of hardware drivers: ``from hardware_interface import RobotHardware``.
+"""The base class of hardware drivers: ``from hardware_interface import RobotHardware``.
 
 ROS's package has only C++ headers. Source: http://wiki.ros.org/hardware_interface.
 """

@@ -23,7 +23,7 @@ _NOT_MEASURED = [-1.0, *_UNKNOWN[1:]]
 
 
 class ImuSensorController(Controller):
-    """Publishes each sensor of the hardware on the topic of its name."""
+    """Publishes each sensor of the hardware on the topic with the sensor's name."""
 
     interfaces = (Interface.IMU,)
 
@@ -39,11 +39,11 @@ class ImuSensorController(Controller):
             self._topics.append((hardware.imu(name), publisher))
 
     def starting(self, time: Time) -> None:
-        """Publish after a period."""
+        """Schedule the first message after one period."""
         self._rate.start(time)
 
     def update(self, time: Time, period: Duration) -> None:
-        """Publish the sensors."""
+        """Publish the sensors' measurements."""
         if self._rate.is_due(time):
             for sensor, publisher in self._topics:
                 publisher.publish(_message(sensor, time))
@@ -70,7 +70,7 @@ def _message(sensor: ImuSensor, time: Time) -> Imu:
 
 
 def _covariance(measured: Sequence[float] | None, covariance: Sequence[float] | None) -> list[float]:
-    """Return a covariance for a message. As sensor_msgs/Imu defines, -1 marks a quantity that is not measured, 0 is unknown."""
+    """Return a covariance for a message. As sensor_msgs/Imu specifies, -1 means not measured and 0 means unknown."""
     if covariance is not None:
         return list(covariance)
     return _NOT_MEASURED if measured is None else _UNKNOWN

@@ -26,18 +26,18 @@ _XMLRPC_TYPES = {
     float: 3,
     str: 4,
     list: 7,
-}  # numbers of XmlRpcValue's types, which ROS prints
+}  # numbers of the XmlRpcValue types, which ROS prints
 
 
 class JointStateController(Controller):
-    """Publishes ``joint_states``: all joints, or those of the parameter ``joints``, and ``extra_joints``, which never move."""
+    """Publishes ``joint_states``: all joints, or those in the parameter ``joints``, plus ``extra_joints``, which never move."""
 
     interfaces = (Interface.JOINT_STATE,)
 
     _has_started = False
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Find the joints, open the topic. Raise ControllerError if ``publish_rate`` is not set."""
+        """Find the joints and open the topic. Raise ControllerError if ``publish_rate`` is not set."""
         names = context.parameters.names("joints")
         if names is None:
             names = list(hardware.names(Interface.JOINT_STATE))
@@ -53,7 +53,7 @@ class JointStateController(Controller):
         self.opened.callback(self._publisher.close)
 
     def starting(self, time: Time) -> None:
-        """Publish in the next cycle. The rate continues if the controller is started again."""
+        """Publish in the next cycle. If the controller is restarted, the publishing schedule continues."""
         if not self._has_started:
             self._rate.start(time, is_due=True)
             self._has_started = True
@@ -74,7 +74,7 @@ class JointStateController(Controller):
 
 
 def _extra_joints(parameters: Parameters, names: list[str]) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield the name and the state of each extra joint. Log the reason for each one that is ignored."""
+    """Yield each extra joint's name and state. Log the reason if one is ignored."""
     listed = parameters.get("extra_joints")
     if listed is None:
         return

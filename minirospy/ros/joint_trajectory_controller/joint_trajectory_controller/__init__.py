@@ -1,6 +1,6 @@
 """Controllers that execute trajectories of joints: ``from joint_trajectory_controller import JointTrajectoryController``.
 
-ROS's package has these classes in C++ only. Their decisions are in `minirospy/core/control/trajectory_follower.py`. Source:
+ROS's package has these classes in C++ only. Their decisions are made in `minirospy/core/control/trajectory_follower.py`. Source:
 http://wiki.ros.org/joint_trajectory_controller.
 """
 
@@ -62,7 +62,8 @@ _WRONG_JOINTS = "Joints on incoming goal don't match the controller joints."
 class JointTrajectoryController(Controller):
     """Executes trajectories from the topic ``command`` and the action ``follow_joint_trajectory``.
 
-    A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`, and :meth:`reset` if it has a state.
+    A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`; it also overrides :meth:`reset` if it has
+    state.
     """
 
     joints: Sequence[Joint]
@@ -117,13 +118,13 @@ class JointTrajectoryController(Controller):
             joint.position if math.isfinite(joint.position) else joint.position_command
             for joint in self.joints
         ]
-        self._action.start()  # first, so that it is ready for each goal that the follower accepts
+        self._action.start()  # first, so that the action is ready for each goal that the follower accepts
         self.follower.start(time.to_nsec(), positions, [joint.velocity for joint in self.joints])
         self._state_due = self._state_period
         self.reset()
 
     def update(self, time: Time, period: Duration) -> None:
-        """Send the commands of this cycle, and publish the state, feedback and a goal's result when they are due."""
+        """Send this cycle's commands; publish the state, feedback and the goal's result when they are due."""
         joints, follower = self.joints, self.follower
         now = time.to_nsec()
         elapsed = period.to_nsec()
@@ -156,10 +157,10 @@ class JointTrajectoryController(Controller):
         raise NotImplementedError
 
     def reset(self) -> None:
-        """Set the joints' commands for the time until the first update."""
+        """Set the joints' commands for the time before the first update."""
 
     def _fill(self, message: _State, time: Time, positions: list[float], velocities: list[float]) -> _State:
-        """Write the states of this cycle into a message."""
+        """Fill a message with the states of this cycle."""
         follower = self.follower
         desired_time, actual_time = follower.times_from_start()
         message.header.stamp = time
@@ -216,7 +217,7 @@ class JointTrajectoryController(Controller):
         tolerances: Sequence[JointTolerances] | None,
         goal: MonitoredGoal | None,
     ) -> None:
-        """Hand a trajectory to the loop; one without points holds the joints. Raise TrajectoryError if it is rejected."""
+        """Queue a trajectory for the loop; one without points holds the joints. Raise TrajectoryError if it is rejected."""
         if not self.follower.is_running:
             raise TrajectoryError(_NOT_RUNNING.format("commands"))
         if not message.points:
@@ -244,7 +245,7 @@ class JointTrajectoryController(Controller):
 
 
 class PositionJointTrajectoryController(JointTrajectoryController):
-    """position_controllers/JointTrajectoryController: the commands are the desired positions."""
+    """position_controllers/JointTrajectoryController: commands the desired positions."""
 
     interfaces = (Interface.POSITION,)
 
@@ -260,7 +261,7 @@ class PositionJointTrajectoryController(JointTrajectoryController):
 
 
 class PosVelJointTrajectoryController(PositionJointTrajectoryController):
-    """pos_vel_controllers/JointTrajectoryController: the commands are the desired positions and velocities."""
+    """pos_vel_controllers/JointTrajectoryController: commands the desired positions and velocities."""
 
     interfaces = (Interface.POS_VEL,)
 
@@ -272,7 +273,7 @@ class PosVelJointTrajectoryController(PositionJointTrajectoryController):
 
 
 class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
-    """pos_vel_acc_controllers/JointTrajectoryController: the commands include the desired accelerations."""
+    """pos_vel_acc_controllers/JointTrajectoryController: commands desired positions, velocities and accelerations."""
 
     interfaces = (Interface.POS_VEL_ACC,)
 
@@ -284,24 +285,24 @@ class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
 
 
 class _ClosedLoopController(JointTrajectoryController):
-    """The commands are the desired velocities times ``velocity_ff/JOINT``, plus a PID with ``gains/JOINT`` of the errors."""
+    """Commands the desired velocities times ``velocity_ff/JOINT``, plus the output of a PID controller with ``gains/JOINT``."""
 
-    command: ClassVar[str]  # the attribute of a joint that this class commands
+    command: ClassVar[str]  # the attribute of a joint that holds the command
 
     def read_gains(self, context: ControllerContext) -> None:
-        """Read the gains, and let dynamic_reconfigure change them."""
+        """Read the gains, and allow dynamic_reconfigure to change them."""
         parameters = context.parameters
         self._velocity_ff = [parameters.finite(f"velocity_ff/{name}", 0.0) for name in self._names]
         self._pids = [Pid.open(parameters.below(f"gains/{name}"), self.opened) for name in self._names]
 
     def reset(self) -> None:
-        """Reset the PIDs, and command 0."""
+        """Reset the PID controllers, and command 0."""
         for pid, joint in zip(self._pids, self.joints, strict=True):
             pid.reset()
             setattr(joint, self.command, 0.0)
 
     def send(self, dt: float) -> None:
-        """Command what the PIDs compute from the errors."""
+        """Command the output of the PID controllers."""
         follower, command = self.follower, self.command
         for joint, pid, velocity_ff, velocity, error, rate in zip(
             self.joints,
@@ -341,7 +342,7 @@ def _tolerance(message: JointTolerance) -> GoalTolerance:
 
 
 def _log(error: TrajectoryError) -> None:
-    """Log why a trajectory is rejected, with ROS's level."""
+    """Log why a trajectory is rejected, at ROS's level."""
     log = rospy.logwarn if isinstance(error, PastTrajectoryError) else rospy.logerr
     log("%s", error)
 

@@ -15,12 +15,12 @@ __all__ = ["JointGroupPositionController", "JointPositionController"]
 
 
 class JointPositionController(ForwardCommandController):
-    """Passes positions on to a joint."""
+    """Forwards position commands to a joint."""
 
     interfaces = (Interface.POSITION,)
 
 
 class JointGroupPositionController(ForwardJointGroupCommandController):
-    """Passes positions on to joints."""
+    """Forwards position commands to several joints."""
 
     interfaces = (Interface.POSITION,)

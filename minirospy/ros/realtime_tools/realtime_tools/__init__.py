@@ -1,4 +1,4 @@
-"""Publish and serve actions from a control loop without waiting: ``from realtime_tools import RealtimePublisher``.
+"""Publish and serve actions from a control loop without blocking: ``from realtime_tools import RealtimePublisher``.
 
 ROS's package has only C++ headers. Source: http://wiki.ros.org/realtime_tools.
 """
@@ -25,9 +25,9 @@ _T = TypeVar("_T", bound=Message)
 
 
 class RealtimePublisher(Generic[_T]):
-    """A publisher whose :meth:`publish` returns at once: one thread, common to all of them, sends the messages.
+    """A publisher whose :meth:`publish` returns immediately. One thread sends the messages of all such publishers.
 
-    A message must not be changed after it was published.
+    Do not change a message after publishing it.
     """
 
     def __init__(self, topic: str, message_class: type[_T], latch: bool = False, queue_size: int = 1) -> None:
@@ -36,7 +36,7 @@ class RealtimePublisher(Generic[_T]):
         self._queue_size = queue_size
 
     def publish(self, message: _T) -> bool:
-        """Hand a message to the thread. Return False, and drop it, if ``queue_size`` messages still wait to be sent."""
+        """Queue a message for the thread. If ``queue_size`` messages are already queued, drop it and return False."""
         if len(self._waiting) >= self._queue_size:
             return False
         self._waiting.append(message)
@@ -44,21 +44,21 @@ class RealtimePublisher(Generic[_T]):
         return True
 
     def close(self) -> None:
-        """Close the topic; messages that still wait are dropped."""
+        """Close the topic, and drop queued messages."""
         self._waiting.clear()
         self._publisher.unregister()
 
     def _send_waiting(self) -> None:
-        """Send the oldest message that waits, if any."""
+        """Send the oldest queued message, if any."""
         try:
             message = self._waiting.popleft()
             self._publisher.publish(message)
         except (IndexError, rospy.ROSException):
-            pass  # closed, or the node shuts down
+            pass  # the topic is closed, or the node is shutting down
 
 
 class Rejection(Exception):
-    """Raised by the ``accept`` of a RealtimeActionServer: the goal is rejected, with a result and a status text."""
+    """Raised by a RealtimeActionServer's ``accept`` to reject a goal, with a result and a status text."""
 
     def __init__(self, result: Message, text: str = "") -> None:
         super().__init__(text)
@@ -66,12 +66,12 @@ class Rejection(Exception):
 
 
 class RealtimeActionServer:
-    """An action server for a control loop, with one active goal: a new one preempts it.
+    """An action server for a control loop, with one active goal. A new goal preempts the active one.
 
-    ``accept(message)`` checks a goal in a thread of the library, and hands it to the loop. It returns the goal, whose outcome
-    the loop decides, or raises Rejection. ``cancel()`` makes the loop stop, because a client has cancelled the active goal.
-    ``make_result(outcome)`` returns the message of the result. ``period``: ns of ROS time between two feedbacks. A goal's
-    success is reported at such a time, too; all other outcomes are reported immediately.
+    ``accept(message)`` runs in another thread: it checks a goal, queues it for the loop, and returns it as a goal whose outcome
+    the loop will decide; or it raises Rejection. ``cancel()`` makes the loop stop because a client has cancelled the active goal.
+    ``make_result(outcome)`` returns the result message. ``period``: ns of ROS time between feedback messages. A success is
+    reported at the next feedback time; all other outcomes are reported immediately.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class RealtimeActionServer:
         self._server.start()
 
     def start(self) -> None:
-        """Note that the loop runs. Call it in the loop's thread, like :meth:`report` and :meth:`stop`."""
+        """Record that the loop is running. Call this in the loop's thread, like :meth:`report` and :meth:`stop`."""
         self._is_running = True
 
     def report(self, time: int) -> bool:
@@ -103,7 +103,7 @@ class RealtimeActionServer:
             return False
         outcome, period = active.goal.outcome, self._period
         if active.due is None or active.due - time > period:
-            active.due = time + period  # the goal's first cycle, or ROS time went back
+            active.due = time + period  # this is the goal's first cycle, or ROS time has jumped back
         is_due = time >= active.due
         if is_due:
             active.due += period * (1 + (time - active.due) // period)
@@ -119,18 +119,18 @@ class RealtimeActionServer:
             _call_soon(lambda: active.handle.publish_feedback(feedback))
 
     def preempt(self) -> None:
-        """Cancel the active goal, if there is one, from any thread but the loop's."""
+        """Cancel the active goal, if any. Call this from any thread except the loop's."""
         if active := self._active:
             self._finish(active, _call)
 
     def stop(self) -> None:
-        """Cancel the active goal, if there is one, because the loop does not run any more."""
+        """Cancel the active goal, if any, because the loop is no longer running."""
         self._is_running = False
         if active := self._active:
             self._finish(active, _call_soon)
 
     def close(self) -> None:
-        """Cancel the active goal, and close the action's topics."""
+        """Cancel the active goal, if any, and close the action's topics."""
         self._is_running = False
         self.preempt()
         self._server.stop()
@@ -142,11 +142,11 @@ class RealtimeActionServer:
             handle.set_rejected(rejection.result, str(rejection))
             return
         self.preempt()
-        # The action server's lock is held until this returns, so that the outcome is reported after the acceptance.
+        # The action server's lock is held until this method returns, so that a goal's acceptance is reported before its outcome.
         self._active = _Active(handle, goal)
         handle.set_accepted()
         if not self._is_running:
-            self.preempt()  # the loop has stopped since
+            self.preempt()  # the loop has stopped meanwhile
 
     def _receive_cancel(self, handle: ServerGoalHandle) -> None:
         active = self._active
@@ -156,13 +156,13 @@ class RealtimeActionServer:
             self._finish(active, _call)
 
     def _finish(self, active: _Active, call: Callable[[Callable[[], None]], None]) -> None:
-        """Report the outcome of a goal that ends now. It is cancelled if it has none."""
+        """Report the outcome of a goal that is ending. A goal without an outcome is cancelled."""
         if self._active is active:
             self._active = None
         active.goal.finish(CANCELLED)
         outcome = active.goal.outcome
         assert outcome is not None
-        # Only one of the threads that get here together reports it.
+        # Several threads may get here at the same time; only one of them reports.
         if active.report_once.acquire(blocking=False):
             ends = {
                 GoalEvent.SUCCEED: active.handle.set_succeeded,
@@ -178,8 +178,8 @@ class _Active:
 
     handle: ServerGoalHandle
     goal: MonitoredGoal
-    due: int | None = None  # ns of ROS time of the next report; None until the first cycle
-    report_once: threading.Lock = field(default_factory=threading.Lock)  # never released
+    due: int | None = None  # ns of ROS time at which the next report is due; None before the first cycle
+    report_once: threading.Lock = field(default_factory=threading.Lock)  # the reporting thread acquires it
 
 
 def _call(function: Callable[[], None]) -> None:
@@ -187,7 +187,7 @@ def _call(function: Callable[[], None]) -> None:
 
 
 def _call_soon(function: Callable[[], None]) -> None:
-    """Call a function in the common thread."""
+    """Call a function in the shared thread."""
     _sender().put(function)
 
 
@@ -196,7 +196,7 @@ _queues: list[SimpleQueue[Callable[[], None]]] = []
 
 
 def _sender() -> SimpleQueue[Callable[[], None]]:
-    """Return the queue of the common thread, which is started at first use."""
+    """Return the queue of the shared thread, which starts on first use."""
     if not _queues:
         with _lock:
             if not _queues:
@@ -209,10 +209,10 @@ def _sender() -> SimpleQueue[Callable[[], None]]:
 def _send(queue: SimpleQueue[Callable[[], None]]) -> None:
     while True:
         function = queue.get()
-        # One topic's fault must not end the thread that serves all.
+        # An error on one topic must not end the thread that serves all topics.
         try:
             function()
         except rospy.ROSException:
-            pass  # the node shuts down
+            pass  # the node is shutting down
         except Exception as error:  # noqa: BLE001 - a message that cannot be serialized raises anything
             rospy.logerr("a controller's message was not sent: %s", error)

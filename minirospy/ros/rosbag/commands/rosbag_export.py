@@ -1,4 +1,4 @@
-"""`rosbag export`: write topics of a bag as tables, CSV or Parquet. This command does not exist in ROS."""
+"""`rosbag export`: write topics of a bag as CSV or Parquet tables. This command does not exist in ROS."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 
 
 def _description(tag: Tag, origin: str, data: bytes, warn: Callable[[LaunchError], object]) -> str:
-    """Return the text of a file or a command. A robot description, or other XML, may have another encoding than UTF-8."""
+    """Return the text of a file or a command. A robot description, or other XML, may have an encoding other than UTF-8."""
     if not data.lstrip().startswith(b"<"):
         return _decoded(tag, origin, data)
     text, encoding = decode_xml(data)

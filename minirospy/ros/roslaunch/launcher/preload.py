@@ -1,8 +1,8 @@
-"""Forks Python nodes from processes that have already imported rospy: ``preloaded.py``, which this module starts.
+"""Forks Python nodes from processes that have already imported rospy. These processes run ``preloaded.py``.
 
-Importing rospy and asyncio takes most of the time and the memory of a small node, and forked nodes share both. Only Linux can
-change the command line of a forked process, and the libraries of macOS do not support fork without exec. So nodes start as
-usual on other systems, and if their process would differ from a started one.
+Importing rospy and asyncio takes most of a small node's start-up time and memory, and forked nodes share the imported modules.
+Only Linux can change the command line of a forked process, and macOS libraries do not support fork without exec, so nodes start
+as usual on other systems. They also start as usual if a forked process would behave differently from a started one.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from typing import IO
 
 __all__ = ["MIN_NODES", "ForkedProcess", "Preload", "Start"]
 
-MIN_NODES = 3  # similar nodes for which a preloaded process pays off
-REPLY_SECONDS = 30.0  # for a preloaded process to answer, on a busy machine
-POLL_SECONDS = 0.01  # between two checks whether a process has exited
+MIN_NODES = 3  # number of similar nodes from which a preloaded process pays off
+REPLY_SECONDS = 30.0  # timeout for an answer of a preloaded process, on a busy machine
+POLL_SECONDS = 0.01  # between checks whether a process has exited
 
 _PR_SET_CHILD_SUBREAPER, _PR_GET_CHILD_SUBREAPER = 36, 37
 _FORKING = threading.Lock()
-"""Held while this process is a subreaper for a fork, because that is a setting of the process, not of a thread."""
+"""Held while this process is a subreaper for a fork: being a subreaper is a setting of the whole process."""
 
 _MIRRORED = frozenset(
     ("PYTHONPATH", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING", "PYTHONUTF8")
 )
-"""Python's variables that have the same effect in a forked process. With any other one, a node starts as usual."""
+"""Python's environment variables that have the same effect in a forked process. If any other one is set, nodes start as usual."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Start:
 
     @property
     def is_plain_python(self) -> bool:
-        """Return whether it is a Python program without options of the interpreter, debuggers or measurements."""
+        """Return whether it is a Python program without interpreter options, a debugger or a profiler."""
         return (
             len(self.command) > 1
             and self.command[0] == sys.executable
@@ -62,7 +62,7 @@ class Start:
 
     @property
     def kind(self) -> _Kind:
-        """Return what processes must have in common with the process that forks them."""
+        """Return the properties that processes must share to be forked from the same process."""
         shared = frozenset((name, value) for name, value in self.environ.items() if name != "ROS_NAMESPACE")
         return _Kind(shared, self.folder)
 
@@ -76,7 +76,7 @@ class _Kind:
 
 
 class ForkedProcess:
-    """A child of this process that another one has forked. The interface is that of subprocess.Popen. Thread-safe."""
+    """A child of this process that was forked by a preloaded process. Has the interface of subprocess.Popen. Thread-safe."""
 
     # The streams are files, not pipes to this process.
     stdin: IO[bytes] | None = None
@@ -97,8 +97,8 @@ class ForkedProcess:
                 try:
                     pid, status = os.waitpid(self.pid, os.WNOHANG)
                 except ChildProcessError:
-                    # SIGCHLD is ignored, or another part of the program has taken the status: subprocess returns 0 then,
-                    # too. Or the process has another parent.
+                    # SIGCHLD is ignored, or another part of the program has collected the exit status: return 0, as subprocess
+                    # does. The process may also have another parent.
                     if self._start_time is None or _start_time(self.pid) != self._start_time:
                         self.returncode = 0
                 else:
@@ -107,7 +107,7 @@ class ForkedProcess:
             return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait until the process has exited; return its exit status.
+        """Wait until the process has exited, and return its exit status.
 
         Raise subprocess.TimeoutExpired after ``timeout`` seconds.
         """
@@ -135,7 +135,7 @@ class ForkedProcess:
 
 
 def _start_time(pid: int) -> bytes | None:
-    """Return when a process started, which tells it from a later one with the same id; None if it has exited."""
+    """Return a process's start time, which distinguishes it from a later process with the same id; None if it has exited."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
     except (FileNotFoundError, ProcessLookupError):
@@ -145,7 +145,7 @@ def _start_time(pid: int) -> bytes | None:
 
 
 class Preload:
-    """The preloaded processes of a launch, one for each kind of node that the launch starts often."""
+    """The preloaded processes of a launch: one for each kind of node that occurs often enough."""
 
     def __init__(self) -> None:
         self._parents: dict[_Kind, _Parent] = {}
@@ -153,7 +153,7 @@ class Preload:
     def prepare(self, starts: Sequence[Start]) -> None:
         """Start the processes that will fork ``starts``. They import rospy while the launch continues.
 
-        The environment variable MINIROSPY_PRELOAD=0 turns this off.
+        Do nothing if the environment variable MINIROSPY_PRELOAD is 0.
         """
         if sys.platform != "linux" or os.environ.get("MINIROSPY_PRELOAD") == "0":
             return
@@ -168,7 +168,7 @@ class Preload:
                     self._parents[kind] = _Parent(members[0])
 
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
-        """Fork a process whose standard streams are ``fds``. Return None if it must be started as usual."""
+        """Fork a process with the standard streams ``fds``. Return None if it must be started as usual."""
         parent = self._parents.get(start.kind) if self._parents and start.is_plain_python else None
         if parent is None:
             return None
@@ -185,7 +185,7 @@ class Preload:
 
 
 class _Parent:
-    """A preloaded process, and the socket to it."""
+    """A preloaded process, and the socket connected to it."""
 
     def __init__(self, start: Start) -> None:
         # Import it here, because it imports ctypes, which few launches need.
@@ -214,7 +214,7 @@ class _Parent:
             theirs.close()
 
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
-        """Fork a process; return None if its program must be started as usual. Raise OSError if the process does not answer."""
+        """Fork a process; return None if its program must be started as usual. Raise OSError if there is no answer."""
         if not self._is_ready:
             if self._socket.recv(len(self._protocol.READY)) != self._protocol.READY:
                 raise ConnectionError("the process exited, or cannot fork nodes")
@@ -238,7 +238,7 @@ class _Parent:
             if not answer:
                 raise ConnectionError("the process exited")
             process = ForkedProcess(start.command, int(answer))
-            # If this process ends before it writes, the node exits without running its program.
+            # If this process exits before it writes to the pipe, the node exits without running its program.
             starter.write(b"1")
         return process
 
@@ -254,7 +254,7 @@ class _Parent:
 
 @contextlib.contextmanager
 def _subreaper() -> Iterator[None]:
-    """Let this process become the parent of orphaned descendants. Raise OSError if the system refuses."""
+    """Make this process the parent of orphaned descendants. Raise OSError if the system refuses."""
     import ctypes
 
     library = ctypes.CDLL(None, use_errno=True)
@@ -265,7 +265,7 @@ def _subreaper() -> Iterator[None]:
             raise OSError(ctypes.get_errno(), "prctl")
 
     with _FORKING:
-        # The program may need the setting for its own processes.
+        # The program may use the subreaper setting for its own processes.
         before = ctypes.c_int()
         call(_PR_GET_CHILD_SUBREAPER, ctypes.addressof(before))
         call(_PR_SET_CHILD_SUBREAPER, 1)

@@ -1,20 +1,20 @@
 """A script that imports rospy once and then forks Python nodes for roslaunch. Linux only.
 
 ``python preloaded.py FD`` answers requests on the Unix socket ``FD``; its client is ``preload.py``. A forked node runs its
-program like ``python PROGRAM ARGUMENTS``: Python's C function for that compiles and runs the file in a new ``__main__``,
-and prints tracebacks. The node sets the kernel's pointers to its command line and environment, so that ``ps``, ``pgrep -f``
-and /proc show the same as for a started process. PR_SET_MM_MAP of prctl(2) does this without privileges. The node is a
-child of roslaunch, because roslaunch is the subreaper when the process in between exits.
+program as ``python PROGRAM ARGUMENTS`` would: Python's own C function compiles and runs the file in a new ``__main__``, and
+prints tracebacks. The node sets the kernel's pointers to its command line and environment, so that ``ps``, ``pgrep -f`` and /proc
+show the same as for a started process. PR_SET_MM_MAP of prctl(2) does this without privileges. The node is a child of roslaunch,
+because roslaunch is the subreaper when the intermediate process exits.
 
-The script has one thread, and exits when its socket is closed. It imports only rospy and the modules that a node needs.
-Importing these starts no thread, reads no arguments and opens no files.
+The script has one thread, and exits when its socket is closed. It imports only rospy and the modules that a node needs. Importing
+them starts no threads, reads no arguments and opens no files.
 """
 
 from __future__ import annotations
 
 import sys
 
-# A node's path contains the folder of its program, not that of this script.
+# A node's module search path contains its program's folder, not this script's.
 if __name__ == "__main__" and not getattr(sys.flags, "safe_path", False):
     del sys.path[0]
 
@@ -47,18 +47,18 @@ PRELOADED = (
     "minirospy.runtime.transport.loop",
     "minirospy.runtime.transport.readers",
 )
-"""The modules of a node that has created publishers, subscribers and services."""
+"""The modules that are loaded in a node after it has created publishers, subscribers and services."""
 
-LENGTH_SIZE = 8  # bytes of the length in front of a request
-FDS = 4  # of a request: stdin, stdout, stderr, and a pipe that roslaunch writes to when the node may start
-READY, REFUSED = b"ready", b"refused"  # answers instead of a process id
+LENGTH_SIZE = 8  # bytes of the length that precedes a request
+FDS = 4  # file descriptors per request: stdin, stdout, stderr, and a pipe to which roslaunch writes when the node may start
+READY, REFUSED = b"ready", b"refused"  # responses in place of a process id
 
-_SUFFIXES = (".py", ".pyc", ".so")  # of files that Python can import
+_SUFFIXES = (".py", ".pyc", ".so")  # suffixes of files that Python can import
 _PR_SET_MM, _PR_SET_MM_MAP = 35, 14
 
 
 class Order(NamedTuple):
-    """A node to fork: the command line, and the value of ROS_NAMESPACE (None: unset). ``environ`` is the complete environment."""
+    """A node to fork: its command line, and the value of ROS_NAMESPACE (None: unset). ``environ``: the complete environment."""
 
     arguments: list[str]
     environ: dict[str, str]
@@ -83,11 +83,11 @@ class _MemoryMap(ctypes.Structure):
 
 
 _kept: list[mmap.mmap] = []
-"""The command line and environment of this process. The kernel reads them at any time."""
+"""The memory of this process's command line and environment, which the kernel may read at any time."""
 
 
 def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
-    """Change what /proc shows as this process's command line and environment. Raise OSError if the kernel refuses."""
+    """Change the command line and environment that /proc shows for this process. Raise OSError if the kernel refuses."""
     words = b"".join(os.fsencode(word) + b"\0" for word in arguments)
     variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in environ.items())
     area = mmap.mmap(-1, len(words) + len(variables) + 1, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
@@ -117,7 +117,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
 
 
 def hides_module(folder: str, loaded: set[str]) -> bool:
-    """Return whether a file in ``folder`` would be imported instead of one of the top-level modules ``loaded``."""
+    """Return whether a file in ``folder`` would be imported in place of one of the top-level modules in ``loaded``."""
     with os.scandir(folder) as entries:
         for entry in entries:
             stem, _, suffix = entry.name.partition(".")
@@ -129,7 +129,7 @@ def hides_module(folder: str, loaded: set[str]) -> bool:
 
 
 def serve(control: socket.socket) -> Order | None:
-    """Fork nodes until the socket is closed; return None then. In a forked node, return its order once it may start."""
+    """Fork nodes until the socket is closed, then return None. In a forked node, return its order once it may start."""
     while True:
         head, fds, _, _ = socket.recv_fds(control, LENGTH_SIZE, FDS)
         if not head:
@@ -157,12 +157,12 @@ def serve(control: socket.socket) -> Order | None:
 
 
 def _fork(order: Order, control: socket.socket, fds: list[int]) -> int:
-    """Fork a node; return its process id, or 0 in the node. Raise OSError if it cannot be forked."""
+    """Fork a node; return its process id, or 0 in the node. Raise OSError if the fork fails."""
     reader, writer = os.pipe()
     with open(reader, "rb") as report:
         middle = os.fork()
         if middle == 0:
-            # The node's parent exits, so that roslaunch becomes its parent.
+            # The intermediate process exits, so that roslaunch becomes the node's parent.
             try:
                 pid = os.fork()
             except OSError:
@@ -182,7 +182,7 @@ def _fork(order: Order, control: socket.socket, fds: list[int]) -> int:
 
 
 def _prepare(order: Order, fds: list[int], report: int) -> None:
-    """Set up the kernel's view of the node, report its process id, and wait until roslaunch lets it start."""
+    """Set up the node as the kernel sees it, report its process id, and wait until roslaunch lets it start."""
     try:
         os.setsid()
         for number, fd in enumerate(fds[:3]):
@@ -190,7 +190,7 @@ def _prepare(order: Order, fds: list[int], report: int) -> None:
         set_command_line(order.arguments, order.environ)
         os.write(report, str(os.getpid()).encode())
         os.close(report)
-        # roslaunch closes the pipe without writing to it if it has given up, or was killed.
+        # If roslaunch has given up or was killed, the pipe is closed without data.
         if os.read(fds[3], 1):
             return
     except OSError:
@@ -199,12 +199,12 @@ def _prepare(order: Order, fds: list[int], report: int) -> None:
 
 
 def folder_of(program: str) -> str:
-    """Return the folder of a program that Python searches first."""
+    """Return the program's folder that Python searches first."""
     return os.path.dirname(os.path.realpath(program))
 
 
 def become(order: Order, main: dict[str, Any]) -> None:
-    """Set up the interpreter's view of the node. ``main`` contains the first attributes of a ``__main__``."""
+    """Set up the node's interpreter. ``main``: the initial attributes of a ``__main__`` module."""
     namespace = order.environ.get("ROS_NAMESPACE")
     if namespace is None:
         os.environ.pop("ROS_NAMESPACE", None)
@@ -213,7 +213,7 @@ def become(order: Order, main: dict[str, Any]) -> None:
     sys.argv = order.arguments[1:]
     sys.orig_argv[:] = order.arguments
     sys.path.insert(0, folder_of(order.program))
-    # Python 3.13 and older keep the id that the thread had before the fork.
+    # Python 3.13 and older keep the thread id from before the fork.
     threading.main_thread()._set_native_id()  # type: ignore[attr-defined]
 
     sys.stdin = sys.__stdin__ = _stream(0, "<stdin>", "r", sys.stdin)  # type: ignore[misc]
@@ -223,7 +223,7 @@ def become(order: Order, main: dict[str, Any]) -> None:
     module = ModuleType("__main__")
     module.__dict__.update(main)
     sys.modules["__main__"] = module
-    # Importing rospy does this with the program's __main__.
+    # In a started node, importing rospy does this with the program's __main__.
     from minirospy.base.script_names import find_packages_named_like_scripts
 
     module.__file__ = order.program
@@ -235,8 +235,8 @@ def become(order: Order, main: dict[str, Any]) -> None:
 class _FirstImport:
     """Hides the imported rospy until the program imports it, and then enables the loggers of the imported modules.
 
-    If a program configures logging before that, it disables all loggers that exist. In a started node, these loggers do not
-    exist yet. The class is a finder and a loader without their base classes, because importlib.abc imports large modules.
+    A program that configures logging earlier disables all existing loggers. In a started node, these loggers would not exist yet.
+    The class is a finder and a loader, but without the base classes, because importlib.abc imports large modules.
     """
 
     def __init__(self) -> None:
@@ -257,7 +257,7 @@ class _FirstImport:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return a spec of rospy with this loader."""
+        """Return a spec for rospy with this loader."""
         if fullname != "rospy":
             return None
         loader: Any = self
@@ -270,7 +270,7 @@ class _FirstImport:
         return self._modules["rospy"]
 
     def exec_module(self, module: ModuleType) -> None:
-        """Show the modules again, as after an import, and enable their loggers."""
+        """Make the modules visible again, as after an import, and enable their loggers."""
         module.__spec__ = self._spec
         sys.modules.update(self._modules)
         sys.meta_path.remove(self)
@@ -279,7 +279,7 @@ class _FirstImport:
 
 
 def _stream(fd: int, name: str, mode: str, like: TextIO) -> io.TextIOWrapper:
-    """Return a standard stream as Python creates it at its start, with the encoding of ``like``."""
+    """Return a standard stream as Python creates it at start-up, with the encoding of ``like``."""
     assert isinstance(like, io.TextIOWrapper)
     unbuffered = sys.stdout.write_through  # type: ignore[union-attr]
     buffer: Any = open(fd, f"{mode}b", 0 if unbuffered and mode == "w" else -1, closefd=False)  # noqa: SIM115
@@ -298,7 +298,7 @@ def _stream(fd: int, name: str, mode: str, like: TextIO) -> io.TextIOWrapper:
 
 
 def open_program(path: str) -> int | None:
-    """Open a file for C code; return its FILE*, or None if it cannot be opened."""
+    """Open a file for C code; return its FILE*, or None if that fails."""
     library = ctypes.CDLL(None)
     library.fopen.restype = ctypes.c_void_p
     file: int | None = library.fopen(os.fsencode(path), b"rbe")
@@ -306,14 +306,14 @@ def open_program(path: str) -> int | None:
 
 
 def main(fd: int) -> Order | None:
-    """Import the modules, and serve on the socket ``fd`` until it is closed; in a forked node, return its order."""
+    """Import the modules, and serve the socket ``fd`` until it is closed. In a forked node, return its order."""
     control = socket.socket(fileno=fd)
-    # Refuse before any node is waiting if the kernel cannot show the nodes' command lines.
+    # If the kernel cannot show the nodes' command lines, refuse before any node waits.
     set_command_line(sys.orig_argv, dict(os.environ))
     for name in PRELOADED:
         import_module(name)
     if len(os.listdir("/proc/self/task")) > 1 or "minirospy.client" not in sys.modules:
-        # A module has started a thread, or the real rospy is installed.
+        # A module has started a thread, or this is the real rospy.
         return None
     gc.collect()
     gc.freeze()
@@ -337,8 +337,8 @@ if __name__ == "__main__":
     _file = open_program(_order.program)
     _run = ctypes.pythonapi.PyRun_SimpleFileExFlags
     _run.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_void_p]
-    # The call is at this level, so that the program's stack has one frame below its own.
+    # Call this at module level, so that only one frame is below the program's own frames on the stack.
     _has_failed = _file is None or _run(_file, os.fsencode(_order.program), 1, None)
-    # After Ctrl-C, Python itself ends this process with SIGINT when the script ends.
+    # After Ctrl-C, Python itself ends this process with SIGINT at the end of the script.
     if _has_failed and getattr(sys, "last_type", None) is not KeyboardInterrupt:
         sys.exit(1)

@@ -161,7 +161,7 @@ def reason_not_shown(kind: Kind, name: str) -> str:
     try:
         folder = packages.find(package) / kind.value
     except NotFoundError:
-        # ROS prints the folder of each package here, which are thousands of characters.
+        # ROS prints every package's folder here, which is thousands of characters.
         searched = f"{{{len(packages.folders())} packages: rospack list}}"
         return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path [{searched}]"
     return f"{refused}: Cannot locate message [{base}] in package [{package}] with paths [['{folder}']]"

@@ -234,7 +234,7 @@ def _instance(cls: type[ManifestManager], ros_paths: tuple[str, ...]) -> Manifes
 def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[str]:
     """Return the packages below a folder, or the stacks if ``manifest_name`` is stack.xml; store their folders in ``cache``.
 
-    For package.xml, packages for rosbuild are left out.
+    If it is package.xml, rosbuild packages are left out.
     """
     if manifest_name == STACK_FILE:
         found = {folder.name: str(folder) for folder in _folders_with(STACK_FILE, Path(path))}

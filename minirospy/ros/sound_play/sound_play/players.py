@@ -87,9 +87,9 @@ def installable(programs: Iterable[str], platform: str) -> list[str]:
 def play_command(file: str, volume: float, which: Which, device: str = "") -> Command | None:
     """Return the command that plays a file, or None if there is no player.
 
-    ``device`` is the output device (default: the machine's): a name of ALSA, such as ``hw:1``, or of the sound server.
+    ``device`` is an ALSA name, such as ``hw:1``, or a name of the sound server (default: the machine's output device).
     """
-    # Only aplay takes a name of ALSA.
+    # Only aplay accepts ALSA names.
     names = sorted(PLAYERS, key=lambda name: name != "aplay") if _ALSA.match(device) else PLAYERS
     for name in names:
         program = which(name)

@@ -1,6 +1,6 @@
-"""Maps between actuators and joints: ``from transmission_interface import DifferentialTransmission``.
+"""Conversions between actuators and joints: ``from transmission_interface import DifferentialTransmission``.
 
-ROS's package has them in C++ only. Source: http://wiki.ros.org/transmission_interface.
+In ROS, these classes exist only in C++. Source: http://wiki.ros.org/transmission_interface.
 """
 
 from minirospy.core.control.transmission_maps import (

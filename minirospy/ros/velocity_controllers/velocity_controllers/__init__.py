@@ -18,18 +18,18 @@ __all__ = ["JointGroupVelocityController", "JointPositionController", "JointVelo
 
 
 class JointVelocityController(ForwardCommandController):
-    """Passes velocities on to a joint."""
+    """Forwards velocity commands to a joint."""
 
     interfaces = (Interface.VELOCITY,)
 
 
 class JointPositionController(PidJointPositionController):
-    """Reaches the position of a joint by its velocity."""
+    """Controls a joint's position through its velocity."""
 
     interfaces = (Interface.VELOCITY,)
 
 
 class JointGroupVelocityController(ForwardJointGroupCommandController):
-    """Passes velocities on to joints."""
+    """Forwards velocity commands to several joints."""
 
     interfaces = (Interface.VELOCITY,)

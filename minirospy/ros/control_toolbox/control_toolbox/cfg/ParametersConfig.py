@@ -1,4 +1,4 @@
-"""The gains of a PID controller, as the module that catkin_make generates from control_toolbox's Parameters.cfg."""
+"""The gains of a PID controller, in the form that catkin_make generates from control_toolbox's Parameters.cfg."""
 
 from minirospy.ros.dynamic_reconfigure.definition import Definition
 

@@ -1,4 +1,4 @@
-"""Parameters that can be changed while a base drives, as the module that catkin_make generates from DiffDriveController.cfg."""
+"""Parameters that can be changed while a base drives, in the form that catkin_make generates from DiffDriveController.cfg."""
 
 from minirospy.ros.dynamic_reconfigure.definition import Definition
 
