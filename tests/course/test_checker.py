@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 from minirospy.base.errors import NotFoundError, UsageError
+from minirospy.course import checker
 from minirospy.course.checker import Report, check
 from minirospy.course.exercise import Exercise, ExerciseError, parse_exercise
 
@@ -87,8 +88,9 @@ def test_program_that_does_it_passes(lamp: Exercise, tmp_path: Path) -> None:
     ],
 )
 def test_what_does_not_hold_is_named(
-    change: tuple[str, str], observed: str, lamp: Exercise, tmp_path: Path
+    change: tuple[str, str], observed: str, lamp: Exercise, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(checker, "START_SECONDS", 100.0)
     assert change[0] in GOOD
     report = run(lamp, tmp_path, GOOD.replace(*change), patience=1.0)
     assert not report.passed
@@ -140,8 +142,14 @@ def test_error_in_a_callback_is_reported_while_the_node_runs(lamp: Exercise, tmp
 
 
 @pytest.mark.skipif(os.name != "posix", reason="CTRL_BREAK_EVENT cannot be ignored in this way")
-def test_program_that_ignores_ctrl_c_is_killed_and_reported(lamp: Exercise, tmp_path: Path) -> None:
-    text = GOOD.replace("try:\n", "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\ntry:\n")
+def test_program_that_ignores_ctrl_c_is_killed_and_reported(
+    lamp: Exercise, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checker, "START_SECONDS", 400.0)
+    # The signal is ignored before the node is registered, which the check waits for.
+    text = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + GOOD.replace(
+        'init_node("lamp")', 'init_node("lamp", disable_signals=True)'
+    )
     report = run(lamp, tmp_path, text, patience=0.3)
     assert "lamp.py stops at Ctrl-C: no, it had to be killed" in lines(report)
 
@@ -156,7 +164,9 @@ def test_process_that_a_program_leaves_is_ended(lamp: Exercise, tmp_path: Path) 
     assert not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
 
 
-def test_node_of_a_launch_file_that_dies_is_named(lamp: Exercise, tmp_path: Path) -> None:
+def test_node_of_a_launch_file_that_dies_is_named(
+    lamp: Exercise, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "bad.py").write_text("import rospy\nrospy.init_node('bad')\nraise SystemExit(3)\n")
     launch = '<launch><node name="bad" pkg="x" type="bad.py"/></launch>'
     package = tmp_path / "x"
@@ -166,7 +176,7 @@ def test_node_of_a_launch_file_that_dies_is_named(lamp: Exercise, tmp_path: Path
         '<maintainer email="a@b.de">x</maintainer><license>BSD</license></package>'
     )
     (tmp_path / "bad.py").rename(package / "bad.py")
-    os.environ["ROS_PACKAGE_PATH"] = str(tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     report = run(lamp, tmp_path, launch, name="lamp.launch")
     assert "the node bad ended with status 3" in lines(report)
 

@@ -219,7 +219,7 @@ def test_joints_are_released_before_controllers_close_their_topics(start: Start,
 
 
 CLOCK = """
-import itertools, threading, time
+import itertools, os, threading, time
 import rospy
 from controller_manager import controller_manager_interface as cm
 from rosgraph_msgs.msg import Clock
@@ -229,15 +229,17 @@ publisher = rospy.Publisher("/clock", Clock, queue_size=10)
 publisher.wait_for_subscribers(2)  # the robot's, and this node's own
 thread = threading.Thread(target=lambda: cm.load_controller("one") and cm.start_controller("one"))
 thread.start()
-before = itertools.takewhile(lambda _: thread.is_alive(), itertools.count(1000))
-now = itertools.chain(before, range(5000, 5020), itertools.count(100))
-for hundredths in now:
-    publisher.publish(Clock(rospy.Time(hundredths // 100, hundredths % 100 * 10_000_000)))
-    time.sleep(0.002)
+before = itertools.takewhile(lambda _: thread.is_alive(), itertools.count(10_000_000_000, 10_000_000))
+# After each jump, time advances by nanoseconds until the robot has seen it: a node reads only the newest time.
+later = itertools.takewhile(lambda _: not os.path.exists("later"), itertools.count(50_000_000_000))
+earlier = itertools.takewhile(lambda _: not os.path.exists("earlier"), itertools.count(1_000_000_000))
+for nanoseconds in itertools.chain(before, later, earlier, itertools.count(1_010_000_000, 10_000_000)):
+    publisher.publish(Clock(rospy.Time(*divmod(nanoseconds, 1_000_000_000))))
+    time.sleep(0.01)
 """
 
 
-def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: Start) -> None:
+def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: Start, workspace: Path) -> None:
     call(LOADS + "rospy.set_param('/use_sim_time', True)")
     robot = start("-c", ROBOT)
     start("-c", CLOCK)
@@ -245,9 +247,14 @@ def test_simulated_time_paces_the_loop_and_a_jump_restarts_controllers(start: St
     period = int(robot.read_until("a 0.").split()[-1])
     assert period > 0
     assert period % 10_000_000 == 0
+    while period < 1_000_000_000:
+        period = int(robot.read_until("a 0.").split()[-1])
+    (workspace.parent / "later").touch()
     robot.read_until("one stops")
     assert 1_000_000_000 <= int(robot.read_until("one starts").split()[-1]) < 10_000_000_000
     assert robot.read_until("a 0.").split()[-1] == "0"
+    (workspace.parent / "earlier").touch()
+    robot.read_until("a 0.")
     robot.process.send_signal(signal.SIGINT)
     status, _, errors = robot.end()
     assert status == 0
@@ -272,15 +279,18 @@ class Robot(RobotHardware):
             clock.set(1_000_000_000)  # a simulation is reset while a cycle runs
         elif len(times) == 5:
             loop._stop.set()
+        cycled.set()
 
 
+import threading
+cycled = threading.Event()
 loop = ControlLoop(Robot())
 loop.start()
-import threading, time
 def tick():
     clock.set(50_000_000_000)
     while not loop._stop.is_set():
-        time.sleep(0.01)
+        cycled.wait(1)  # the time does not run ahead of a loop that stalls
+        cycled.clear()
         clock.set(clock.now() + 10_000_000)
 threading.Thread(target=tick, daemon=True).start()
 loop.wait()
