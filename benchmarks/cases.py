@@ -1,4 +1,4 @@
-"""What benchmarks with several cases share: free ports, a new master for each case, and a table with a row for each."""
+"""Share free ports, a new master for each case, and a table with a row for each among the benchmarks."""
 
 from __future__ import annotations
 
