@@ -16,7 +16,7 @@ from minirospy.ros.gazebo_ros.physics import SimJoint, SimLink, Simulation, Simu
 
 __all__ = ["Refused", "apply", "offer", "offer_directly", "require_joint", "require_link"]
 
-Handler = Callable[[Any], Any]
+Handler = Callable[[Any], object]
 
 
 class Refused(Exception):

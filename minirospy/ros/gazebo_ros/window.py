@@ -134,7 +134,7 @@ class Window:
                 self._poses.publish(_transforms(*poses))
 
     def _publish_slow(self) -> None:
-        sources: tuple[tuple[rospy.Publisher[Any], Callable[[], Any]], ...] = (
+        sources: tuple[tuple[rospy.Publisher[Any], Callable[[], object]], ...] = (
             (self._joints, self._read_joints),
             (self._contacts, self._read_contacts),
             (self._rays, self._read_rays),

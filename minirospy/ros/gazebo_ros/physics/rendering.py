@@ -41,7 +41,7 @@ class Renderer:
         self.backend, self._gl = open_context(width, height)
         self._generation = -1
         self._model: Any = None  # the compiled model of the scene
-        self._loaded: Any = None  # the model whose meshes the context has loaded
+        self._loaded: object = None  # the model whose meshes the context has loaded
         self._scene: Any = None
         self._context: Any = None
         self._near, self._far = 0.1, 100.0
