@@ -33,7 +33,7 @@ help:
 	@echo "make ros2     test the bridge to ROS 2 against real ROS 2, which it installs from PyPI"
 	@echo "make ros2-core  the same without the peers over Zenoh, whose installation takes minutes"
 	@echo "make lint     check style (ruff) and types (mypy); the page by eslint and tsc if node is installed"
-	@echo "make guard    fail where a message or a call costs much more than plain sockets do"
+	@echo "make guard    fail if a message, a call or the start of a node costs much more than plain sockets, a plain ring or a plain Python"
 	@echo "make bench    run the benchmarks"
 	@echo "make fuzz     send random requests to a master and the bridge, random files to the readers, ten minutes each"
 	@echo "make mutants  put small faults into core/graph/, core/wire/, the journal and access; list those that no test notices"

@@ -15,6 +15,7 @@ from pathlib import Path
 __all__ = ["BIN", "free_port", "measure_cases", "new_master", "wait_for_port"]
 
 BIN = Path(sys.executable).parent
+MAX_SECONDS = 60.0  # for the start of a master or node
 
 
 def free_port() -> int:
@@ -25,13 +26,15 @@ def free_port() -> int:
 
 
 def wait_for_port(port: int) -> None:
-    """Wait until a server listens on a port of the loopback interface."""
-    while True:
+    """Wait until a server listens on a port of the loopback interface. Raise SystemExit if none does in time."""
+    end = time.monotonic() + MAX_SECONDS
+    while time.monotonic() < end:
         try:
             socket.create_connection(("127.0.0.1", port), 0.2).close()
             return
         except OSError:
             time.sleep(0.02)
+    raise SystemExit(f"nothing listens on port {port}")
 
 
 @contextmanager

@@ -83,12 +83,9 @@ def tree(process: psutil.Process) -> list[psutil.Process]:
 
 
 def measure(
-    program: str, variables: dict[str, str], count: int, *, settle: float = SETTLE
+    program: str, variables: dict[str, str], count: int, *, with_memory: bool = True
 ) -> dict[str, float]:
-    """Return the figures of one launch by column. Raise SystemExit if the nodes are not registered in time.
-
-    ``settle``: seconds until the memory is measured.
-    """
+    """Return the figures of one launch by column. Raise SystemExit if the nodes are not registered in time."""
     port = free_port()
     with tempfile.TemporaryDirectory() as home:
         launch = write_launch(Path(home), count)
@@ -113,17 +110,19 @@ def measure(
                     time.sleep(0.02)
                 seconds = time.monotonic() - start
                 cpu = sum(sum(each.cpu_times()[:4]) for each in tree(psutil.Process(launcher.pid)))
-                time.sleep(settle)
-                memory = [each.memory_full_info() for each in tree(psutil.Process(launcher.pid))]
+                figures = {"registered, s": seconds, "CPU, s": cpu}
+                if with_memory:
+                    time.sleep(SETTLE)
+                    memory = [each.memory_full_info() for each in tree(psutil.Process(launcher.pid))]
+                    figures["PSS, MB"] = sum(each.pss for each in memory) / 1e6
+                    figures["not shared, MB"] = sum(each.uss for each in memory) / 1e6
             finally:
                 launcher.send_signal(signal.SIGINT)
-                launcher.wait(MAX_SECONDS)
-    return {
-        "registered, s": seconds,
-        "CPU, s": cpu,
-        "PSS, MB": sum(each.pss for each in memory) / 1e6,
-        "not shared, MB": sum(each.uss for each in memory) / 1e6,
-    }
+                try:
+                    launcher.wait(MAX_SECONDS)
+                except subprocess.TimeoutExpired:
+                    launcher.kill()
+    return figures
 
 
 def main() -> int:
