@@ -23,7 +23,7 @@ _MAX_ELEMENTS = 1_000_000
 _UNQUOTED = re.compile(rb"""<[^<"'>]*(?:"[^"]*"[^<"'>]*|'[^']*'[^<"'>]*)*?\s([\w:-]+)\s*=\s*([^\s"'<>/=]+)""")
 _MAX_ADVISED = 1000  # bytes of a line that are searched for a mistake; the searches take quadratic time
 _TYPOGRAPHIC_QUOTE = re.compile(rb"=\s*(?:\xe2\x80[\x98-\x9f]|\xc2[\xab\xbb])")
-_UNCLOSED = re.compile(rb"""\s([\w:-]+)\s*=\s*(["'])[^"'<>]*=\2""")
+_UNCLOSED = re.compile(rb"""\s([\w:-]+)\s*=\s*(["'])[^"'<>]*=\2(?=[^\s/>?])""")
 # Patterns in a line that is not well-formed, and what to write instead.
 _MISTAKES = (
     (re.compile(rb"&(?!#?\w+;)"), "& is written &amp;"),
@@ -159,12 +159,13 @@ def _advice(error: XmlSyntaxError, opened: list[XmlElement], text: str | bytes) 
         return ": a file has one outermost tag"
     lines = text.split(b"\n") if isinstance(text, bytes) else text.encode("utf-8", "replace").split(b"\n")
     line = lines[error.line - 1][:_MAX_ADVISED] if 0 < error.line <= len(lines) else b""
-    if _TYPOGRAPHIC_QUOTE.search(line):
+    is_malformed = error.why.startswith("not well-formed")
+    if is_malformed and _TYPOGRAPHIC_QUOTE.search(line):
         return ": a value is written in straight quotes, \" or '"
     if found := _UNQUOTED.search(line):
         name, value = (part.decode("utf-8", "replace") for part in found.groups())
         return f': a value is written in quotes: {name}="{value}"'
-    if not error.why.startswith("not well-formed"):
+    if not is_malformed:
         return ""
     if found := _UNCLOSED.search(line):
         return f": the value of {found[1].decode('utf-8', 'replace')} has no closing quote"

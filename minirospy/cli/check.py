@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -124,7 +125,9 @@ def _check(
     if one_master is not None:
         from minirospy.cli.completion.shell import shell_name
 
-        one_master = shell_name(one_master, default="sh")
+        # SHELL names the login shell, which need not be the one that evaluates the lines; all shells of Unix take those of sh.
+        in_cmd = sys.platform == "win32" and "SHELL" not in os.environ
+        one_master = shell_name(one_master or ("bat" if in_cmd else "sh"))
     if join is not None or name is not None:
         from minirospy.course.results import class_master
         from minirospy.course.results import join as join_class

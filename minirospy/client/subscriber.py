@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["SubscribedTopic", "Subscriber", "wait_for_message"]
 
 _log = logging.getLogger("rosout")
+_own_log = logging.getLogger(__name__)  # for the terminal and the log file; not published
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
@@ -133,10 +134,10 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
             patience = _SILENT_SECONDS if timeout is None else min(timeout, _SILENT_SECONDS)
             is_longer = timeout is None or timeout > _SILENT_SECONDS
             if not wait_for_event(arrived, patience) and is_longer:
-                # rospy logs nothing here, so users would not notice a misspelled name.
+                # rospy says nothing here, so users would not notice a misspelled name. It is not for /rosout.
                 peers = subscriber.get_num_connections()
                 why = "no message yet" if peers else "nothing publishes it"
-                _log.info("wait_for_message(%s): %s, waiting...", subscriber.resolved_name, why)
+                _own_log.warning("wait_for_message(%s): %s, waiting...", subscriber.resolved_name, why)
                 wait_for_event(arrived, None if timeout is None else timeout - patience)
         finally:
             subscriber.unregister()

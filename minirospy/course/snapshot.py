@@ -87,20 +87,29 @@ def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]], left_
                 name = f"{prefix}/{path.relative_to(root).as_posix()}"
                 name.encode()
                 info = zipfile.ZipInfo.from_file(path, name, strict_timestamps=False)
-                with path.open("rb") as stream:
-                    data = stream.read(_MAX_FILE_BYTES + 1)
+                # Do not read what is left out: a folder may have many large files.
+                if _fits(info.file_size, count, total):
+                    with path.open("rb") as stream:
+                        data = stream.read(_MAX_FILE_BYTES + 1)
+                else:
+                    data = None
             except OSError as error:
                 left_out[str(path)] = _unreadable(error)
                 continue
             except UnicodeEncodeError:
                 left_out[str(path)] = "its name is not UTF-8"
                 continue
-            if len(data) > _MAX_FILE_BYTES or total + len(data) > MAX_BYTES or count >= _MAX_FILES:
+            if data is None or not _fits(len(data), count, total):
                 left_out[str(path)] = "it or the snapshot is too large"
                 continue
             archive.writestr(info, data, zipfile.ZIP_DEFLATED)
             count, total = count + 1, total + len(data)
     return count
+
+
+def _fits(size: int, count: int, total: int) -> bool:
+    """Return whether a file of ``size`` bytes fits into a snapshot with ``count`` files of ``total`` bytes."""
+    return size <= _MAX_FILE_BYTES and total + size <= MAX_BYTES and count < _MAX_FILES
 
 
 def _files(root: Path, left_out: dict[str, str]) -> list[Path]:

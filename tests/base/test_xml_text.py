@@ -130,6 +130,7 @@ def test_xacro_refuses_expanding_entities(tmp_path: Path, included: bool) -> Non
         ("<l a='a<b'/>", "< in a value is written &lt;"),
         ('<l b="&lt;" a="a<b"/>', "< in a value is written &lt;"),
         ("<l a='x b='1'/>", "the value of a has no closing quote"),
+        ("<l a='_p:=' b='1 & 2'/>", "& is written &amp;"),
         ("<l a=\u201cx\u201d/>", "a value is written in straight quotes, \" or '"),
         ("<l a=x b='1 & 2'/>", 'a value is written in quotes: a="x"'),
         ("<l/><l/>", "a file has one outermost tag"),
@@ -142,7 +143,10 @@ def test_usual_mistake_is_named(text: str, advice: str) -> None:
     assert error.value.why.endswith(f"): {advice}")
 
 
-@pytest.mark.parametrize("text", ["<l a='1'b='2'/>", "<l>\x01</l>", "<l><!-- a --><b a='--x'/>\x01</l>"])
+@pytest.mark.parametrize(
+    "text",
+    ["<l a='1'b='2'/>", "<l a='1' a='2' b='c=“x”'/>", "<l>\x01</l>", "<l><!-- a --><b a='--x'/>\x01</l>"],
+)
 def test_other_mistakes_get_no_advice(text: str) -> None:
     with pytest.raises(XmlSyntaxError) as error:
         parse_xml(text)

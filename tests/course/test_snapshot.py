@@ -87,6 +87,22 @@ def test_all_files_together_have_a_limit(
     ]
 
 
+def test_file_that_is_too_large_is_not_read(
+    workspace: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    really_open = Path.open
+
+    def noted_open(path: Path, *args: Any, **kwargs: Any) -> Any:
+        opened.append(path.name)
+        return really_open(path, *args, **kwargs)
+
+    monkeypatch.setattr(Path, "open", noted_open)
+    write_snapshot(tmp_path / "anna.zip", Environment.read())
+    assert "my_led.py" in opened
+    assert "big.bag" not in opened
+
+
 def test_file_of_1970_is_packed(workspace: Path, tmp_path: Path) -> None:
     os.utime(workspace / "rpi_test" / "package.xml", (0, 0))
     file = tmp_path / "anna.zip"

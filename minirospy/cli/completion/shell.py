@@ -35,10 +35,10 @@ def _parser() -> Parser:
     return parser
 
 
-def shell_name(word: str, default: str | None = None) -> str:
+def shell_name(word: str) -> str:
     """Return a shell's name in ``SHELLS``: that of ``word`` or, if it is empty, that of the variable SHELL.
 
-    ``default`` replaces a shell that only SHELL names. Raise UsageError if there is nothing for the shell.
+    Raise UsageError if there is nothing for the shell.
     """
     user_shell = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
     name = word or Path(user_shell).stem
@@ -46,8 +46,6 @@ def shell_name(word: str, default: str | None = None) -> str:
     name = "powershell" if name == "pwsh" else name
     if name in SHELLS:
         return name
-    if default is not None and not word:
-        return default
     raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")
 
 

@@ -94,7 +94,11 @@ class Message:
         for name in kwds:
             if name not in names:
                 error = AttributeError(f"{name} is not an attribute of {type(self).__name__}")
-                raise noted(error, f"a {self._type} has the fields {', '.join(names)}")
+                kind = getattr(self, "_type", type(self).__name__)  # a class written by hand may lack _type
+                raise noted(
+                    error,
+                    f"a {kind} has the fields {', '.join(names)}" if names else f"a {kind} has no fields",
+                )
         for name in names:
             setattr(self, name, kwds.get(name))
 

@@ -398,6 +398,7 @@ class PluginHost:
     def reset(self) -> None:
         """Reset all plugins."""
         for plugin in self._running:
+            plugin.due_ns = 0  # also if the user's plugin does not call reset() of its base class
             try:
                 plugin.reset()
             except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's

@@ -676,7 +676,9 @@ class RingReceiver:
 
 
 def _text_of(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)
+    """Return an error's text in ASCII, since other processes parse it; the system's texts may be translated."""
+    text = getattr(error, "strerror", None) or str(error)
+    return text.encode("ascii", "replace").decode()
 
 
 def _answer(sock: socket.socket, byte: bytes) -> None:
