@@ -119,6 +119,8 @@ STEP, LEAD = 10_000_000, 60_000_000  # ns; the controllers publish their states 
 seen, changed = [], threading.Condition()
 def on_state(message):
     with changed:
+        if not seen:
+            print("follows the loop", flush=True)
         seen.append(message.header.stamp.to_nsec())
         changed.notify_all()
 subscribers = [rospy.Subscriber(f"/{name}/state", State, on_state) for name in ("arm", "other_arm")]
@@ -159,8 +161,9 @@ def loopback(start: Start) -> None:
     """
     call(SETUP + "rospy.set_param('/use_sim_time', True)")
     start("minirospy_hardware", "loopback", INITIAL)
-    start("-c", CLOCK)
+    clock = start("-c", CLOCK)
     assert call(START).endswith("[True, True, True] True\n")
+    clock.read_until("follows the loop")
 
 
 @pytest.mark.usefixtures("loopback")
