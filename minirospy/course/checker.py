@@ -21,7 +21,7 @@ __all__ = ["Finding", "Report", "check", "words_of"]
 
 START_SECONDS = 15.0  # for a node to register, on a slow laptop with a virus scanner
 OWN_START_SECONDS = 60.0  # for a program of the exercise itself, without which it cannot be checked
-_EXIT_SECONDS = 1.0  # from the traceback to the end of a program that fails
+EXIT_SECONDS = 1.0  # from the traceback to the end of a program that fails
 _LAST_LINES = 8  # lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # for which `click` holds a button; longer than two periods of 10 Hz polling
 _REPEAT_HERTZ = 10.0  # rate of published messages, unless the exercise specifies one
@@ -225,7 +225,7 @@ class _Run:
         for program in self._trial.work:
             if program.status is None and program.name not in self._reported and program.fault():
                 # A traceback is printed before the exit.
-                self._trial.world.wait_until(partial(_has_ended, program), _EXIT_SECONDS)
+                self._trial.world.wait_until(partial(_has_ended, program), EXIT_SECONDS)
             status = program.status
             if status is not None:
                 program.wait_for_output()

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -16,6 +17,8 @@ from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.course import checker
 from minirospy.course.checker import Report, check
 from minirospy.course.exercise import Exercise, ExerciseError, parse_exercise
+from minirospy.course.world import World
+from tests.patience import PATIENCE
 
 LAMP = """
 name: lamp
@@ -97,7 +100,11 @@ def test_what_does_not_hold_is_named(
     assert observed in lines(report)
 
 
-def test_crash_is_one_sentence_and_the_last_lines(lamp: Exercise, tmp_path: Path) -> None:
+def test_crash_is_one_sentence_and_the_last_lines(
+    lamp: Exercise, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The traceback is printed before the exit, by which the program is judged.
+    monkeypatch.setattr(checker, "EXIT_SECONDS", PATIENCE)
     report = run(lamp, tmp_path, "import rospy\nrospy.init_node('lamp')\nprint('almost')\nrospy.Publsher\n")
     first, *others = report.findings
     assert "lamp.py keeps running: no, it ended after" in str(first)
@@ -122,7 +129,17 @@ def test_program_that_ends_is_advised_to_spin_before_the_time_for_its_effects_ha
     assert "rospy.spin()" in report.findings[0].hint
 
 
-def test_program_without_a_node_is_advised_to_init(lamp: Exercise, tmp_path: Path) -> None:
+def test_program_without_a_node_is_advised_to_init(
+    lamp: Exercise, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait_until = World.wait_until
+
+    def wait_from_output_on(world: World, holds: Callable[[], bool], seconds: float) -> bool:
+        # The time limit, which applies from the start on, may be shorter than Python takes to print.
+        wait_for(lambda: all(program.lines for program in world.programs))
+        return wait_until(world, holds, seconds)
+
+    monkeypatch.setattr(World, "wait_until", wait_from_output_on)
     report = run(lamp, tmp_path, "import time\nprint('waiting')\ntime.sleep(100)\n", patience=0.2)
     assert "lamp.py starts a node: no, it runs, but no node is registered after 3 s" in str(
         report.findings[0]

@@ -132,6 +132,6 @@ def test_a_long_document_takes_a_time_that_grows_with_its_length() -> None:
         b"x" * 100,
     ):
         body = b"<methodResponse><params>" + piece * 20_000 + b"</params></methodResponse>"
-        start_time = time.process_time()
+        start_time = time.thread_time()
         assert read_plain(body) is None or piece == b" "
-        assert time.process_time() - start_time < 1.0
+        assert time.thread_time() - start_time < 1.0

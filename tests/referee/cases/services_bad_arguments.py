@@ -11,21 +11,22 @@ outcome("call before init_node", lambda: rospy.ServiceProxy("early", Trigger)())
 outcome("wait_for_service before init_node", lambda: rospy.wait_for_service("early", timeout=0.1))
 rospy.init_node("case", argv=[])
 
-for label, name in (
-    ("empty", ""),
-    ("None", None),
-    ("space", "a b"),
-    ("dash", "a-b"),
-    ("digit", "1a"),
-    ("two slashes", "a//b"),
-    ("slash at the end", "a/"),
-    ("only slash", "/"),
-    ("tilde inside", "a~b"),
-    ("unicode", "ż"),
+BRIEF, PATIENT = 0.01, 60.0  # seconds to wait for a service that never responds, and for one that does
+for label, name, seconds in (
+    ("empty", "", BRIEF),
+    ("None", None, BRIEF),
+    ("space", "a b", BRIEF),
+    ("dash", "a-b", PATIENT),
+    ("digit", "1a", PATIENT),
+    ("two slashes", "a//b", PATIENT),
+    ("slash at the end", "a/", PATIENT),
+    ("only slash", "/", BRIEF),
+    ("tilde inside", "a~b", PATIENT),
+    ("unicode", "ż", PATIENT),
 ):
     outcome("proxy name " + label, lambda: rospy.ServiceProxy(name, Trigger).resolved_name)
     outcome("service name " + label, lambda: rospy.Service(name, Trigger, lambda request: {}).resolved_name)
-    outcome("wait name " + label, lambda: rospy.wait_for_service(name, timeout=0.01))
+    outcome("wait name " + label, lambda: rospy.wait_for_service(name, timeout=seconds))
 for label, class_ in (
     ("a message", Bool),
     ("a request", SetBoolRequest),

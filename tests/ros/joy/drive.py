@@ -127,8 +127,8 @@ def follow_teleop(
 
 def answer_of(twists: queue.Queue[Twist]) -> str:
     try:
-        # On a busy machine, a message may take a while.
-        twist = twists.get(timeout=10)
+        # Only a silent node takes this long: on a busy machine, a message may take a while.
+        twist = twists.get(timeout=60)
     except queue.Empty:
         return "nothing"
     linear, angular = twist.linear, twist.angular

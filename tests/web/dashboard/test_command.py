@@ -10,7 +10,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Iterator
-from http.client import HTTPConnection
+from http.client import HTTPConnection, HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname, urlopen
@@ -85,7 +85,7 @@ def test_page_is_served_before_there_is_a_master(
             connection.request("GET", "/status", headers=headers)
             answer = connection.getresponse()
             return answer.status, answer.read().decode()
-        except ConnectionError:  # between the two pages the port is free
+        except (ConnectionError, HTTPException):  # between the two pages the port is free
             return 0, ""
         finally:
             connection.close()

@@ -107,6 +107,30 @@ for kind in (Raw, Library):
     print(json.dumps(replay(kind)))
 """
 
+CLOCK = """
+import itertools, threading
+import rospy
+from control_msgs.msg import JointTrajectoryControllerState as State
+from rosgraph_msgs.msg import Clock
+
+rospy.init_node("clock", disable_signals=True)
+publisher = rospy.Publisher("/clock", Clock, queue_size=10)
+STEP, LEAD = 10_000_000, 60_000_000  # ns; the controllers publish their states every 20 ms
+seen, changed = [], threading.Condition()
+def on_state(message):
+    with changed:
+        if not seen:
+            print("follows the loop", flush=True)
+        seen.append(message.header.stamp.to_nsec())
+        changed.notify_all()
+subscribers = [rospy.Subscriber(f"/{name}/state", State, on_state) for name in ("arm", "other_arm")]
+for now in itertools.count(1_000_000_000, STEP):
+    publisher.publish(Clock(rospy.Time(*divmod(now, 1_000_000_000))))
+    with changed:
+        changed.wait_for(lambda: not seen or now < seen[-1] + LEAD)
+    threading.Event().wait(0.005)
+"""
+
 QUERIES = """
 from controller_manager_msgs.srv import *
 def ask(name, kind, *arguments):
@@ -131,10 +155,15 @@ def outcomes() -> list[list[object]]:
 
 @pytest.fixture
 def loopback(start: Start) -> None:
-    """Start a loopback with the recorded robot's controllers."""
-    call(SETUP)
+    """Start a loopback with the recorded robot's controllers, and a clock that waits for the loop.
+
+    With a clock that does not wait, a loop that stalls would exceed a goal's time tolerance, and report another error.
+    """
+    call(SETUP + "rospy.set_param('/use_sim_time', True)")
     start("minirospy_hardware", "loopback", INITIAL)
+    clock = start("-c", CLOCK)
     assert call(START).endswith("[True, True, True] True\n")
+    clock.read_until("follows the loop")
 
 
 @pytest.mark.usefixtures("loopback")

@@ -250,7 +250,7 @@ def concurrence(results, **kwargs):
 
     def runner(number, result):
         def run(ud):
-            turns[number].wait(10)
+            turns[number].wait(60)
             ud.out = number
             return result
 
@@ -328,9 +328,9 @@ results = []
 thread = threading.Thread(target=lambda: results.append(outer.execute()))
 slow_runs.clear()
 thread.start()
-slow_runs.wait(30)
+slow_runs.wait()
 outer.request_preempt()
-thread.join(20)
+thread.join()
 say(results, outer.preempt_requested(), inner.preempt_requested(), slow.preempt_requested())
 
 # A preempt request before the start reaches the first state.

@@ -187,7 +187,7 @@ def fibonacci(goal):
         server.set_aborted(FibonacciResult([goal.order]))
         return
     waited = 0
-    while goal.order > 50 and waited < 1000:
+    while goal.order > 50 and waited < 10_000:
         waited += 1
         if server.is_preempt_requested():
             server.set_preempted(FibonacciResult([99]))
@@ -258,7 +258,7 @@ def work(ud):
     if ud.order > 50:
         works.set()
     ud.sequence = [ud.order]
-    for _ in range(500 if ud.order > 50 else 0):
+    for _ in range(5000 if ud.order > 50 else 0):
         if worker.preempt_requested():
             worker.service_preempt()
             return "preempted"
@@ -288,17 +288,17 @@ wrapper = ActionServerWrapper(
 )
 wrapper.run_server()
 client = actionlib.SimpleActionClient("wrapped", FibonacciAction)
-say("wrapped", client.wait_for_server(rospy.Duration(20)))
+say("wrapped", client.wait_for_server(rospy.Duration(60)))
 for order in (5, -1, -9):
-    state = client.send_goal_and_wait(FibonacciGoal(order), rospy.Duration(20))
+    state = client.send_goal_and_wait(FibonacciGoal(order), rospy.Duration(60))
     say("wrapped", order, state, client.get_result().sequence)
 client.send_goal(FibonacciGoal(70))
-works.wait(30)
+works.wait(60)
 # A goal that is canceled before it is acknowledged is lost if a list of statuses was sent before the goal arrived.
 while client.get_state() != GoalStatus.ACTIVE:
     pause.wait(0.01)
 client.cancel_goal()
-say("wrapped", client.wait_for_result(rospy.Duration(20)), client.get_state(), client.get_result().sequence)
+say("wrapped", client.wait_for_result(rospy.Duration(60)), client.get_state(), client.get_result().sequence)
 
 # Introspection: the published messages, and a container that is started at another state.
 inner = smach.Concurrence(["both"], "both", outcome_map={"both": {"L": "ok"}})
