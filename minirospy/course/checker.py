@@ -197,7 +197,8 @@ class _Run:
             program = world.start(word, is_work=step.subject == "work" or isinstance(step.subject, int))
             # A small ``patience`` applies to the student's program only: the exercise needs its own programs in any case.
             seconds = START_SECONDS if program.is_work else OWN_START_SECONDS / min(1.0, world.patience)
-            runs = world.wait_until(partial(_has_started, world, before, program), seconds)
+            has_started = partial(_has_started, world, before, program)
+            runs = world.wait_until(has_started, seconds, needs_work=program.is_work)
             if not program.is_work:
                 if not runs or program.status is not None:
                     program.wait_for_output()

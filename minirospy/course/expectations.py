@@ -278,7 +278,8 @@ def _service(trial: Trial, step: Step) -> Outcome:
 def call(trial: Trial, step: Step) -> object:
     """Wait for a service and call it; return the response. Raise NotFoundError or ServiceException if that fails."""
     world, name = trial.world, step.subject
-    world.wait_until(lambda: name in world.graph.state().services, step.within)
+    # The service may be that of a program that belongs to the exercise.
+    world.wait_until(lambda: name in world.graph.state().services, step.within, needs_work=False)
     type_ = service_type(world.graph, name)
     request = fill_request(type_, [step.options.get("request", {})])
     return call_service(world.graph, name, type_, request)

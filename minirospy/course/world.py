@@ -153,14 +153,15 @@ class World:
                 if was_running:
                     self._tell_guardian(f"-{program.process.pid}")
 
-    def wait_until(self, holds: Callable[[], bool], seconds: float) -> bool:
+    def wait_until(self, holds: Callable[[], bool], seconds: float, *, needs_work: bool = True) -> bool:
         """Poll until ``holds()`` is true or ``seconds``, times the patience, have passed. Return whether it is true.
 
-        Stop earlier if all of the student's programs have exited, unless they are expected to.
+        Stop earlier if all of the student's programs have exited, unless they are expected to, or the condition does not need
+        them (``needs_work``).
         """
         end = time.monotonic() + seconds * self.patience
         while not holds():
-            if self._work_has_ended():
+            if needs_work and self._work_has_ended():
                 end = min(end, time.monotonic() + _LAST_EFFECT_SECONDS * self.patience)
             if time.monotonic() >= end:
                 # On a busy machine the last poll may be long ago.

@@ -120,6 +120,29 @@ def test_syntax_error_is_named_with_its_line(lamp: Exercise, tmp_path: Path) -> 
     assert "(lamp.py, line 2)" in str(report.findings[0])
 
 
+def test_programs_of_the_exercise_start_although_the_students_has_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("minirospy.course.world._LAST_EFFECT_SECONDS", 0.0)
+    # The student's program ends once that of the exercise has started, which registers its node after that.
+    own, pid, has_started = (tmp_path / name for name in ("own.py", "pid", "has_started"))
+    own.write_text(
+        f"import psutil, time\nopen({str(has_started)!r}, 'w').close()\n"
+        f"work = psutil.Process(int(open({str(pid)!r}).read()))\n"
+        "try:\n    while work.status() != psutil.STATUS_ZOMBIE: time.sleep(0.01)\nexcept psutil.NoSuchProcess: pass\n"
+        "import rospy\nrospy.init_node('own')\nrospy.spin()\n"
+    )
+    work = (
+        f"import os, rospy, time\nopen({str(pid)!r}, 'w').write(str(os.getpid()))\nrospy.init_node('lamp')\n"
+        f"while not os.path.exists({str(has_started)!r}): time.sleep(0.01)\n"
+    )
+    steps = f"- start: work\n- start: {own}\n- node: /own\n"
+    exercise = parse_exercise(f"name: t\ntitle: t\nwork:\n- about: node\nsteps:\n{steps}", "t.yaml")
+    report = run(exercise, tmp_path, work)
+    assert "it ended by itself after" in lines(report)
+    assert not report.passed
+
+
 def test_program_that_ends_is_advised_to_spin_before_the_time_for_its_effects_has_passed(
     tmp_path: Path,
 ) -> None:
@@ -134,10 +157,12 @@ def test_program_without_a_node_is_advised_to_init(
 ) -> None:
     wait_until = World.wait_until
 
-    def wait_from_output_on(world: World, holds: Callable[[], bool], seconds: float) -> bool:
+    def wait_from_output_on(
+        world: World, holds: Callable[[], bool], seconds: float, *, needs_work: bool = True
+    ) -> bool:
         # The time limit, which applies from the start on, may be shorter than Python takes to print.
         wait_for(lambda: all(program.lines for program in world.programs))
-        return wait_until(world, holds, seconds)
+        return wait_until(world, holds, seconds, needs_work=needs_work)
 
     monkeypatch.setattr(World, "wait_until", wait_from_output_on)
     report = run(lamp, tmp_path, "import time\nprint('waiting')\ntime.sleep(100)\n", patience=0.2)
