@@ -109,9 +109,9 @@ export const GERMAN = {
   "correct the port in ROS_MASTER_URI, or end that program":
     "den Port in ROS_MASTER_URI berichtigen, oder jenes Programm beenden",
   "see docs/network.md": "siehe docs/network.md",
-  "that of {machine} is {seconds} s ahead of this one": "die von {machine} geht gegenüber dieser {seconds} s vor",
-  "that of {machine} is {seconds} s behind this one": "die von {machine} geht gegenüber dieser {seconds} s nach",
-  "the master's machine ({host})": "dem Rechner des Masters ({host})",
+  "that of {machine} is {seconds} s ahead of this one": "{machine}: die Uhr geht gegenüber dieser {seconds} s vor",
+  "that of {machine} is {seconds} s behind this one": "{machine}: die Uhr geht gegenüber dieser {seconds} s nach",
+  "the master's machine ({host})": "der Rechner des Masters ({host})",
   "let both follow one time server (chrony, ntp): stamps and transforms of one are wrong for the other":
     "beide nach einem Zeitserver stellen (chrony, ntp): Zeitstempel und Transformationen des einen sind für den anderen falsch",
   "{node} has another definition of {type} than this machine: build all sides from the same one":
@@ -156,8 +156,8 @@ export const GERMAN = {
   "a firewall lets only some ports through: open TCP port {port} too (see MINIROSPY_PORTS)":
     "eine Firewall lässt nur manche Ports durch: auch TCP-Port {port} öffnen (siehe MINIROSPY_PORTS)",
   "{machine} does not reach this one at {address}: {why}":
-    "diesen Rechner an {address} erreicht nicht {machine}: {why}",
-  "{machine} does not reach this one at {address}": "diesen Rechner an {address} erreicht nicht {machine}",
+    "{machine} erreicht diesen Rechner an {address} nicht: {why}",
+  "{machine} does not reach this one at {address}": "{machine} erreicht diesen Rechner an {address} nicht",
   "a firewall keeps it from TCP ports {one} and {other} of this machine: open them, or set MINIROSPY_PORTS to ports that are open":
     "eine Firewall sperrt die TCP-Ports {one} und {other} dieses Rechners: sie öffnen, oder MINIROSPY_PORTS auf offene Ports setzen",
   "{advice}; or it takes '{host}' for another machine: {command}":
