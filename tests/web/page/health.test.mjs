@@ -164,3 +164,11 @@ test("all texts of the doctor in the list are German, what is in them stays", ()
   chooseLanguage("en");
   assert.equal(translated("nobody publishes /a"), "nobody publishes /a");
 });
+
+test("a node is masculine in German, as in the course", () => {
+  const feminine = /\b(die|diese|jene|einer?|keine|[dms]eine|ihre) (\w+e )?Node\b/i;
+  assert.deepEqual(
+    Object.values(GERMAN).filter((text) => feminine.test(text)),
+    [],
+  );
+});
