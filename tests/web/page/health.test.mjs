@@ -136,7 +136,7 @@ test("all texts of the doctor in the list are German, what is in them stays", ()
     "niemand sendet /led_comand (/node; /led_command wird gesendet), /b (/c)",
   );
   assert.equal(
-    translated("/a, /b und 3 weitere: another program answers at their port on 'pi': timed out after 1.5 s"),
+    translated("/a, /b and 3 more: another program answers at their port on 'pi': timed out after 1.5 s"),
     "/a, /b und 3 weitere: an ihrem Port auf 'pi' antwortet ein anderes Programm: nach 1.5 s keine Antwort",
   );
   assert.equal(
