@@ -534,7 +534,7 @@ def test_classroom_shows_the_exercises_of_each_student(
 ) -> None:
     served = serve()
     master = MasterProxy(os.environ["ROS_MASTER_URI"], "/students")
-    with contextlib.closing(master), beats("anna"):
+    with contextlib.closing(master), beats("anna", "ben"):
         for name, value in CLASS.items():
             if " " not in name:
                 master.set_param(name, value)
@@ -545,7 +545,8 @@ def test_classroom_shows_the_exercises_of_each_student(
         page.wait_text(".class-failures li", "The LED lights: it stays dark")
         # The board of a student is shown until there has been no beat for ten seconds.
         page.wait("return document.querySelectorAll('.class-led.red').length === 1")
-        # The buttons of a shared board are live.
+        # The buttons of a shared board are live. Ben's computer has sent none.
+        page.wait_text(".class-table tr:has(.class-no) td .muted", "0 nodes")
         page.wait(
             "return document.querySelectorAll('.class-button').length === 2"
             " && !document.querySelector('.class-button.pressed')"
