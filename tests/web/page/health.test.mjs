@@ -136,7 +136,7 @@ test("all texts of the doctor in the list are German, what is in them stays", ()
     "niemand sendet /led_comand (/node; /led_command wird gesendet), /b (/c)",
   );
   assert.equal(
-    translated("/a, /b und 3 weitere: another program answers at their port on 'pi': timed out after 1.5 s"),
+    translated("/a, /b and 3 more: another program answers at their port on 'pi': timed out after 1.5 s"),
     "/a, /b und 3 weitere: an ihrem Port auf 'pi' antwortet ein anderes Programm: nach 1.5 s keine Antwort",
   );
   assert.equal(
@@ -145,8 +145,30 @@ test("all texts of the doctor in the list are German, what is in them stays", ()
     ),
     "2 Bäume ohne Verbindung, mit den Wurzeln [map], [odom] ([odom] ist fast [odm]: war eines davon gemeint?)",
   );
+  // The master's machine is named in the nominative.
+  assert.equal(
+    translated("that of the master's machine (pi) is 3.0 s ahead of this one"),
+    "der Rechner des Masters (pi): die Uhr geht gegenüber dieser 3.0 s vor",
+  );
+  assert.equal(translated("that of pi is 3.0 s behind this one"), "pi: die Uhr geht gegenüber dieser 3.0 s nach");
+  assert.equal(
+    translated("the master's machine (pi) does not reach this one at 10.0.0.7:40001"),
+    "der Rechner des Masters (pi) erreicht diesen Rechner an 10.0.0.7:40001 nicht",
+  );
+  assert.equal(
+    translated("pi does not reach this one at 10.0.0.7:40001: connection refused"),
+    "pi erreicht diesen Rechner an 10.0.0.7:40001 nicht: Verbindung abgelehnt",
+  );
   const long = `nobody publishes ${"/a is in /b and in /c; ".repeat(1000)}`;
   assert.equal(translated(long), long);
   chooseLanguage("en");
   assert.equal(translated("nobody publishes /a"), "nobody publishes /a");
+});
+
+test("a node is masculine in German, as in the course", () => {
+  const feminine = /\b(die|diese|jene|einer?|keine|[dms]eine|ihre) (\w+e )?Node\b/i;
+  assert.deepEqual(
+    Object.values(GERMAN).filter((text) => feminine.test(text)),
+    [],
+  );
 });

@@ -63,7 +63,7 @@ export const GERMAN = {
   "topics": "Topics",
   "{topic} is silent: {nodes} sends nothing": "{topic} ist stumm: {nodes} sendet nichts",
   "look at that node's log lines, and at the device that it reads":
-    "die Log-Zeilen dieser Node ansehen und das Gerät, das sie liest",
+    "die Log-Zeilen dieses Nodes ansehen und das Gerät, das er liest",
   // findings of minirospy doctor
   "no ROS master answers at {uri}: start one with `roscore`, or set ROS_MASTER_URI to the machine where it runs":
     "an {uri} antwortet kein ROS-Master: mit `roscore` einen starten, oder ROS_MASTER_URI auf den Rechner setzen, auf dem er läuft",
@@ -87,7 +87,7 @@ export const GERMAN = {
   "{subscriber} does not get {topics} of {publisher}": "{subscriber} bekommt {topics} von {publisher} nicht",
   "{service} of {node} does not answer: {why}": "{service} von {node} antwortet nicht: {why}",
   "start its node again; if that one runs elsewhere, its port for services is blocked: see MINIROSPY_PORTS":
-    "die Node neu starten; läuft sie auf einem anderen Rechner, ist ihr Port für Services gesperrt: siehe MINIROSPY_PORTS",
+    "den Node neu starten; läuft er auf einem anderen Rechner, ist sein Port für Services gesperrt: siehe MINIROSPY_PORTS",
   "not installed: {packages}": "nicht installiert: {packages}",
   "look at its terminal": "in sein Terminal sehen",
   "this machine does not know the name '{host}' of ROS_MASTER_URI={uri}":
@@ -109,9 +109,9 @@ export const GERMAN = {
   "correct the port in ROS_MASTER_URI, or end that program":
     "den Port in ROS_MASTER_URI berichtigen, oder jenes Programm beenden",
   "see docs/network.md": "siehe docs/network.md",
-  "that of {machine} is {seconds} s ahead of this one": "die von {machine} geht gegenüber dieser {seconds} s vor",
-  "that of {machine} is {seconds} s behind this one": "die von {machine} geht gegenüber dieser {seconds} s nach",
-  "the master's machine ({host})": "dem Rechner des Masters ({host})",
+  "that of {machine} is {seconds} s ahead of this one": "{machine}: die Uhr geht gegenüber dieser {seconds} s vor",
+  "that of {machine} is {seconds} s behind this one": "{machine}: die Uhr geht gegenüber dieser {seconds} s nach",
+  "the master's machine ({host})": "der Rechner des Masters ({host})",
   "let both follow one time server (chrony, ntp): stamps and transforms of one are wrong for the other":
     "beide nach einem Zeitserver stellen (chrony, ntp): Zeitstempel und Transformationen des einen sind für den anderen falsch",
   "{node} has another definition of {type} than this machine: build all sides from the same one":
@@ -119,7 +119,7 @@ export const GERMAN = {
   "run `minirospy doctor` on the machine of {node}: it does not reach '{host}', or has another definition of the type":
     "auf dem Rechner von {node} `minirospy doctor` ausführen: er erreicht '{host}' nicht, oder hat eine andere Definition des Typs",
   "its node has another definition of {type} than this machine":
-    "seine Node hat eine andere Definition von {type} als dieser Rechner",
+    "sein Node hat eine andere Definition von {type} als dieser Rechner",
   "build both machines from the same definition": "beide Rechner aus derselben Definition bauen",
   "are registered as being at '{host}', a name that this machine does not know":
     "sind an '{host}' angemeldet, einem Namen, den dieser Rechner nicht kennt",
@@ -143,12 +143,12 @@ export const GERMAN = {
   "connection refused": "Verbindung abgelehnt",
   "timed out": "keine Antwort in der Zeit",
   "timed out after {seconds} s": "nach {seconds} s keine Antwort",
-  "it is the node {node}": "es ist die Node {node}",
-  "the master does not know its address": "der Master kennt ihre Adresse nicht",
+  "it is the node {node}": "es ist der Node {node}",
+  "the master does not know its address": "der Master kennt die Adresse des Nodes nicht",
   "no server can be opened here: {why}": "hier lässt sich kein Server öffnen: {why}",
   "correct ROS_IP, or MINIROSPY_PORTS": "ROS_IP oder MINIROSPY_PORTS berichtigen",
   "this machine does not reach its own node at '{host}': {why}":
-    "dieser Rechner erreicht seine eigene Node an '{host}' nicht: {why}",
+    "dieser Rechner erreicht seinen eigenen Node an '{host}' nicht: {why}",
   "set ROS_IP to an address of this machine, or unset ROS_IP and ROS_HOSTNAME":
     "ROS_IP auf eine Adresse dieses Rechners setzen, oder ROS_IP und ROS_HOSTNAME löschen",
   "the master reaches this machine, but {nodes} gets no topic from it":
@@ -156,8 +156,8 @@ export const GERMAN = {
   "a firewall lets only some ports through: open TCP port {port} too (see MINIROSPY_PORTS)":
     "eine Firewall lässt nur manche Ports durch: auch TCP-Port {port} öffnen (siehe MINIROSPY_PORTS)",
   "{machine} does not reach this one at {address}: {why}":
-    "diesen Rechner an {address} erreicht nicht {machine}: {why}",
-  "{machine} does not reach this one at {address}": "diesen Rechner an {address} erreicht nicht {machine}",
+    "{machine} erreicht diesen Rechner an {address} nicht: {why}",
+  "{machine} does not reach this one at {address}": "{machine} erreicht diesen Rechner an {address} nicht",
   "a firewall keeps it from TCP ports {one} and {other} of this machine: open them, or set MINIROSPY_PORTS to ports that are open":
     "eine Firewall sperrt die TCP-Ports {one} und {other} dieses Rechners: sie öffnen, oder MINIROSPY_PORTS auf offene Ports setzen",
   "{advice}; or it takes '{host}' for another machine: {command}":
@@ -168,7 +168,7 @@ export const GERMAN = {
   "the doctor that listens at '{host}' is not reached: {why}":
     "der Doktor, der auf '{host}' wartet, ist nicht erreichbar: {why}",
   "{service} did not answer as a doctor: {answer}": "{service} hat nicht wie ein Doktor geantwortet: {answer}",
-  "end that node": "jene Node beenden",
+  "end that node": "jenen Node beenden",
   "it reaches this machine, and this one does not reach it at {address}: {why}":
     "er erreicht diesen Rechner, und dieser erreicht ihn an {address} nicht: {why}",
   "see there what to do": "dort steht, was zu tun ist",
@@ -177,14 +177,14 @@ export const GERMAN = {
   "nothing came on /tf while listening": "auf /tf kam beim Zuhören nichts",
   "`rosrun tf tf_monitor` shows when something does": "`rosrun tf tf_monitor` zeigt, wann etwas kommt",
   "listeners ignore it: correct what that node publishes":
-    "Empfänger lassen sie aus: berichtigen, was jene Node sendet",
+    "Empfänger lassen sie aus: berichtigen, was jener Node sendet",
   "[{frame}] has {count} parents ({parents}), published by {nodes}: lookups jump from one to the other":
     "[{frame}] hat {count} übergeordnete Koordinatensysteme ({parents}), gesendet von {nodes}: Abfragen springen zwischen ihnen",
-  "let one node publish it, with one parent": "nur eine Node soll es senden, mit einem übergeordneten",
+  "let one node publish it, with one parent": "nur ein Node soll es senden, mit einem übergeordneten",
   "[{frame}] is published by {count} nodes ({nodes}): it may jump":
     "[{frame}] senden {count} Nodes ({nodes}): es kann springen",
   "stop all but one of them (two drivers, two robot_state_publishers, a bag that is played besides?)":
-    "alle bis auf eine beenden (zwei Treiber, zwei robot_state_publisher, ein Bag, das nebenher läuft?)",
+    "alle bis auf einen beenden (zwei Treiber, zwei robot_state_publisher, ein Bag, das nebenher läuft?)",
   "a loop, which makes every lookup there fail: {frames}": "eine Schleife, in der jede Abfrage fehlschlägt: {frames}",
   "take one of them out": "eines davon herausnehmen",
   "{count} trees that are not connected, with the roots {roots} ({hint}: was one of them meant?)":
@@ -194,13 +194,13 @@ export const GERMAN = {
   "publish a transform between them (`rosrun tf2_ros static_transform_publisher`), or correct the name":
     "eine Transformation zwischen ihnen senden (`rosrun tf2_ros static_transform_publisher`), oder den Namen berichtigen",
   "{node} stamps its transforms ({frame}) {seconds} s ahead: lookups of now fail, or take old ones":
-    "{node} stempelt ihre Transformationen ({frame}) {seconds} s voraus: Abfragen für jetzt schlagen fehl oder nehmen alte",
+    "{node} stempelt seine Transformationen ({frame}) {seconds} s voraus: Abfragen für jetzt schlagen fehl oder nehmen alte",
   "set the clocks of both machines by the same server (chrony, ntp); `minirospy doctor` says whose is off":
     "die Uhren beider Rechner nach demselben Server stellen (chrony, ntp); `minirospy doctor` sagt, welche falsch geht",
   "{node} stamps its transforms ({frame}) {seconds} s behind: lookups of now fail (extrapolation into the future)":
-    "{node} stempelt ihre Transformationen ({frame}) {seconds} s zurück: Abfragen für jetzt schlagen fehl (Extrapolation in die Zukunft)",
+    "{node} stempelt seine Transformationen ({frame}) {seconds} s zurück: Abfragen für jetzt schlagen fehl (Extrapolation in die Zukunft)",
   "if its machine's clock is right, the node is late or a bag is played without --clock and /use_sim_time":
-    "geht die Uhr ihres Rechners richtig, ist die Node zu spät, oder ein Bag läuft ohne --clock und /use_sim_time",
+    "geht die Uhr seines Rechners richtig, ist der Node zu spät, oder ein Bag läuft ohne --clock und /use_sim_time",
   "{version}; `import rospy` finds nothing": "{version}; `import rospy` findet nichts",
   "run without -I and -S, or install minirospy again: its .pth file puts rospy on the path":
     "ohne -I und -S starten, oder minirospy neu installieren: seine .pth-Datei bringt rospy in den Pfad",
@@ -226,7 +226,7 @@ export const GERMAN = {
     "{variable} ist weder eine IP-Adresse noch ein Name, den dieser Rechner kennt",
   "{variable} is not a name that this machine knows": "{variable} ist kein Name, den dieser Rechner kennt",
   "{variable} is every address and none: nobody can connect to a node there":
-    "{variable} ist jede Adresse und keine: dort kann sich niemand mit einer Node verbinden",
+    "{variable} ist jede Adresse und keine: dort kann sich niemand mit einem Node verbinden",
   "{variable} is an IPv6 address, and nodes listen on IPv4 alone":
     "{variable} ist eine IPv6-Adresse, und Nodes hören nur auf IPv4",
   "{variable} is this machine alone, but the master is on another one ({host})":

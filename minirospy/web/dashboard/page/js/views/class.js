@@ -116,7 +116,8 @@ function board(student) {
   const nodes = t("{count} nodes", { count: student.nodes.length });
   return [
     h("span", { role: "img", "aria-label": on.join(", ") || t("no LED is lit") }, lit),
-    h("span", { role: "img", "aria-label": hint, title: hint }, buttons),
+    // Without the student's levels, "no button is pressed" would be a guess.
+    student.buttons !== "" && h("span", { role: "img", "aria-label": hint, title: hint }, buttons),
     h("span", { class: "muted" }, nodes),
   ];
 }
