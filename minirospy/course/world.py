@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["Arrival", "World"]
 
 _POLL_SECONDS = 0.02
-_LAST_EFFECT_SECONDS = 1.0  # after this, nothing that a program did before its exit can still have an effect
+LAST_EFFECT_SECONDS = 1.0  # after this, nothing that a program did before its exit can still have an effect
 _KEPT_MESSAGES = 5000  # messages kept per topic: a minute of a topic with 80 Hz
 _STOP_SECONDS = 10.0  # wait for a program after Ctrl-C
 _LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
@@ -162,7 +162,7 @@ class World:
         end = time.monotonic() + seconds * self.patience
         while not holds():
             if needs_work and self._work_has_ended():
-                end = min(end, time.monotonic() + _LAST_EFFECT_SECONDS * self.patience)
+                end = min(end, time.monotonic() + LAST_EFFECT_SECONDS * self.patience)
             if time.monotonic() >= end:
                 # On a busy machine the last poll may be long ago.
                 return holds()

@@ -123,7 +123,7 @@ def test_syntax_error_is_named_with_its_line(lamp: Exercise, tmp_path: Path) -> 
 def test_programs_of_the_exercise_start_although_the_students_has_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.course.world._LAST_EFFECT_SECONDS", 0.0)
+    monkeypatch.setattr("minirospy.course.world.LAST_EFFECT_SECONDS", 0.0)
     # The student's program ends once that of the exercise has started, which registers its node after that.
     own, pid, has_started = (tmp_path / name for name in ("own.py", "pid", "has_started"))
     own.write_text(
