@@ -51,7 +51,8 @@ export class Class {
     // Nothing is drawn again that has not changed, so that what a person has selected stays.
     const isLive = (student) => student.beat > 0 && now - this.beats.get(student.key).at < GONE_MS;
     const live = students.filter(isLive).map(({ key }) => key);
-    const all = JSON.stringify([exercises, students.map((each) => [each, [...each.results]]), live]);
+    const shown = students.map((each) => [{ ...each, beat: 0 }, [...each.results]]);
+    const all = JSON.stringify([exercises, shown, live]);
     if (all === this.drawn) return;
     this.drawn = all;
     const passed = students.flatMap(({ results }) => [...results.values()].filter(({ ever }) => ever)).length;
