@@ -38,7 +38,7 @@ class Rate:
         """Sleep for the rest of the period. Raise the same exceptions as :meth:`Node.sleep`."""
         now = self._node.now().to_nsec()
         # Time has jumped back, or the loop body took several periods.
-        # Start a new period now, so that the sleep is not very long, and missed periods are not made up for.
+        # Start a new period now, to avoid a very long sleep, or a burst of iterations that makes up for missed periods.
         if not self._last <= now <= self._last + 2 * self._period:
             self._last = now
         self._last += self._period

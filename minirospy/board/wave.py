@@ -52,7 +52,7 @@ class Wave:
         self._changed.set()
 
     def start(self) -> None:
-        """Start the wave; also possible after stop()."""
+        """Start the wave, for the first time or again after stop()."""
         if self._thread is None:
             self._stopping = False
             self._gpio.register_wave(self)

@@ -534,7 +534,7 @@ def _announce(serving: Serving, port: int, view: str, fields: Fields, tokens: To
 
 
 def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
-    """Open the browser with a one-time code in place of the token. Return whether there is a browser. Runs on the loop."""
+    """Open the link with a one-time code instead of the token. Return False if there is no browser. Call this on the loop."""
     import asyncio
 
     from minirospy.web.dashboard.browser import open_link

@@ -61,7 +61,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_interrupt(error: BaseException | None) -> bool:
-        # An interrupted wait may raise RuntimeError, because it did not acquire its lock. Check the error that caused it.
+        # A wait that is interrupted before it acquires its lock may raise RuntimeError. Check the original error, in __context__.
         while isinstance(error, RuntimeError):
             error = error.__context__
         return error is not None and is_expected(error)

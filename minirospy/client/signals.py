@@ -226,7 +226,7 @@ class SignalWatchdog:
             self._interrupt = Action.INTERRUPT
             self._nudge()
         else:
-            # The program, or a library such as IPython, has replaced the handler; let that one decide what to do.
+            # The program, or a library such as IPython, has replaced the handler; let the new handler decide what to do.
             _send_to_main(self._number)
 
     def _nudge(self) -> None:
@@ -234,7 +234,7 @@ class SignalWatchdog:
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
                 # Do not send a second nudge before the first has arrived.
-                # The handler counts signals, but the system merges undelivered ones.
+                # The system would merge the two signals into one, and the handler, which counts signals, would miss one.
                 return
             self._nudges += 1
             self._is_nudge = True

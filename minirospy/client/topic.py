@@ -54,7 +54,7 @@ class AnyMsg(Message):
 
 
 class Topic(Generic[_M_co]):
-    """The common part of Publisher and Subscriber: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
+    """Base class of Publisher and Subscriber, with ``name`` (resolved), ``type``, ``md5sum`` and ``data_class``.
 
     ``impl`` is shared by all of the topic's handles in this process. It is None once unregistered.
     """

@@ -12,7 +12,7 @@ __all__ = ["advice_for_callback", "advice_for_message_class", "advice_for_servic
 def advice_for_callback(
     error: BaseException, function: Callable[..., object], message: Any, *, has_args: bool
 ) -> str:
-    """Return why a callback failed, if it has the wrong parameters or uses a message in place of one of its fields.
+    """Return a hint for a callback that has the wrong parameters, or that uses the message as if it were one of its fields.
 
     Return an empty string if the error has another cause.
     """

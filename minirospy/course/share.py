@@ -19,7 +19,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["share"]
 
-_POLL_SECONDS = 0.2  # an LED that blinks faster than 2.5 Hz is not shown completely
+_POLL_SECONDS = 0.2  # between pin readings; if an LED blinks faster than 2.5 Hz, some changes are missed
 _BEAT_SECONDS = 3.0  # between heartbeats; after three missed ones, the page marks a computer as gone
 _ASK_SECONDS = 2.0  # timeout for calls to a master
 

@@ -82,7 +82,7 @@ _STAMP = struct.Struct("<Iq")
 
 
 class Claim(NamedTuple):
-    """A gateway's claim to represent a robot since ``start`` (in ns of the gateway's clock), on the machine ``host``.
+    """A gateway's claim to represent a robot. ``start``: since when, in ns of the gateway's clock; ``host``: its machine.
 
     Neither ``start`` nor ``host`` is verified; no decision depends on ``start``.
     """

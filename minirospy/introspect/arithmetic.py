@@ -111,7 +111,7 @@ def _angle(text: str, name: str, evaluate: Callable[[str], float]) -> float | st
 
 
 class _Evaluator:
-    """Evaluates a syntax tree, and selects each operator by the type of its node."""
+    """Evaluates a syntax tree. Looks up each operator by its node type."""
 
     def __init__(self) -> None:
         import ast

@@ -105,7 +105,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
 
 def words_of(nanoseconds: int) -> dict[str, object]:
-    """Return the words that represent values: ``now`` is the time, ``auto`` a stamped header."""
+    """Return the keywords with their values: ``now`` is the time, and ``auto`` is a header with that time stamp."""
     from minirospy.base.times import Time
     from minirospy.core.idl.load import get_message_class
 

@@ -12,7 +12,7 @@ __all__ = ["ProcessLoad", "ProcessLoads"]
 
 
 class ProcessLoad(NamedTuple):
-    """CPU use in percent of one core since the previous call (None at the first one), and resident memory in bytes."""
+    """``cpu``: percent of one core since the previous call, or None on the first; ``memory``: resident memory in bytes."""
 
     cpu: float | None
     memory: int

@@ -149,7 +149,7 @@ class ToolNode:
         self._end()
 
     def inbox(self, topic: str) -> Inbox:
-        """Subscribe to a topic. Return an inbox with its messages, for a single reading thread."""
+        """Subscribe to a topic and return an inbox for its messages. Only one thread may read the inbox."""
         inbox = Inbox(self.clock)
         self._on_end.append(inbox.close)
         self.listen(topic, inbox.put)
@@ -208,7 +208,7 @@ class _Listeners:
             function(body, header)
 
     def deliver(self, body: Frame, header: Header) -> None:
-        """Call all functions with a new message. Runs in a worker."""
+        """Pass a new message to each of the functions. Called in a worker."""
         # A function that is being added gets this message either here or in add(), but not in both.
         with self._lock:
             functions = self._functions

@@ -73,7 +73,7 @@ class Link:
 
 
 def is_bridge(node: str) -> bool:
-    """Return whether a node is a bridge, according to its name on either side."""
+    """Return whether a node's name is that of a bridge. Bridges use the same name prefix in ROS 1 and ROS 2."""
     return node.rpartition("/")[2].startswith(BRIDGE_PREFIX)
 
 

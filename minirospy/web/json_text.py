@@ -36,7 +36,7 @@ MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
 PIECE_NUMBERS = 32 * 1024  # maximum number of characters, all numbers, to parse per call
 
-_PIECE_VALUES = 1000  # maximum number of values of a list to encode per call: 1 ms for floats
+_PIECE_VALUES = 1000  # maximum number of list values to encode per call; 1000 floats take 1 ms
 _PIECE_CHARACTERS = 64 * 1024  # maximum number of characters of a string to encode per call
 
 _SPACE = re.compile(r"[ \t\n\r]*")

@@ -424,7 +424,7 @@ class _Collector:
             self._properties.setdefault(target, {}).update(zip(words[::2], words[1::2], strict=False))
 
     def _file_name(self, target: str) -> str:
-        """Return the file name of a compiled target's output, without ``lib`` and extensions."""
+        """Return the name of a compiled target's output file, without the default prefix ``lib`` and without extensions."""
         properties = self._properties.get(target, {})
         return properties.get("PREFIX", "") + properties.get("OUTPUT_NAME", target)
 

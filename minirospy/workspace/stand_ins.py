@@ -55,7 +55,7 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
 
 
 def _modules(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the modules that replace extension modules, each after its enclosing packages, except for the outermost one."""
+    """Yield the modules that replace extension modules, each after its parent packages. Omit the outermost package."""
     top = _OVERLAY / plan.name
     for path in sorted(top.rglob("*.py")):
         if path.stem in plan.compiled and path.parent.name != "__pycache__":

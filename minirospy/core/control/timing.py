@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 __all__ = ["MAX_CYCLES", "CycleTimes", "Spread", "spread"]
 
-MAX_CYCLES = 100_000  # number of cycles that are kept until they are read: some minutes
+MAX_CYCLES = 100_000  # maximum number of cycles to keep between two reads: a few minutes' worth
 
 
 class Spread(NamedTuple):

@@ -401,7 +401,7 @@ def _is_within(
 
 
 def _stop(start: int, position: float, velocity: float, duration: int, goal: MonitoredGoal | None) -> Segment:
-    """Return a segment that brings a joint to rest: the first half of a motion that returns with the opposite velocity."""
+    """Return a segment that stops a joint: the first half of a motion that returns to ``position`` with ``-velocity``."""
     first = State(position, velocity)
     turning = Segment(start, first, start + 2 * duration, State(position, -velocity))
     return Segment(start, first, start + duration, State(*turning.sample(start + duration)), goal)

@@ -255,7 +255,7 @@ def _on_demand(sources: dict[str, str]) -> dict[str, str]:
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # Call a function; the code that emit_package generates would be repeated in each such file.
+            # Write a call to load_package() instead of the code from emit_package, which each such file would repeat.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"

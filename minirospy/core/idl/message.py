@@ -136,7 +136,7 @@ class Message:
 
         As in genpy, which does not convert struct's errors, a number that exceeds a float32 raises OverflowError.
         """
-        # After an error, find the field that cannot be written. Otherwise check everything that genpy checks.
+        # If ``exc`` is given, find the field that cannot be written. Otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)

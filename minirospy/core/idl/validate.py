@@ -26,7 +26,7 @@ MAX_TEXT = 1 << 20
 
 MAX_LEVELS = 50  # maximum depth of nested messages
 
-# Maximum number of fields per message, including those of inner messages, which the generated source expands
+# Maximum number of fields per message, including those of nested messages: the generated source has code for each of them
 _MAX_FIELDS = 4_000
 
 # Maximum number of fields in all types that a message uses; MoveIt's largest message has some 17,000

@@ -19,7 +19,7 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
-MAX_HULLS = 32  # for a moving mesh; a mesh with more parts collides as one hull
+MAX_HULLS = 32  # maximum for a moving mesh; a mesh with more parts gets a single hull
 # A static mesh with more flat patches is simplified until it has fewer, because worlds have many small models with fine meshes.
 MAX_PRISMS = 1500
 MIN_PRISMS = 100  # for a small mesh

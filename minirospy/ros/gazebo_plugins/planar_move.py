@@ -22,7 +22,7 @@ class PlanarMove(DrivePlugin):
         self.load_drive()
 
     def reset(self) -> None:
-        """Stop."""
+        """Stop the model and discard the odometry's state."""
         super().reset()
         self._odometry_timer = Timer(self.rate)
         self._last: tuple[int, Pose, float] | None = None  # time in ns, pose and yaw of the last message

@@ -100,7 +100,7 @@ def resource_paths(
 
 
 def exported_paths(folders: Iterable[Path | str], attribute: str, separator: str = os.pathsep) -> list[str]:
-    """Return the folders that packages export for gazebo_ros in an attribute. Unreadable packages are skipped."""
+    """Return the folders that packages list in this attribute of their ``<gazebo_ros>`` exports. Skip unreadable packages."""
     found: list[str] = []
     for folder in folders:
         for element in _exports(Path(folder)):

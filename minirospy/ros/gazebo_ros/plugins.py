@@ -136,7 +136,7 @@ class PluginBase:
         return time_of(self.simulation.time_ns)
 
     def header(self, frame_id: str) -> Header:
-        """Return a message's header with the time of the simulation."""
+        """Return a message header with the simulation's time."""
         return Header(0, self.now, frame_id)
 
     def call(self, function: Callable[[], _T]) -> _T:
@@ -301,7 +301,7 @@ class PeriodicPlugin(ModelPlugin):
         return publisher
 
     def is_needed(self) -> bool:
-        """Return whether anything uses the data: a subscriber, or another plugin if there are no outputs."""
+        """Return whether an output has a subscriber. Return True without outputs, because another plugin uses the data."""
         return not self._outputs or any(each.get_num_connections() for each in self._outputs)
 
     def sense(self) -> None:

@@ -100,7 +100,7 @@ class Notifier:
         Keyed by URI.
         """
         self.nodes: dict[str, _Backlog] = {}
-        # The earliest time at which each (URI, topic)'s next notification may be sent, earliest first.
+        # For each (URI, topic): the earliest time at which its next notification may be sent. Sorted by time.
         self._held: dict[tuple[str, str], float] = {}
 
         self.line = _Line(MAX_CONCURRENT_CALLS)

@@ -194,7 +194,7 @@ class OutLink:
         """Append ``frame`` to the outbox and return True. Return False if the outbox has become empty in the meantime."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
-            # Send from this thread: a thread that publishes without pause would not let the loop's thread send.
+            # Send from this thread: if it publishes without pause, the loop's thread gets no chance to send.
             self._help()
             if not outbox:
                 return False

@@ -46,7 +46,7 @@ QUIET_SECONDS = 5.0  # time without a large message after which a ring's memory 
 # Seconds for which a publishing thread waits for a subscriber to release a place: the same as for a full socket.
 _WAIT_SECONDS = 0.005
 _WAIT_MS = 1  # milliseconds per wait during that time
-_FILES = 2  # file descriptors sent with an offer: the ring, and the counter of released places
+_FILES = 2  # number of file descriptors in an offer: the ring, and the eventfd that counts released places
 
 _log = logging.getLogger(__name__)
 
@@ -409,7 +409,7 @@ class Sharing:
 
 
 class RingSender:
-    """The publisher's end of one connection. Hold the link's lock, except for :meth:`answered` and :meth:`collect`."""
+    """The publisher's end of a connection. Hold the link's lock for every call except :meth:`answered` and :meth:`collect`."""
 
     def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
         self.step = Step.NEW

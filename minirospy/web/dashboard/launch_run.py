@@ -132,7 +132,7 @@ class LaunchRun:
         self._exited: dict[str, Process] = {}
         self._known: dict[str, Process] = {}
         self._lock = threading.Lock()
-        # Use a daemon thread: if this process exits without stopping the launch, the launcher's guardian ends the nodes.
+        # Use a daemon thread, so that this process can exit during a launch; the launcher's guardian then ends the nodes.
         self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
         self._thread.start()
 

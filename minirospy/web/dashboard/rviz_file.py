@@ -121,7 +121,7 @@ def format_rviz(config: Mapping[str, object]) -> str:
 
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
     """Yield the lines for a nonempty map or list at a nesting depth of ``depth``."""
-    # Limit the depth: each line passes through one generator per level and is indented once per level.
+    # Limit the depth, because it determines the cost per line: one generator and one indentation per level.
     if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):

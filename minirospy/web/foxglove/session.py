@@ -59,7 +59,7 @@ _TIME = "time"  # key of time messages in a client's queue, which keeps only the
 
 
 class FoxgloveServer(Protocol):
-    """The endpoint's interface for its clients' sessions."""
+    """The interface through which a client's session uses the endpoint."""
 
     graph: SharedGraph
     assets: Assets

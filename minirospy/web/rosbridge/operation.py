@@ -66,7 +66,7 @@ class OperationSession(Protocol):
 
     @property
     def is_large(self) -> bool:
-        """Return whether the current operation's message is so large that the ROS message is created in a thread."""
+        """Return whether the current operation's message is large enough to create the ROS message in a thread."""
 
     def send(self, fields: Mapping[str, object]) -> None:
         """Send a message that does not belong to a topic."""

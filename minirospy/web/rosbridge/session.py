@@ -32,7 +32,7 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-# ratio of the memory of a parsed operation to that of its text, for objects and lists of numbers
+# A parsed operation takes about this many times the memory of its text, if it holds objects or lists of numbers.
 _VALUE_FACTOR = 4
 
 # maximum bytes per CBOR message from a read-only client, which only sends small requests; each byte may become a value

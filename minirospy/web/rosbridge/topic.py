@@ -99,7 +99,7 @@ class ClientTopic:
         self._wait()
 
     def _send(self, arrival: Arrival) -> None:
-        # Encode in the client's turn: encoding and fragmenting a large message takes milliseconds per client.
+        # Encode only in the client's turn, because encoding and fragmenting a large message takes milliseconds per client.
         self._session.client.in_turn(lambda: self._send_now(arrival), arrival.body)
 
     def _send_now(self, arrival: Arrival) -> None:

@@ -32,11 +32,11 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
 # seconds of work for one client before the next client's turn; with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# number of jobs for which a client counts as new: each is expected to take as long as those of other new clients
+# number of jobs for which a client counts as new: each is expected to take at least as long as other new clients' jobs
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which the expected seconds decay after each job that takes less
 IMMEDIATE_SHARE = 0.5  # fraction of the time for work that starts without being queued
-# Maximum burst of an interactive client in slices, 1 ms in total.
+# Maximum burst length of an interactive client, in slices (1 ms in total).
 # A request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms.
 # A new client starts with one time slice, and gets another with each short burst of work.
 # If 250 new clients flood the server, each gets one slice; after that, its other clients are served first.
@@ -98,7 +98,7 @@ class _FairQueue:
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
-        # tag of the work that was started last; if the queue was empty then, the highest tag
+        # highest start tag of the work that was run; update() sets it to ``highest`` if the queue is empty
         self.served = 0.0
         self.highest = 0.0  # highest tag of a client that was served
 
@@ -134,7 +134,7 @@ class FairTurns:
         self._new_expected = slice_  # seconds that a new client's piece of work may take
         self._interactive = _FairQueue()
         self._bulk = _FairQueue()
-        self._bulk_credit = 0.0  # seconds for which bulk clients are served first
+        self._bulk_credit = 0.0  # seconds owed to bulk clients, which go first while this is at least a slice
         self._numbers = itertools.count()
         self._is_running = False  # True while a client's work is running
         self._is_scheduled = False  # True from call_soon() until the callback runs

@@ -95,7 +95,7 @@ def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
 
 
 END = b"\r\n" + START
-"""The end of an image. It includes the next boundary, because a browser shows an image only after that boundary."""
+"""The end of an image, including the next boundary: a browser shows an image only once it has received that boundary."""
 
 
 def topics_page(topics: Mapping[str, str], token: str) -> bytes:

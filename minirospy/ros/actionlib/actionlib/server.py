@@ -42,7 +42,7 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # maximum number of statuses to publish immediately after each change
+_FEW_STATUSES = 50  # with at most this many statuses, publish them immediately after each change
 
 # For longer lists: seconds to pause per status, so that publishing does not use all CPU time.
 _SECONDS_A_STATUS = 1e-4

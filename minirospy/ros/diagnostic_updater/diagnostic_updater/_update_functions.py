@@ -110,7 +110,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports time stamps that are zero, too old or too far in the future. Counts the runs with such time stamps."""
+    """Reports time stamps that are zero, too old or too far in the future, and the number of updates with each kind."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)

@@ -320,7 +320,7 @@ def set_inertial(body: Any, inertial: Inertial) -> None:
 
 
 def count_substeps(step: float) -> int:
-    """Return the number of MuJoCo steps per step (s) of the world."""
+    """Return the number of MuJoCo steps for one step of the world, which takes ``step`` seconds."""
     return max(1, math.ceil(step / MAX_SUBSTEP - 1e-9))
 
 

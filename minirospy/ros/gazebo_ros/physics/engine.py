@@ -236,7 +236,7 @@ class Engine:
             counts[:] = all_counts
 
     def _count_ray_geoms(self) -> NDArray[np.int32]:
-        """Return, for each body, the number of geoms that rays must check: up to the last one that they can hit."""
+        """Return, for each body, how many of its first geoms a ray must check: all up to the last geom that rays can hit."""
         model = self.model
         counts = np.zeros(model.nbody, np.int32)
         geoms = np.flatnonzero(RAY_GROUPS[model.geom_group])

@@ -146,7 +146,7 @@ class Shapes:
         return self._count
 
     def delete_after(self, last: int) -> None:
-        """Delete the meshes and heightmaps with numbers above ``last``, which no geom may use."""
+        """Delete the meshes and heightmaps with numbers above ``last``. Call this only if no geom uses them."""
         numbers = [number for number in self._elements if number > last]
         names = {self._elements[number].name for number in numbers}
         for number in numbers:

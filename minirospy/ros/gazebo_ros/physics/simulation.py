@@ -385,7 +385,7 @@ class Simulation:
         """Add the visuals of each model that MuJoCo accepts; the others are listed in ``warnings``."""
         for model in self._models.values():
             last = self._builder.shapes.last
-            self._builder.add_visuals(model.built, model.record, model.name)  # its warnings are already known
+            self._builder.add_visuals(model.built, model.record, model.name)  # warnings already recorded
             try:
                 self.engine.recompile()
             except ValueError as error:

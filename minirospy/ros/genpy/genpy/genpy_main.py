@@ -24,7 +24,7 @@ def usage(progname: str) -> None:
 
 
 def genmain(argv: Sequence[str], progname: str, gen: Generator) -> NoReturn:
-    """Run a generator with a command line that includes the program name, and exit.
+    """Run a generator for the command line ``argv``, which starts with the program's name, and exit.
 
     The exit status is 0, 1 to 3 after an error, or 2 after a usage error. Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER
     FILE ...``, or ``--initpy -o FOLDER``.

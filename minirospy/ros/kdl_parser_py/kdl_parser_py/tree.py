@@ -32,7 +32,7 @@ class Joint:
         return self._joint.name
 
     def getTypeName(self) -> str:
-        """Return RotAxis, TransAxis, or None. KDL names a fixed joint None."""
+        """Return "RotAxis", "TransAxis", or "None" for a fixed joint, as in KDL."""
         return _TYPE_NAMES.get(self._joint.type, "None")
 
 

@@ -36,7 +36,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a conversion from an array to a message type, or if ``plural`` to a list of messages."""
+    """Return a decorator that registers a converter from arrays to ``msgtype``, or to lists of ``msgtype`` if ``plural``."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function

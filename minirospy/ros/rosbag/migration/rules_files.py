@@ -250,7 +250,7 @@ class MessageMigrator:
             self.migrate(old, new)
 
     def make_update_rule(self, old_class: MessageClass, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return a rule that copies fields with equal names."""
+        """Return a rule that copies fields by name."""
         return make_update_rule(self, old_class, new_class)
 
     def make_old_half_rule(self, old_class: MessageClass) -> type[MessageUpdateRule]:

@@ -37,7 +37,7 @@ class RospyLogger(logging.Logger):
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder, and records of `rosout` also to the terminal; return the file's path.
+    """Log to a file in the log folder; log `rosout` records to the terminal too. Return the file's path.
 
     Replace the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file
     (ROS_PYTHON_LOG_CONFIG_FILE, or a file in ROS_HOME) takes precedence over these settings. Set ROS_LOG_FILENAME to the path.
@@ -101,7 +101,7 @@ def makedirs_with_parent_perms(p: str) -> None:
     except FileExistsError:
         return  # another process has created the folder in the meantime
     wanted, made = os.stat(parent), os.stat(path)
-    # Only root may change a folder's owner, for example to that of /tmp; otherwise the folder stays the user's own.
+    # Only root may change a folder's owner. Without root, a folder in /tmp, which root owns, keeps the user as its owner.
     with contextlib.suppress(PermissionError):
         if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
             os.chown(path, wanted.st_uid, wanted.st_gid)

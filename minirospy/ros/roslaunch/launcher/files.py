@@ -167,7 +167,7 @@ def _command_hint(package: str, file: str, packages: Packages) -> str:
 
 
 def _near_file_of(package: str, file: str, packages: Packages) -> str:
-    """Return the hint for a misspelled launch file of a package."""
+    """Return a hint that lists similarly named launch files of a package, or an empty string if there are none."""
     try:
         folder = packages.find(package)
     except NotFoundError:

@@ -265,7 +265,7 @@ def _subreaper() -> Iterator[None]:
             raise OSError(ctypes.get_errno(), "prctl")
 
     with _FORKING:
-        # The program may use the subreaper setting for its own processes.
+        # Restore the setting afterwards: the program may use it for its own processes.
         before = ctypes.c_int()
         call(_PR_GET_CHILD_SUBREAPER, ctypes.addressof(before))
         call(_PR_SET_CHILD_SUBREAPER, 1)

@@ -156,7 +156,7 @@ class LaunchedProcess(Process):
         return self.process.exit_code if self.process else None
 
     def is_alive(self) -> bool:
-        """Return whether the process is running. As in ROS, a process that was not started yet counts as alive."""
+        """Return whether the process is running. As in ROS, return True for a process that has not been started yet."""
         return self.process is None or self.process.is_running
 
     def start(self) -> bool:

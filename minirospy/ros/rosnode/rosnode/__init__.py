@@ -317,7 +317,7 @@ def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
 
 
 def _fullusage(return_error: bool = True) -> NoReturn:
-    """Print the list of commands and exit, with status 0 or that of a usage error."""
+    """Print the list of commands, and exit: with the status of a usage error if ``return_error`` is true, otherwise with 0."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     status = main([])

@@ -188,7 +188,7 @@ class _Platform(OsDetector):
     system = ""
 
     def is_os(self) -> bool:
-        """Return whether the detector's system is running."""
+        """Return whether this machine runs the detector's system."""
         return platform.system() == self.system
 
     def get_version(self) -> str:

@@ -68,7 +68,7 @@ class ManifestManager:
         return list(self._ros_paths)
 
     def get_ros_paths(self) -> Names:
-        """Return the searched folders."""
+        """Return ``ros_paths``, the folders searched for packages or stacks."""
         return self.ros_paths
 
     def list(self) -> Names:

@@ -187,7 +187,7 @@ class Iterator(Container):
         return [self._state_label]
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the state while it executes."""
+        """Return a list with the state's label while the state executes, and an empty list otherwise."""
         return [self._state_label] if self._is_running else []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:

@@ -26,7 +26,7 @@ BUILTIN: dict[int, tuple[float, ...]] = {
 
 
 def wav_of(notes: tuple[float, ...]) -> bytes:
-    """Return a WAV file with notes of equal length, in mono and 16 bits."""
+    """Return the notes as a WAV file: mono, 16 bits, all notes equally long."""
     count = int(_RATE * _NOTE_SECONDS)
     samples = array.array("h")
     for note in notes:

@@ -97,7 +97,7 @@ class BufferServer:
                 wait_for_event(self._news, self._next_look())
 
     def _due(self) -> list[actionlib.ServerGoalHandle]:
-        """Remove and return the goals whose lookup is possible or that have timed out."""
+        """Remove and return the goals whose transform can be looked up now, or that have timed out."""
         now = rospy.get_rostime()
         with self._lock:
             waiting, self._pending = self._pending, []

@@ -24,7 +24,7 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000  # number of delays to average, and of messages to compute a rate from
+_KEPT = 1000  # number of recent delays to average, and of recent messages to compute a rate from
 _STEP = 0.01
 _STEPS = 20  # number of measurements per report of the delay between two frames
 _SMOOTHING = 0.01
