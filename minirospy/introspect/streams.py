@@ -13,7 +13,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from minirospy.base.clock import Clock, SimulatedClock, WallClock, time_of_clock_message
+from minirospy.base.clock import Clock, SignalSafeEvent, SimulatedClock, WallClock, time_of_clock_message
 from minirospy.base.errors import MessageException, MinirospyError, RpcRefused
 from minirospy.core.idl.protocols import is_stamped
 from minirospy.core.wire.framing import Frame, serialize_frame
@@ -59,7 +59,8 @@ class ToolNode:
     ) -> None:
         name = name or f"{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
         self.name = f"{environment.namespace.rstrip('/')}/{name}"
-        self.ended = threading.Event()
+        # Ctrl-C may interrupt wait() anywhere: the lock of a threading.Event would stay locked, and close() would wait forever.
+        self.ended = SignalSafeEvent()
         self.classes = MessageClasses()
         self.clock: Clock = WallClock()
         self.simulated = False

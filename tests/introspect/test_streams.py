@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any
@@ -98,3 +100,30 @@ def test_a_node_that_is_interrupted_as_it_starts_is_closed(
     address = urlsplit(nodes[0].uri)
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection((address.hostname or "", address.port or 0), timeout=30)
+
+
+INTERRUPTED = """
+import sys, threading
+from minirospy.base.environment import Environment
+from minirospy.introspect.streams import ToolNode
+
+node = ToolNode(Environment.read(), "interrupted")
+
+def interrupt(frame, event, _):
+    # Ctrl-C between the acquisition of a lock and the start of its `with` block leaves the lock acquired.
+    if event == "return" and frame.f_code.co_name == "__enter__" and frame.f_code.co_filename == threading.__file__:
+        sys.setprofile(None)
+        raise KeyboardInterrupt
+
+sys.setprofile(interrupt)
+try:
+    node.wait(0.01)
+except KeyboardInterrupt:
+    pass
+sys.setprofile(None)
+node.close()
+"""
+
+
+def test_ctrl_c_at_any_point_of_a_wait_does_not_hang_the_close(master: str) -> None:
+    subprocess.run([sys.executable, "-c", INTERRUPTED], check=True, timeout=100)
