@@ -7,7 +7,6 @@ A subscriber copies the message and releases the place. This module makes the de
 
 from __future__ import annotations
 
-import re
 import struct
 from collections import deque
 from collections.abc import Hashable
@@ -31,7 +30,6 @@ __all__ = [
     "READY",
     "REFUSED",
     "Announcement",
-    "LargeMessages",
     "Layout",
     "Places",
     "Step",
@@ -39,7 +37,6 @@ __all__ = [
     "layout_for",
     "offer",
     "parse_announcement",
-    "parse_large_messages",
     "parse_offer",
     "prepare",
 ]
@@ -74,33 +71,6 @@ _OFFER = struct.Struct("<II")
 _ANNOUNCEMENT = struct.Struct("<IIII")
 OFFER_BYTES = _OFFER.size - _WORD.size  # without the word
 ANNOUNCEMENT_BYTES = _ANNOUNCEMENT.size - _WORD.size  # without the word
-
-
-# The end of a connection's text in getBusInfo; it comes from another process, so its length and its characters are limited
-_LARGE_MESSAGES = re.compile(
-    r"; (\d{1,18}) of (\d{1,18}) large messages by shared memory(?:: ([ -~]{1,200}))?\Z"
-)
-
-
-class LargeMessages(NamedTuple):
-    """How many of a connection's large messages went through a ring, and why the others did not ("" if most did)."""
-
-    shared: int
-    all: int
-    why: str = ""
-
-    @property
-    def text(self) -> str:
-        """The end of a connection's text in getBusInfo; :func:`parse_large_messages` reads it."""
-        return f"; {self.shared} of {self.all} large messages by shared memory" + (
-            f": {self.why}" if self.why else ""
-        )
-
-
-def parse_large_messages(info: str) -> LargeMessages | None:
-    """Parse the end of a connection's text in getBusInfo. Return None if it does not mention large messages."""
-    match = _LARGE_MESSAGES.search(info)
-    return LargeMessages(int(match[1]), int(match[2]), match[3] or "") if match else None
 
 
 class Announcement(NamedTuple):

@@ -25,7 +25,7 @@ from minirospy.core.graph.calls import (
     some,
     uris,
 )
-from minirospy.core.wire.ring import LargeMessages
+from minirospy.core.wire.large_messages import LargeMessages
 from minirospy.runtime.transport.local import PROTOCOL
 
 if TYPE_CHECKING:

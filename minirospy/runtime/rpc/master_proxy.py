@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from minirospy.base.environment import split_uri
 from minirospy.base.errors import SUSPENDED, MasterUnreachableError, RpcRefused, RpcTimeout, RpcUnreachable
-from minirospy.core.wire.ring import LargeMessages, parse_large_messages
+from minirospy.core.wire.large_messages import LargeMessages, parse_large_messages
 from minirospy.runtime.rpc.client import RpcClient
 from minirospy.runtime.transport.limits import is_file_limit
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from minirospy.base.errors import WireError
 from minirospy.core.wire import ring
 from minirospy.core.wire.framing import MAX_FRAME, SPLIT
+from minirospy.core.wire.large_messages import LargeMessages, parse_large_messages
 from minirospy.core.wire.ring import Announcement, Places, Step, layout_for
 
 
@@ -48,16 +49,16 @@ def test_an_announcement_outside_the_ring_is_refused(offset: int, size: int, tai
 @pytest.mark.parametrize(
     ("large", "text"),
     [
-        (ring.LargeMessages(118, 120), "; 118 of 120 large messages by shared memory"),
+        (LargeMessages(118, 120), "; 118 of 120 large messages by shared memory"),
         (
-            ring.LargeMessages(0, 3, "the subscriber belongs to another user"),
+            LargeMessages(0, 3, "the subscriber belongs to another user"),
             "; 0 of 3 large messages by shared memory: the subscriber belongs to another user",
         ),
     ],
 )
-def test_large_messages_are_read_back_from_a_connections_text(large: ring.LargeMessages, text: str) -> None:
+def test_large_messages_are_read_back_from_a_connections_text(large: LargeMessages, text: str) -> None:
     assert large.text == text
-    assert ring.parse_large_messages(f"UNIXROS connection to [unix on socket 9]{text}") == large
+    assert parse_large_messages(f"UNIXROS connection to [unix on socket 9]{text}") == large
 
 
 @pytest.mark.parametrize(
@@ -75,7 +76,7 @@ def test_large_messages_are_read_back_from_a_connections_text(large: ring.LargeM
     ],
 )
 def test_other_texts_of_connections_say_nothing_about_large_messages(info: str) -> None:
-    assert ring.parse_large_messages(info) is None
+    assert parse_large_messages(info) is None
 
 
 @pytest.mark.parametrize("size", [0, ring.MAX_RING + 1, 0xFFFFFFFF])

@@ -1,0 +1,35 @@
+"""How a publisher sent large messages to a subscriber, as text in getBusInfo.
+
+It is not part of :mod:`minirospy.core.wire.ring`, because every program imports it, and `import rospy` must be fast.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+__all__ = ["LargeMessages", "parse_large_messages"]
+
+# The end of a connection's text in getBusInfo; it comes from another process, so its length and its characters are limited
+_LARGE_MESSAGES = r"; (\d{1,18}) of (\d{1,18}) large messages by shared memory(?:: ([ -~]{1,200}))?\Z"
+
+
+class LargeMessages(NamedTuple):
+    """How many of a connection's large messages went through a ring, and why the others did not ("" if most did)."""
+
+    shared: int
+    all: int
+    why: str = ""
+
+    @property
+    def text(self) -> str:
+        """The end of a connection's text in getBusInfo; :func:`parse_large_messages` reads it."""
+        return f"; {self.shared} of {self.all} large messages by shared memory" + (
+            f": {self.why}" if self.why else ""
+        )
+
+
+def parse_large_messages(info: str) -> LargeMessages | None:
+    """Parse the end of a connection's text in getBusInfo. Return None if it does not mention large messages."""
+    match = re.search(_LARGE_MESSAGES, info)
+    return LargeMessages(int(match[1]), int(match[2]), match[3] or "") if match else None
