@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import launch_nodes
 import psutil
+from cases import free_port, wait_for_port
 
 SECONDS = 0.7
 IMAGE = 921_600
@@ -325,25 +326,11 @@ def measure_large(meter: Meter, pictured: Callable[[Any, Any], int]) -> None:
         meter.costs["6 MB image"] = float("inf")
 
 
-def wait_for_port(port: int) -> None:
-    """Return when a server listens on the port."""
-    end = time.monotonic() + 20
-    while time.monotonic() < end:
-        try:
-            socket.create_connection(("127.0.0.1", port), 1).close()
-            return
-        except OSError:
-            time.sleep(0.02)
-    raise SystemExit("the master does not answer")
-
-
 def measure_all() -> dict[str, float]:
     """Return the CPU microseconds of each case and yardstick, with a new master and peer."""
     for variable in ("MINIROSPY_TRANSPORT", "MINIROSPY_PRELOAD"):
         os.environ.pop(variable, None)  # they turn off what is measured
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = str(probe.getsockname()[1])
+    port = str(free_port())
     os.environ |= {"ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
 
     meter = Meter()
