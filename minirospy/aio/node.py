@@ -52,7 +52,7 @@ _Request = TypeVar("_Request", bound=Message)
 _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
-# maximum log lines in ten seconds, because a bridge may have thousands of topics
+# maximum log lines per ten seconds; a bridge may register thousands of topics
 MAX_REGISTRATION_FAULTS = 5
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
@@ -232,7 +232,7 @@ class Node:
 
     @property
     def is_started(self) -> bool:
-        """Return whether the node has connected to a master, and therefore is in the graph."""
+        """Return whether the node has connected to a master and joined the graph."""
         return self._is_started
 
     @property
@@ -284,7 +284,7 @@ class Node:
         type_: InterfaceType | None = None,
         on_change: Callable[[], object] | None = None,
     ) -> RawSubscription:
-        """Subscribe to ``topic``, of any type unless ``type_`` is given, and receive its messages as bytes.
+        """Subscribe to ``topic`` and receive its messages as bytes. Without ``type_``, accept any type.
 
         ``deliver(data, header)``, with the publisher's connection header, is called on the loop; so is ``on_change``,
         when a publisher has connected. Both must return quickly. ``deliver`` may keep the data. ``await

@@ -121,7 +121,7 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # This process belongs to another program's job, such as an IDE's or a service's, which lets no process leave.
+            # This process is in another program's job, such as an IDE's or a service's, and that job lets no process leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 

@@ -15,7 +15,7 @@ _T = TypeVar("_T")
 
 
 class Need(Enum):
-    """A request that a step may yield instead of None."""
+    """A scheduling request that a step yields instead of None: to run alone, or to pause."""
 
     ALONE = "no other work that takes much memory may run beside this"
     PAUSE = "there is nothing to do at present"

@@ -34,7 +34,7 @@ _FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]"
 _PLAIN_DECLARATION = re.compile(r"""<\?xml\s+version\s*=\s*(["'])1\.\d\1""")
 _ENCODING = re.compile(rb"""^\s*<\?xml\b[^>]*?\bencoding\s*=\s*["']([A-Za-z][\w.:-]*)["']""")
 
-_FALLBACK = "Latin-1"  # every byte is a character in it
+_FALLBACK = "Latin-1"  # it decodes any bytes: every byte is a character
 
 
 class Note(NamedTuple):
@@ -64,7 +64,7 @@ def parse_lenient(text: str | bytes) -> Parsed:
         try:
             return Parsed(parse_xml(rewritten), tuple(rewriting.notes.values()))
         except XmlSyntaxError:
-            # The lines and columns of the first error refer to the original text.
+            # Raise the first error, whose line and column refer to the original text.
             raise error from None
 
 

@@ -28,7 +28,7 @@ _UNCLOSED = re.compile(rb"""\s([\w:-]+)\s*=\s*(["'])[^"'<>]*=\2(?=[^\s/>?])""")
 _MISTAKES = (
     (re.compile(rb"&(?!#?\w+;)"), "& is written &amp;"),
     (re.compile(rb"""=\s*(?:"[^"<]*<[^"]*"|'[^'<]*<[^']*')"""), "< in a value is written &lt;"),
-    # The second part is for a comment that starts in another line.
+    # The second alternative matches a comment that starts on an earlier line.
     (re.compile(rb"<!--(?:(?!-->).)*?--(?!>)|\A[^<=]*--(?!>)"), "a comment contains no --"),
 )
 

@@ -214,8 +214,8 @@ class Gpio:
             )
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
-                # In a shutdown hook, the interrupted program may have checked its flag already and be about to use a pin.
-                # That must not fail: in RPi.GPIO, which is written in C, the program's call would finish first.
+                # In a shutdown hook: the interrupted program may already have checked its stop flag, and be about to use a pin.
+                # That use must not fail: RPi.GPIO's calls are in C, so there the call would finish before the hook runs.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):

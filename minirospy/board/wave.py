@@ -69,7 +69,7 @@ class Wave:
         self._gpio.unregister_wave(self)
 
     def _run(self) -> None:
-        # Without a board there is no pin to modulate.
+        # If the board is gone, there is no pin to modulate.
         with contextlib.suppress(BoardError):
             while not self._stopping:
                 self._changed.clear()

@@ -28,7 +28,7 @@ class _Repeated:
     def __init__(self, due: float, line: str) -> None:
         self.due = due  # time when the next line may be logged
         self.line = line  # description of the last error
-        self.omitted = 0  # number of errors since the last line
+        self.omitted = 0  # number of errors not logged since the last line
 
 
 class CallbackErrors:

@@ -73,7 +73,7 @@ class Lifecycle:
         self.reason: object = None  # the reason passed with the shutdown request
 
         self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() still returns False
-        # Called after ``hooks``, including those that a hook has added
+        # Called after ``hooks``, including hooks added by other hooks
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
         """called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls"""

@@ -10,7 +10,7 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-# seconds for the main thread to start the hooks, and then again for it to see that is_shutdown() is true
+# seconds for the main thread to start the hooks, and the same again to see that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 # Seconds for the main thread to exit by itself after a request from another process.

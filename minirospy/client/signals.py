@@ -75,7 +75,7 @@ class SignalWatchdog:
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # If SIGHUP is ignored because of nohup, let it stay ignored.
+            # If SIGHUP is ignored because of nohup, keep ignoring it.
             if handler != self.on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
                 signal.signal(number, self.on_signal)

@@ -260,7 +260,7 @@ class Timer(threading.Thread):
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:
-                    # A callback that is not a function cannot be called again, so stop.
+                    # Stop if the callback is not callable, because the next call would fail, too.
                     # During a shutdown, ignore errors in the callback.
                     if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
                         raise

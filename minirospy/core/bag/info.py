@@ -67,7 +67,7 @@ class Summary(NamedTuple):
     end: float | None
     messages: int
     stored: list[Stored]
-    types: list[tuple[str, str]]  # types and their md5sums
+    types: list[tuple[str, str]]  # pairs of a type and its md5sum
     topics: list[Topic]
 
 

@@ -255,7 +255,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return new message indexes for the last chunk, whose own are incomplete, and add them to its chunk index."""
+        """Return new message indexes for the last chunk, because its own are incomplete, and add them to its chunk index."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 

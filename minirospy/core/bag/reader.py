@@ -307,7 +307,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if the index does not match the bag header; messages would be missing then."""
+    """Raise BagFormatError if the index does not match the bag header, because messages would then be missing."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:

@@ -42,7 +42,7 @@ class PublishRate:
 
     def is_due(self, time: Time) -> bool:
         """Return whether to publish in this cycle. If time has jumped back, restart the schedule from there."""
-        period = self._period  # another thread may change it
+        period = self._period  # read once, because another thread may change it
         if period is None:
             return False
         now = nanoseconds(time)

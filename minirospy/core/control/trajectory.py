@@ -38,7 +38,7 @@ __all__ = [
 NEVER = 1 << 100  # ns; later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
 MAX_MAGNITUDE = 1e100  # maximum position or derivative; up to it, no segment coefficient overflows
-_SINGULARITY = 1e-9  # rad; this close to a half turn, the positions decide the direction, not rounding
+_SINGULARITY = 1e-9  # rad; this close to a half turn, the sign of the position difference decides, not a rounding error
 
 
 class ErrorCode(IntEnum):
@@ -77,7 +77,7 @@ class JointTolerances(NamedTuple):
     goal_time: int = 0  # ns after the end of the trajectory within which the joint may still reach its goal
 
 
-UNCHECKED = JointTolerances()  # for a joint that stops, or moves without a goal
+UNCHECKED = JointTolerances()  # tolerances for a joint that stops, or moves without a goal
 
 
 class Segment:
@@ -293,7 +293,7 @@ class JointPath:
             self._count += len(tail.points.times) - 1 - tail.first
         self._index = 0
         self.current = segments[0]
-        self.next_start = self._start(1)  # ns; NEVER in the last segment
+        self.next_start = self._start(1)  # ns; start of the next segment, or NEVER in the last one
 
     def advance(self, time: int) -> None:
         """Make the segment at ``time`` the current one. Times must not decrease."""

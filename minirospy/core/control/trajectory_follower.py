@@ -93,7 +93,7 @@ class TrajectoryFollower:
         self._paths: list[JointPath] = []
         self.is_running = False
         self.time = 0  # ns of ROS time at the last update
-        self.uptime = 0  # ns at the last update
+        self.uptime = 0  # ns of uptime at the last update
         self._clock = (0, 0, 0)  # time, period and uptime of the last update, for other threads
         self.positions: list[float] = []  # desired
         self.velocities: list[float] = []  # desired
@@ -309,7 +309,7 @@ class TrajectoryFollower:
         bridge_start = max(start, uptime)
         bridge_end = start + points.times[first]
         if bridge_end <= uptime:
-            bridge_end = uptime + 1  # all points have passed meanwhile: go to the last one
+            bridge_end = uptime + 1  # all points are in the past by now: go to the last one
 
         paths = []
         for path, column, tolerances, is_continuous in zip(

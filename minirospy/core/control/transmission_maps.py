@@ -98,7 +98,7 @@ class FourBarLinkageTransmission(TransmissionMap):
     ) -> None:
         a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "four-bar linkage")
         motion = ((_reciprocal(a * c), 0.0), (-_reciprocal(a * c * d), _reciprocal(b * d)))
-        # These are ROS's formulas, although the actuators' and the joints' powers are not equal.
+        # These are ROS's formulas, although they do not conserve power between actuators and joints.
         super().__init__(motion, ((a * c, 0.0), (-a * c * d, b * d)), joint_offset)
 
 

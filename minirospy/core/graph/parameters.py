@@ -75,7 +75,7 @@ class ParameterTree:
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that no caller has received since their creation; only these may be modified in place.
+        # The ids of the dictionaries not returned to any caller since their creation; only these may be modified in place.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # The subscribed keys, sorted so that all keys below a namespace are adjacent.
@@ -312,7 +312,7 @@ class ParameterTree:
                 if each.caller_id != setter:
                     yield ParameterUpdate(each.uri, changed)
 
-        # Also notify the node that set the namespace: its cached value of a parameter inside is outdated.
+        # Also notify the node that set the namespace: its cached values of parameters inside it are outdated.
         at = bisect_right(self._keys, changed)
         while at < len(self._keys) and self._keys[at].startswith(changed):
             key = self._keys[at]

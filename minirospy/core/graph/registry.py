@@ -65,7 +65,7 @@ class _NodeEntry:
         self.name = name
         self.uri = uri
         self.holder = intern(holder_of(uri))
-        self.size = 0  # bytes counted for this node
+        self.size = 0  # bytes of memory counted for this node
         self.entries: dict[str, int] = {}
 
     def add(self, name: str, kind: int) -> None:

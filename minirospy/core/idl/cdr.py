@@ -285,7 +285,7 @@ class _Generator:
         self._source = Source()
         self._is_cdr_source = is_cdr_source
         self._swaps = swaps
-        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items missing in the source message
+        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # the side whose items are missing in the source message
         self._walk = _Walk()
         self._position = _Position(8, 0)
         # pending items; _flush() merges them and writes them in as few lines as possible

@@ -218,7 +218,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the source of the call that packs values. Read an inner message only once if it contains several of them."""
+        """Return the source of the call that packs values. Read a nested message only once if several values are in it."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}

@@ -19,18 +19,18 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
-MAX_HULLS = 32  # maximum for a moving mesh; a mesh with more parts gets a single hull
-# A static mesh with more flat patches is simplified until it has fewer, because worlds have many small models with fine meshes.
+MAX_HULLS = 32  # maximum hulls for a moving mesh; a mesh with more parts gets a single hull
+# Maximum flat patches in a static mesh; a mesh with more is simplified, because worlds have many small, fine meshes.
 MAX_PRISMS = 1500
-MIN_PRISMS = 100  # for a small mesh
-PRISMS_PER_METER = 200  # along the longest side
-MAX_CONVEX = 5000  # triangles; testing a larger part for convexity would take seconds
-MAX_RAYS = 200  # rays cast from the largest triangles, to detect a hollow mesh
-MAX_TESTS = 2_000_000  # ray-triangle tests; these take 0.2 s
-HOLLOW = 0.1  # from this fraction of the surface facing other parts, a mesh is hollow, as a cup is
-THICKNESS = 0.02  # m; thickness of a prism below the surface
+MIN_PRISMS = 100  # the limit for a mesh of any size
+PRISMS_PER_METER = 200  # the limit per metre of a mesh's longest side
+MAX_CONVEX = 5000  # maximum triangles in a part that is tested for convexity; more would take seconds
+MAX_RAYS = 200  # maximum rays, cast from the largest triangles to detect a hollow mesh
+MAX_TESTS = 2_000_000  # maximum ray-triangle tests, which take 0.2 s
+HOLLOW = 0.1  # minimum fraction of a hollow mesh's surface that faces other parts of it, as in a cup
+THICKNESS = 0.02  # m; thickness of the prism below a flat patch of the surface
 FLAT = 1e-6  # fraction of the mesh's size; anything thinner has no hull
-TOLERANCE = 1e-4  # fraction of the part's size by which vertices of a convex part may be in front of a face
+TOLERANCE = 1e-4  # fraction of the part's size; no vertex of a convex part is further than this in front of a face
 
 Points = NDArray[np.float64]
 Triangles = NDArray[np.int32]
@@ -58,7 +58,7 @@ def collision_parts(
         if len(parts) > MAX_HULLS:
             return Parts([_thickened(mesh)], False)
         hollow = list(map(is_hollow, parts))
-        most = MAX_HULLS // max(sum(hollow), 1)  # for each hollow part
+        most = MAX_HULLS // max(sum(hollow), 1)  # maximum hulls per hollow part
         hulls: list[Mesh] = []
         for part, splits in zip(parts, hollow, strict=True):
             hulls += (split(part, most) if splits and most > 1 else None) or [_thickened(part)]

@@ -58,7 +58,7 @@ class Pose(NamedTuple):
 
 
 IDENTITY = Pose()
-MIN_STEP = 1e-9  # s; time is counted in nanoseconds
+MIN_STEP = 1e-9  # s; time is counted in whole nanoseconds
 
 
 class Box(NamedTuple):

@@ -108,7 +108,7 @@ class _Reader:
         self._collect()
         frames: dict[str, Frame] = {}
         for name, frame in self._all_frames():
-            frames.setdefault(name, frame)  # if a link and a joint share a name, it refers to the link
+            frames.setdefault(name, frame)  # a name that a link and a joint share refers to the link
         self.frames = Frames(frames)
         self_collide = source.flag(element, "self_collide", False)
 
@@ -299,7 +299,7 @@ class _Reader:
         read: Callable[[Element, Pose, Source], _Part | None],
         pose_of: Callable[[Element], Pose],
     ) -> tuple[_Part, ...]:
-        """Return the children with a tag that can be used."""
+        """Read the children with a tag, and return the results, without those that are None."""
         parts = (read(part, pose_of(part), self.source) for part in element.all(tag))
         return tuple(part for part in parts if part is not None)
 

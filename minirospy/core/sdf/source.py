@@ -22,9 +22,9 @@ URIs start with ``model://``, ``package://`` or ``file://``.
 """
 
 MAX_FILE_BYTES = 64 * 1024 * 1024  # bytes; the largest worlds of Gazebo's users have 10 MB
-MAX_INCLUDES = 16  # nesting depth of files and models; a greater depth is a mistake or an attack
-MAX_WARNINGS = 200  # lines per model or world; nobody reads more
-MAX_PARTS = 20_000  # links, joints and models per world or spawn request
+MAX_INCLUDES = 16  # maximum nesting of files and models; a greater depth is a mistake or an attack
+MAX_WARNINGS = 200  # maximum warnings per model or world; nobody reads more
+MAX_PARTS = 20_000  # maximum links, joints and models per world or spawn request
 _INFINITE = 1e16  # sdformat writes infinite limits as this number; larger numbers overflow in the simulation
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no", "")
@@ -214,7 +214,7 @@ class Source:
         values = []
         for part in element.text.split():
             try:
-                value = float(part if "_" not in part else "")  # Python accepts 1_000
+                value = float(part if "_" not in part else "")  # float() accepts underscores, as in 1_000
             except ValueError:
                 raise self.error(
                     element, f"<{element.tag}> is '{_short(element.text)}': '{_short(part)}' is not a number"

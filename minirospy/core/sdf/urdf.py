@@ -103,7 +103,7 @@ class _Converter:
         self._kept = self._flagged("preserveFixedJoint")
         self._revolute = self._flagged("disableFixedJointLumping") - self._kept
         self._bodies: dict[str, _Body] = {}
-        self._names: dict[tuple[str, str], str] = {}  # (link, its collision's name) -> that in the model
+        self._names: dict[tuple[str, str], str] = {}  # dict from (link, collision name) to the collision's name in the model
 
     def convert(self) -> Element:
         """Return the ``<model>``. Raise SdfError if no part of the robot remains."""
@@ -194,7 +194,7 @@ class _Converter:
     def _with_mass(self) -> list[str]:
         """Return the names of the links that remain, in tree order, and warn about the others."""
         kept: list[str] = []
-        lost: dict[str, int] = {}  # topmost massless link -> the links below it
+        lost: dict[str, int] = {}  # dict from the topmost massless link to the links below it
         cause: dict[str, str] = {}
         for name, body in self._bodies.items():
             joint = self._robot.parent_joint(name)
@@ -316,7 +316,7 @@ class _Converter:
         collision.children.append(surface)
 
     def _add_link_extensions(self, link: Element, owner: str, pose: Pose) -> None:
-        """Copy the link's children from ``<gazebo reference="owner">``. Sensors and lights of merged links are moved along."""
+        """Copy the link's children from ``<gazebo reference="owner">``; adjust the poses of sensors and lights from merged links."""
         children = self._extensions.get(owner, [])
         # As in sdformat, unknown tags come last, so <turnGravityOff> overrides <gravity>.
         for child in sorted(children, key=lambda child: child.tag not in _LINK_TAGS):

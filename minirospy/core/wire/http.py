@@ -192,7 +192,7 @@ class HttpReader:
         self._in_body = False
 
     def continue_line(self) -> bytes:
-        """Return the response for which a peer waits after it has sent ``Expect: 100-continue``."""
+        """Return the response that a peer awaits after sending ``Expect: 100-continue``."""
         self.wants_continue = False
         return _CONTINUE
 

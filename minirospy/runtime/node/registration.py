@@ -148,7 +148,7 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> object:
-        """Look up the address of this node or of one of its services.
+        """Ask the master for the address of this node or of one of its services.
 
         Raise MasterUnreachableError or RpcError if the look-up fails.
         """

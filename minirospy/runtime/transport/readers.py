@@ -188,8 +188,8 @@ class _FrameSource:
         self._was_large = False
         self._may_busy_poll = may_busy_poll(sock)
         self._is_fast = False
-        # On a Unix socket, a reset means end of file: Linux reports it after all data if the publisher closed before reading an
-        # answer about shared memory.
+        # On a Unix socket, a reset means end of file.
+        # Linux reports it, after all data, if the publisher closed before reading an answer about shared memory.
         self._is_unix = sock.family not in FAMILIES
         self._ring = RingReceiver() if shares_memory else None
 

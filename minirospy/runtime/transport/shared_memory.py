@@ -65,7 +65,7 @@ def may_share(sock: socket.socket) -> bool:
 
 
 def obstacle(sock: socket.socket, *, is_same_host: bool) -> str:
-    """Return why a publisher's connection that has no :class:`RingSender` has none."""
+    """Return the reason why a publisher's connection has no :class:`RingSender`."""
     if sock.family != getattr(socket, "AF_UNIX", None):
         if not is_same_host:
             return "the subscriber is on another machine or in another container"
@@ -207,7 +207,7 @@ class SharedRing:
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
         self._is_watched = False  # whether the timer runs, or is about to
-        # by pidfd of a subscriber that closed its connection while it held places: the memory, and the connection
+        # dict from the pidfd of a subscriber that closed its connection while it held places, to the memory and connection
         self._closed: dict[int, tuple[_Memory, RingSender]] = {}
 
     @property
@@ -414,12 +414,12 @@ class RingSender:
     def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
         self.step = Step.NEW
         self.announced = 0  # number of messages that went through the ring
-        self._trouble = ""  # why the ring is not used, set with Step.OFF
+        self._trouble = ""  # the reason why the ring is not used, set with Step.OFF
         self._ring = shared
         self._sock = sock
         self._process = peer(sock).process
         self.memory: _Memory | None = None  # the memory that was offered last
-        self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
+        self._counter = -1  # the eventfd in the last offer, which counts the subscriber's releases
         self._is_releasing = True  # whether the last wait for a release was successful
 
     def obstacle(self, large: int, last_size: int) -> str:
