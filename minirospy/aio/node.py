@@ -67,7 +67,7 @@ _UNSPECIFIED = _Unspecified()
 
 
 class Node:
-    """A node in the computation graph, which exists inside ``async with Node("name") as node:``.
+    """A node in the computation graph, used as ``async with Node("name") as node:``.
 
     ``name`` has no namespace; ``anonymous`` appends a number to it. ``argv`` contains remappings, private parameters
     and special names as on a command line (pass ``sys.argv`` in a program that roslaunch starts; the default is empty,
@@ -114,7 +114,7 @@ class Node:
         # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
 
-        # The shutdown reason from another process, such as the master if a new node has the same name
+        # The reason given by another process that requested the shutdown, such as the master if a new node took this name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)

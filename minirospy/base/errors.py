@@ -344,7 +344,7 @@ class BagFormatError(BagError):
 
 
 class NoBagError(BagFormatError):
-    """The file does not start like a bag."""
+    """The file does not start with a bag's first line."""
 
 
 class BagVersionError(BagError):

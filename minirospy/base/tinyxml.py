@@ -19,7 +19,7 @@ _TOKEN = re.compile(
     r"|<!\[CDATA\[.*?\]\]>"
     r"|(?P<declaration><\?xml\b.*?\?>)"
     r"|<\?.*?\?>"
-    r"|<!DOCTYPE(?=(?P<doctype>[^>\[]*))(?P=doctype)(?:\[[^\]]*\])?[^>]*>"  # lookahead: without it, quadratic time
+    r"|<!DOCTYPE(?=(?P<doctype>[^>\[]*))(?P=doctype)(?:\[[^\]]*\])?[^>]*>"  # the lookahead prevents quadratic time
     r"|(?P<end></[^\s<>]+\s*>)"
     r"|<(?P<tag>[A-Za-z_][^\s/>]*)(?P<attributes>(?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(?P<close>/?)>"
     r"|(?P<text>[^<]+)"
@@ -103,7 +103,7 @@ class _Rewriting:
                 self._note(f"everything after the end of <{root}> is ignored")
                 break
             if token == "<":
-                # No parser accepts this. Continuing the search would take quadratic time if the text has many of them.
+                # No parser accepts a bare "<" here. Stop searching: a text with many of them would take quadratic time.
                 parts.append(text[match.start() :])
                 break
             parts.append(self._token(match, is_first=match.start() == 0))

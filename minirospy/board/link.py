@@ -235,7 +235,7 @@ class Link:
 
 
 class _Connection:
-    """A connected socket after the server's Welcome, which contained ``pins`` and ``person``."""
+    """A connection on which the server has sent its Welcome, with the ``pins`` and the ``person``."""
 
     def __init__(self, link: socket.socket, stream: Stream, welcome: Welcome, more: list[Message]) -> None:
         self._socket = link

@@ -122,7 +122,7 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use it.
+        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use this dict.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
         # The channels that cleanup() released in a signal handler, with their BCM pins: the interrupted call may still use them.
@@ -458,7 +458,7 @@ class Gpio:
                 callbacks.schedule(detector)
 
     def _check_wiring(self, channel: int, pin: int, direction: int) -> None:
-        """Warn once per channel whose setup has no effect on the virtual board.
+        """Warn, once per channel, if the channel's setup has no effect on the virtual board.
 
         ``setwarnings(False)`` does not suppress the warning, because most listings start with that call.
         """

@@ -69,7 +69,7 @@ class Lifecycle:
         """
         # Set once the shutdown hooks have run; every blocking call then returns
         self.shutting_down = SignalSafeEvent()
-        self.left = SignalSafeEvent()  # set when the node has left the graph
+        self.left = SignalSafeEvent()  # set once the node has left the graph
         self.reason: object = None  # the reason passed with the shutdown request
 
         self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() still returns False

@@ -42,7 +42,7 @@ class DeferringHandler(logging.Handler):
 
 
 class RosStreamHandler(DeferringHandler):
-    """Prints log lines like rospy: debug and info to stdout, other levels to stderr, coloured on a terminal.
+    """Prints log lines as rospy does: debug and info to stdout, other levels to stderr, coloured on a terminal.
 
     ROSCONSOLE_FORMAT sets the format (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
     """

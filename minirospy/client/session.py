@@ -242,7 +242,7 @@ class Session:
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
         # Ignore the two logger services, which every node offers.
         own = {name: each for name, each in self.offered.items() if not name.endswith(_SERVICES_OF_NODES)}
-        # A program that polls or has waited ends on purpose, and so does an interactive session.
+        # A program that polls, or has waited, exits on purpose, and so does an interactive session.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if is_meant or hasattr(sys, "last_value") or not all(state.is_new for state in waiting.values()):
@@ -310,7 +310,7 @@ class Session:
                 flush=True,
             )
         if not self.lifecycle.is_shutdown_requested:
-            # Called after the hooks, once is_shutdown() has become true.
+            # The interrupts are called after the hooks, once is_shutdown() has become true.
             self.lifecycle.interrupts.append(self.signals.interrupt_later)
         self.lifecycle.signal_shutdown(reason)
 

@@ -86,7 +86,7 @@ class SignalWatchdog:
             _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
-            # Restore the previous file descriptor: it belongs to an event loop that installed it first.
+            # Restore the previous wakeup descriptor, because it belongs to an event loop that was installed first.
             signal.set_wakeup_fd(previous)
 
     def release(self) -> None:

@@ -77,7 +77,7 @@ class Subscriber(Topic[_M_co]):
         if buff_size <= 0:
             raise ROSException("buffer size must be a positive integer")
         if callback is not None and not callable(callback):
-            # rospy reports this only when a message arrives.
+            # Warn now, because rospy reports an invalid callback only when a message arrives.
             warnings.warn(
                 f"the callback {callback!r} for {self.resolved_name} is not a function: pass its name, without quotes "
                 "and parentheses",
@@ -178,7 +178,7 @@ class SubscribedTopic(SharedTopic):
         self._statistics: StatisticsPublisher | None = None
         self._misfits = RateLimitedLogger(_log)
         self._registered = False
-        self._since = time.monotonic()  # when the latest Subscriber was created
+        self._since = time.monotonic()  # time at which the latest Subscriber was created
 
     @property
     def has_callback(self) -> bool:

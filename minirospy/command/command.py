@@ -191,7 +191,7 @@ def _heed_break() -> None:
 
 
 def _heed_interrupts() -> None:
-    """Exit on SIGINT even if a script started the command with `&`, for which the shell sets the signal to be ignored.
+    """Exit on SIGINT even if a script started the command with `&`, which makes the shell ignore the signal for it.
 
     ROS's commands exit in this case too, because they are nodes and install their own handlers. Build commands do not
     call this function; they keep the shell's setting.

@@ -96,7 +96,7 @@ class _Rewriting:
         self._put(edit.data)
 
     def finish(self) -> int:
-        """Truncate the file at the current position; return how many bytes its end has moved."""
+        """Truncate the file at the current position; return the number of bytes by which its end has moved."""
         shift, self._read = self.shift, self._read + len(self._waiting)
         self._put(b"")
         self._stream.seek(self._written)

@@ -73,7 +73,7 @@ class Switch:
     start_asap: bool
     timeout: float  # maximum wait for the hardware; 0 or less: no limit
     requested: Time
-    is_begun: bool = False  # set once the hardware has been asked to switch
+    is_begun: bool = False  # True once the hardware has been asked to switch
     on_done: Callable[[], object] = lambda: None
 
 

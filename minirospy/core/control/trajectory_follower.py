@@ -92,8 +92,8 @@ class TrajectoryFollower:
         self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque(maxlen=_MAX_REQUESTS)
         self._paths: list[JointPath] = []
         self.is_running = False
-        self.time = 0  # ns of ROS time at the last update
-        self.uptime = 0  # ns of uptime at the last update
+        self.time = 0  # ROS time of the last update, in ns
+        self.uptime = 0  # uptime at the last update, in ns
         self._clock = (0, 0, 0)  # time, period and uptime of the last update, for other threads
         self.positions: list[float] = []  # desired
         self.velocities: list[float] = []  # desired
@@ -401,7 +401,7 @@ def _is_within(
 
 
 def _stop(start: int, position: float, velocity: float, duration: int, goal: MonitoredGoal | None) -> Segment:
-    """Return a segment that stops a joint: the first half of a motion that returns to ``position`` with ``-velocity``."""
+    """Return a segment that brings a joint to a stop: the first half of a motion that reverses ``velocity``."""
     first = State(position, velocity)
     turning = Segment(start, first, start + 2 * duration, State(position, -velocity))
     return Segment(start, first, start + duration, State(*turning.sample(start + duration)), goal)

@@ -62,8 +62,8 @@ class MasterApi(ABC):
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
-        self.log: Callable[[str], object] = nothing  # called with a line for each registration
-        # called for each change, with the record that the journal stores
+        self.log: Callable[[str], object] = nothing  # called with a log line for each registration
+        # Called with the journal's record for each change
         self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal; returns the number by which a change refers to it."""

@@ -252,7 +252,7 @@ class _Reader:
             raise self.source.error(element, f"model [{self.name}]: {error}") from None
 
     def _in_link(self, part: Element, link: str) -> Pose:
-        """Return the pose of a link's part in the link."""
+        """Return a link part's pose relative to the link."""
         frame, value = self._placed(part.first("pose"), link)
         try:
             return self.frames.relative(value, frame, link)
@@ -299,7 +299,7 @@ class _Reader:
         read: Callable[[Element, Pose, Source], _Part | None],
         pose_of: Callable[[Element], Pose],
     ) -> tuple[_Part, ...]:
-        """Read the children with a tag, and return the results, without those that are None."""
+        """Return the results of ``read`` for the children with this tag, without None."""
         parts = (read(part, pose_of(part), self.source) for part in element.all(tag))
         return tuple(part for part in parts if part is not None)
 
@@ -368,7 +368,7 @@ class _Reader:
 
 
 def _joint_key(name: str) -> str:
-    """Return the key of a joint's frame, which contains a newline, as no name does."""
+    """Return the key of a joint's frame; it contains a newline, which no frame name does."""
     return f"joint\n{name}"
 
 

@@ -21,7 +21,7 @@ Resolve = Callable[[str], "str | None"]
 URIs start with ``model://``, ``package://`` or ``file://``.
 """
 
-MAX_FILE_BYTES = 64 * 1024 * 1024  # bytes; the largest worlds of Gazebo's users have 10 MB
+MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
 MAX_INCLUDES = 16  # maximum nesting of files and models; a greater depth is a mistake or an attack
 MAX_WARNINGS = 200  # maximum warnings per model or world; nobody reads more
 MAX_PARTS = 20_000  # maximum links, joints and models per world or spawn request
@@ -38,7 +38,7 @@ def no_files(uri: str) -> str | None:
 
 @dataclass
 class Shared:
-    """Data shared by all files of one reading: documents and found paths by name, and the number of parts so far."""
+    """Data shared by all files that are read together: documents and found paths by name, and the number of parts so far."""
 
     documents: dict[str, Element] = field(default_factory=dict)
     found: dict[str, str | None] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Source:
-    """A file and its context.
+    """A file that is being read, and its context.
 
     file: its name in messages. folder: the base of relative URIs, or an empty string. version: its SDF version. chain: the paths
     of the including files, ending with its own. depth: the number of enclosing models.

@@ -43,7 +43,7 @@ __all__ = ["read_urdf"]
 
 _WORLD = "world"
 _LUMP = "_fixed_joint_lump__"
-_MIN_MASS = 1e-6  # kg; sdformat treats a smaller mass as 0
+_MIN_MASS = 1e-6  # kg; sdformat treats a smaller mass as zero
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no")
 
@@ -103,7 +103,7 @@ class _Converter:
         self._kept = self._flagged("preserveFixedJoint")
         self._revolute = self._flagged("disableFixedJointLumping") - self._kept
         self._bodies: dict[str, _Body] = {}
-        self._names: dict[tuple[str, str], str] = {}  # dict from (link, collision name) to the collision's name in the model
+        self._names: dict[tuple[str, str], str] = {}  # name in the model by (link, collision name)
 
     def convert(self) -> Element:
         """Return the ``<model>``. Raise SdfError if no part of the robot remains."""
@@ -316,7 +316,7 @@ class _Converter:
         collision.children.append(surface)
 
     def _add_link_extensions(self, link: Element, owner: str, pose: Pose) -> None:
-        """Copy the link's children from ``<gazebo reference="owner">``; adjust the poses of sensors and lights from merged links."""
+        """Copy the link's children from ``<gazebo reference="owner">``. Adjust poses of a merged link's sensors and lights."""
         children = self._extensions.get(owner, [])
         # As in sdformat, unknown tags come last, so <turnGravityOff> overrides <gravity>.
         for child in sorted(children, key=lambda child: child.tag not in _LINK_TAGS):

@@ -128,7 +128,7 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Complete a piece from the current parts; return the value that a step yields.
+        """Complete a piece from the current parts; return ALONE if the rest should be written alone, else None.
 
         Raise RpcProtocolError if the limit is exceeded.
         """

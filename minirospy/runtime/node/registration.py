@@ -71,7 +71,7 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Register the entries of ``tables``: kind ("Publisher") -> name -> publication, subscription or service.
+        """Register the entries of ``tables``: per kind ("Publisher"), a dict from name to publication, subscription or service.
 
         Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """

@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 # Maximum total bytes of all clients' requests that are incomplete or being read; above it, the largest are refused
 MAX_HELD = 72 * 1024 * 1024
-LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are never refused because of MAX_HELD
+LARGE_REQUEST = 32 * 1024  # a request of at most this many bytes is never refused because of MAX_HELD
 
 # Maximum bytes of unread responses to all clients together.
 # Above it, disconnect the client that has gone longest without reading.

@@ -41,7 +41,7 @@ from minirospy.runtime.transport.sockets import (
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, for frames that are read in steps
+_TURN_CHUNK = 4096  # bytes per receive, and per connection's buffer, for frames that are read in steps
 
 _DRAIN_BYTES = 64 * 1024 * 1024
 # maximum bytes to allocate per receive, so that a large length prefix alone cannot make this process allocate much memory

@@ -133,7 +133,7 @@ class _Memory:
         """Create and map the file, which has no memory at first. Raise OSError if that fails."""
         self.layout = layout
         self.places = Places(layout.places)
-        self._backed = [0] * layout.places  # bytes with allocated memory at the start of each place
+        self._backed = [0] * layout.places  # number of bytes with allocated memory at the start of each place
         self.file = os.memfd_create("minirospy-ring", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
         self.read_only = -1
         try:
@@ -197,7 +197,7 @@ class SharedRing:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.lock = threading.Lock()
         self.memory: _Memory | None = None
-        self.trouble = ""  # why there is no memory, set by turn_off()
+        self.trouble = ""  # the reason why there is no memory, set by turn_off()
         self._loop = loop
         self._senders: set[RingSender] = set()
         self._retired: list[
@@ -218,7 +218,7 @@ class SharedRing:
             return sum(memory.backed_bytes for memory in memories)
 
     def share(self, frame: LargeFrame) -> Sharing:
-        """Return an object that writes ``frame`` into the ring once the first connection needs it."""
+        """Return an object that writes ``frame`` into the ring when the first connection needs it."""
         with self.lock:
             self.collect()
         return Sharing(self, frame)
@@ -251,7 +251,7 @@ class SharedRing:
             self._release(memory, sender)
             return
         except (OSError, AttributeError):
-            # The memory stays until the other subscribers have a new ring, that is until the next large messages.
+            # The memory stays allocated until the next large messages have given the other subscribers a new ring.
             return
         self._closed[file] = memory, sender
         self._loop.add_reader(file, self._exited, file)
@@ -483,7 +483,7 @@ class RingSender:
             self._turn_off("the subscriber has released more than it held")
 
     def close(self) -> None:
-        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced.
+        """Forget the connection. If the subscriber holds places, replace the ring, because it may still read them.
 
         Call this on the loop.
         """
@@ -574,7 +574,7 @@ class RingSender:
         self.step = Step.OFF
 
     def _forget_memory(self) -> None:
-        """Release all places of the previous ring, which the subscriber had read before it answered :data:`ring.READY`."""
+        """Release all places of the previous ring. The subscriber had read them before it answered :data:`ring.READY`."""
         memory, self.memory = self.memory, None
         if memory:
             memory.places.release(self, memory.places.held_by(self))
