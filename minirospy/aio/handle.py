@@ -25,7 +25,7 @@ _H = TypeVar("_H", bound="Handle")
 
 
 class Handle:
-    """An object that registers in the background: ``await handle`` waits until it is registered with the master."""
+    """The base class of publishers, subscriptions and services, which register in the background; ``await`` waits for that."""
 
     _registration: asyncio.Task[None]
 

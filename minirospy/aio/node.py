@@ -219,7 +219,7 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Ask the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
+        """Ask the node to shut down: :meth:`spin` returns, loops over messages end, sleeps are interrupted. Thread-safe.
 
         The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """
@@ -261,7 +261,7 @@ class Node:
     # --- topics
 
     def subscribe(self, topic: str, message_class: type[_M], *, queue_size: int = 10) -> Subscription[_M]:
-        """Subscribe to ``topic`` and return its messages, for ``async for``.
+        """Subscribe to ``topic``; iterate over the result with ``async for`` to receive the messages.
 
         While the program is busy, the newest ``queue_size`` messages are queued; older ones are dropped and counted
         (``dropped``). The subscription starts immediately, in the background; ``await node.subscribe(...)`` waits until

@@ -32,7 +32,7 @@ JOIN_SECONDS = 1.0
 
 
 class Subscription(Handle, Generic[_M_co]):
-    """The messages on a topic, for ``async for``; created by :meth:`Node.subscribe`.
+    """The messages on a topic, to iterate over with ``async for``; created by :meth:`Node.subscribe`.
 
     The iteration ends when the subscription is closed or the node shuts down.
     """

@@ -75,7 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """Context manager. If ``is_guarded`` is set, child processes end if this process ends before :meth:`close`."""
+    """A context manager that, if ``is_guarded`` is set, ends child processes when this process ends before :meth:`close`."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None

@@ -505,7 +505,7 @@ class TransportTerminated(TransportException):
 
 
 class ServiceException(Exception):
-    """A service call failed: no provider, a broken link, or the handler's own error."""
+    """A service call failed: there is no provider, the connection broke, or the handler raised an error."""
 
 
 class TransformException(Exception):

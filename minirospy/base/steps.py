@@ -23,7 +23,7 @@ class Need(Enum):
 
 ALONE, PAUSE = Need
 
-Steps = Generator[Need | None, None, _T]  # work that yields between its steps and returns its result
+Steps = Generator[Need | None, None, _T]  # a generator that yields between its steps and returns its result
 
 SMALL_ITEMS = 2000  # number of items that take a few milliseconds to serialize
 

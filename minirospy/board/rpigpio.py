@@ -206,7 +206,7 @@ class Gpio:
         return int(self._linked().states[pin].function)
 
     def cleanup(self, channel: int | Sequence[int] | None = None) -> None:
-        """Reset the channels that this program set up to inputs; without an argument, also reset the numbering mode."""
+        """Reset this program's channels to inputs; without an argument, also reset the numbering mode."""
         with self._lock:
             everything = channel is None
             wanted = (
@@ -400,7 +400,7 @@ class Gpio:
 
         with self._lock:
             if pin not in self._directions:
-                # During the call to the board, a signal handler has called cleanup().
+                # A signal handler called cleanup() during the call to the board.
                 return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin

@@ -47,7 +47,7 @@ class CallbackErrors:
         self._lock = threading.RLock()
 
     def log(self, callback: object, error: BaseException, advice: str = "") -> None:
-        """Log ``error``, which ``callback`` raised, or count it.
+        """Log an error that ``callback`` raised, or only count it if the same error was logged recently.
 
         ``advice`` is printed once, outside the log: programs compare the log's text with ROS's.
         """

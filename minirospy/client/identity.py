@@ -117,7 +117,7 @@ class Identity:
         return names.resolve(name, self.name, self.resolved_mappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the command line's remapping of ``name`` as written there, or ``name`` itself if it is not remapped."""
+        """Return the name to which the command line remaps ``name``, as written there, or ``name`` if it is not remapped."""
         mapped = self.mappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 

@@ -50,7 +50,7 @@ class RosStreamHandler(DeferringHandler):
     def __init__(
         self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
     ) -> None:
-        """Print to ``stdout`` and ``stderr``. By default, these are ``sys.stdout`` and ``sys.stderr`` when a line is written."""
+        """Print to ``stdout`` and ``stderr``; by default, to ``sys.stdout`` and ``sys.stderr`` as set when a line is written."""
         super().__init__()
         self._colorize = colorize
         self._stdout = stdout

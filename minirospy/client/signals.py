@@ -103,7 +103,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while the node still handles Ctrl-C. From then on, the system handles a third Ctrl-C."""
+        """Flush the program's output while the node handles Ctrl-C. Afterwards, a third Ctrl-C terminates the process."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:

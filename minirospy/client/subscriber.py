@@ -149,7 +149,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
 
 
 class _Callback(NamedTuple):
-    """A subscriber's function and its additional argument."""
+    """A Subscriber's callback function and the additional argument for it."""
 
     function: Callable[..., object]
     args: object
@@ -307,7 +307,7 @@ class SubscribedTopic(SharedTopic):
         return 0 if 0 in sizes else max(sizes, default=0)
 
     def _look_for_statistics(self) -> None:
-        """Count the received messages if the parameter is set.
+        """Count the received messages if the parameter /enable_statistics is set.
 
         Runs in a worker thread, so that no Subscriber waits for the master.
         """

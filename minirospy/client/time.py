@@ -37,7 +37,7 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back during a sleep, to ``time`` seconds before its start.
+    """During a sleep, simulated time jumped back to ``time`` seconds before the sleep's start.
 
     As in rospy, also a KeyboardInterrupt.
     """

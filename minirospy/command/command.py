@@ -98,7 +98,7 @@ NO_MASTER = RosText(f"ERROR: {MasterUnreachableError.ros_text}")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return ROS's message for an error, with an empty text if ROS has none."""
+    """Return ROS's message for an error; its text is empty if ROS has none."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):

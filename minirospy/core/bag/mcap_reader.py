@@ -52,7 +52,7 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 
 
 class McapReader(BagReader):
-    """An MCAP file of ROS 1, or of ROS 2. Presents its channels as bag connections.
+    """An MCAP file from ROS 1 or ROS 2. Presents its channels as bag connections.
 
     Messages of ROS 2 are converted if the file has their definitions and ROS 1 has the type. Channels that cannot be
     converted are not read; ``foreign`` contains their topics, each with the reason. Raise BagFormatError if the file is

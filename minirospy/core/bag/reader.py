@@ -205,7 +205,7 @@ class _Run:
 
 
 class _Merge:
-    """Merges chunks that may overlap into blocks of messages in time order.
+    """Merges chunks, which may overlap, into blocks of messages in time order.
 
     Each chunk is a run of sorted messages. The data of pending runs stays in memory up to CACHE_SIZE; beyond that it is
     discarded and read again later, so that even a bag whose chunks all overlap needs no more memory.

@@ -98,7 +98,7 @@ class BagHeader(NamedTuple):
 
 
 class Connection(NamedTuple):
-    """One publisher's topic: ``id`` in the bag, ``topic``, and the publisher's connection header."""
+    """A connection in the bag: its ``id``, its ``topic``, and the publisher's connection header."""
 
     id: int
     topic: str

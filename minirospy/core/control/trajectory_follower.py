@@ -94,11 +94,11 @@ class TrajectoryFollower:
         self.is_running = False
         self.time = 0  # ROS time of the last update, in ns
         self.uptime = 0  # uptime at the last update, in ns
-        self._clock = (0, 0, 0)  # time, period and uptime of the last update, for other threads
+        self._clock = (0, 0, 0)  # time, period and uptime of the last update, as read by other threads
         self.positions: list[float] = []  # desired
         self.velocities: list[float] = []  # desired
         self.accelerations: list[float] = []  # desired
-        self.position_errors: list[float] = []  # desired - actual
+        self.position_errors: list[float] = []  # desired minus actual
         self.velocity_errors: list[float] = []
 
     def start(self, time: int, positions: Sequence[float], velocities: Sequence[float]) -> None:
@@ -342,7 +342,7 @@ class TrajectoryFollower:
 
 
 def read_joints(parameters: Parameters, robot: Callable[[], Robot]) -> list[FollowedJoint]:
-    """Return the joints of the parameter ``joints``, with the tolerances of ``constraints``.
+    """Return the joints listed in the parameter ``joints``, with the tolerances in ``constraints``.
 
     Raise ControllerError if the parameter is missing or names a joint that the robot's description lacks; raise ValueError
     if a tolerance is not finite.

@@ -88,7 +88,7 @@ class DifferentialTransmission(TransmissionMap):
 
 
 class FourBarLinkageTransmission(TransmissionMap):
-    """Actuator 1 moves joint 1; joint 2 is actuator 2 minus joint 1's motion. Raise HardwareError if a reduction is 0."""
+    """Actuator 1 moves joint 1; joint 2 moves by actuator 2's motion minus joint 1's. Raise HardwareError if a reduction is 0."""
 
     def __init__(
         self,

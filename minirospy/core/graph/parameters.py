@@ -123,7 +123,7 @@ class ParameterTree:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Recalculate the memory in use, which may still include values that were replaced.
+        """Recalculate the memory in use, because the current figure may include values that have been replaced.
 
         Raise ParametersFullError if there is still too little.
         """
@@ -307,7 +307,7 @@ class ParameterTree:
         """Yield, one by one, the updates that a change requires; there may be many."""
         changed = _with_slash(path)
         for length in range(len(path) + 1):
-            # Skip the node that set the value: it already has it.
+            # Skip the node that set the value, because it knows the value.
             for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
                 if each.caller_id != setter:
                     yield ParameterUpdate(each.uri, changed)

@@ -149,7 +149,7 @@ _UNKNOWN = _Position(1, 0)
 
 
 class _Walk:
-    """Computes positions through layouts; caches the results, because layouts are nested."""
+    """Computes the positions in layouts, and caches them, because layouts are nested."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, _Position], _Position] = {}

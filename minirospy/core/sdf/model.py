@@ -290,7 +290,7 @@ class Model:
 
 
 class Physics(NamedTuple):
-    """The engine's parameters. The defaults are Gazebo's."""
+    """The physics engine's parameters; the defaults are Gazebo's."""
 
     step: float = 0.001
     real_time_factor: float = 1.0

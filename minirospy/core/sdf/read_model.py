@@ -327,7 +327,7 @@ class _Reader:
         initial = source.number(element, "initial_joint_position", axis.initial_position)
         axis = axis._replace(initial_position=initial)
         if child == _WORLD:
-            # MuJoCo and Gazebo move the child. Make the world the parent, and reverse the axis.
+            # The simulators move a joint's child, so make the world the parent, and reverse the axis.
             parent, child = child, parent
             axis, axis2 = (each._replace(xyz=_negative(each.xyz)) for each in (axis, axis2))
         pose = relative(links[child].pose, here)
@@ -344,7 +344,7 @@ class _Reader:
         return _KINDS.get(text)
 
     def _link_of(self, name: str) -> str:
-        """Return the link that a name in a joint refers to: a link, or the link to which the frame of this name is attached."""
+        """Return the link that a joint refers to by name: a link, or the link to which a frame is attached."""
         for _ in range(len(self.attached) + 1):
             if name not in self.attached or name in self.links:
                 break

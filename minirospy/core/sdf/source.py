@@ -31,7 +31,7 @@ _FALSE = ("0", "false", "no", "")
 
 
 def no_files(uri: str) -> str | None:
-    """Return ``uri`` if it is an absolute path that exists. A resolver without search paths."""
+    """Resolve a URI without search paths: return ``uri`` if it is an absolute path that exists."""
     path = uri.removeprefix("file://")
     return path if os.path.isabs(path) and os.path.exists(path) else None
 
@@ -176,7 +176,7 @@ class Source:
         return x, y, z
 
     def color(self, element: Element | None, tag: str, default: Color | None) -> Color | None:
-        """Return a child's colour; without an opacity it is opaque."""
+        """Return a child's colour, which is opaque if it has no opacity."""
         if (child := _given(element, tag)) is None:
             return default
         red, green, blue, *opacity = (min(max(value, 0.0), 1.0) for value in self.finite(child, (3, 4)))

@@ -356,7 +356,7 @@ class _Converter:
     # ---- joints
 
     def _joint(self, joint: UrdfJoint) -> Element | None:
-        """Return the ``<joint>``, or None if the joint's type leaves the child free."""
+        """Return the ``<joint>``, or None if a joint of this type does not restrict its child."""
         kind = self._joint_kind(joint)
         if kind is None:
             what = f"joint [{joint.name}] is {joint.type.value}, which Gazebo does not know: link [{joint.child}] is free"

@@ -17,7 +17,7 @@ __all__ = ["Output", "escape", "is_numpy", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-# size in bytes above which the writer asks that no other response be written at the same time
+# size in bytes above which no other response may be written at the same time
 _ALONE_BYTES = 1024 * 1024
 
 

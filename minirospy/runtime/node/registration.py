@@ -46,7 +46,7 @@ responds.
 """
 
 _CLOSING_CALL_SECONDS = 3600.0
-_PROBE_SECONDS = 3.0  # seconds between a closing node's checks whether the master still responds
+_PROBE_SECONDS = 3.0  # seconds between a closing node's checks that the master still responds
 
 NOTICE_SECONDS = 3.0  # seconds before a closing node logs that it is still waiting for the master
 
@@ -194,7 +194,7 @@ class Registrations:
         self._registering.discard(task)
         if not task.cancelled():
             # Retrieve the task's exception, because asyncio logs exceptions that are never retrieved.
-            # A caller that is waiting also receives it. Otherwise it is ignored: the call will be retried.
+            # A waiting caller also receives the exception. Without one, ignore it, because the call will be retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:

@@ -170,7 +170,7 @@ class PeerEndedError(WireError):
 
 
 class Reader:
-    """Exact reads from a blocking socket; surplus bytes are buffered for the next read.
+    """Reads exact numbers of bytes from a blocking socket; buffers surplus bytes for the next read.
 
     A small request or response arrives whole, so a single receive returns both its length and its body.
     """

@@ -368,7 +368,7 @@ class Subscription:
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # The Unix socket does not connect: the processes are isolated from each other, for example by a sandbox.
+            # Connecting to the Unix socket failed: the processes are isolated from each other, for example by a sandbox.
             # Use TCP.
             host, port = unix.host, unix.port
         else:

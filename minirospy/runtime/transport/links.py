@@ -231,7 +231,7 @@ class OutLink:
         if self._outbox and self._has_to_wait(buffers):
             return
         if sharing and self.ring:
-            # Announce it only if the outbox is empty, because announcements and frames must arrive in message order.
+            # Announce the message only if the outbox is empty, because announcements and frames must arrive in order.
             try:
                 if self.ring.announce(sharing, may_wait=self._may_stay()):
                     return

@@ -41,7 +41,7 @@ __all__ = [
 FIELD = "shared_memory"
 """The field of the connection header by which a subscriber declares that it can read from a ring."""
 
-QUIET_SECONDS = 5.0  # time without a large message after which a ring's memory is given back
+QUIET_SECONDS = 5.0  # seconds without a large message after which a ring's memory is given back
 
 # Seconds for which a publishing thread waits for a subscriber to release a place: the same as for a full socket.
 _WAIT_SECONDS = 0.005
@@ -202,7 +202,7 @@ class SharedRing:
         self._senders: set[RingSender] = set()
         self._retired: list[
             _Memory
-        ] = []  # replaced memories that a connection still uses, and that are still allocated
+        ] = []  # replaced memories that are still allocated, and that a connection still uses
         self._is_off = False
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
@@ -243,11 +243,11 @@ class SharedRing:
         Call this on the loop, with the lock held.
         """
         if memory not in self._retired:
-            return  # no other connection uses it, so it is freed when its subscriber unmaps it
+            return  # no other connection uses this memory, so it is freed when the subscriber unmaps it
         try:
             file = os.pidfd_open(process)
         except ProcessLookupError:
-            # It has exited, and its parent has been notified.
+            # The subscriber has exited, and its parent has been notified.
             self._release(memory, sender)
             return
         except (OSError, AttributeError):
