@@ -75,7 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager that, if ``is_guarded`` is set, ends child processes when this process ends before :meth:`close`."""
+    """A context manager that makes child processes end with this process until :meth:`close`, if ``is_guarded`` is set."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None

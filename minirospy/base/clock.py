@@ -29,7 +29,7 @@ __all__ = [
 
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
-"""Length of each wait in the main thread, which receives signals, in seconds.
+"""Seconds per wait in the main thread, the thread that receives signals.
 
 On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just before a wait is handled only after it.
 """

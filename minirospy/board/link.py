@@ -278,7 +278,7 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without a responding server: the new server exited because another one was running, which has exited since.
+            # Status 0 without a responding server: the new server exited because of another one, and that one has exited since.
             # Negative status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)

@@ -14,7 +14,7 @@ __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 # Seconds for the main thread to exit by itself after a request from another process.
-# This is longer than after a signal, because no user is waiting at the terminal.
+# The time is longer than after a signal, because no user is waiting at the terminal.
 # A main thread that polls is_shutdown() may be in a long iteration of its loop.
 _REQUEST_GRACE_SECONDS = 2.0
 _REQUEST_GRACE_OF_POLLS_SECONDS = 5.0

@@ -27,7 +27,7 @@ class SoftLimits(NamedTuple):
     lower: float
     upper: float
     k_position: float  # 1/s
-    k_velocity: float  # damping, in N m s/rad or N s/m
+    k_velocity: float  # velocity gain, in N m s/rad or N s/m
 
 
 @dataclass(frozen=True)

@@ -247,7 +247,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return the local variable for a field's value, converted to the object whose length is written."""
+        """Return the name of the variable with a field's value, converted to the object whose length is written."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])

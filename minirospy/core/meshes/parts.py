@@ -38,7 +38,7 @@ Triangles = NDArray[np.int32]
 
 
 class Parts(NamedTuple):
-    """Meshes whose convex hulls are used for collisions; ``are_exact`` if they equal the original mesh together."""
+    """Meshes whose convex hulls are used for collisions; ``are_exact`` if together they equal the original mesh."""
 
     meshes: list[Mesh]
     are_exact: bool

@@ -299,7 +299,7 @@ class _Reader:
         read: Callable[[Element, Pose, Source], _Part | None],
         pose_of: Callable[[Element], Pose],
     ) -> tuple[_Part, ...]:
-        """Return the results of ``read`` for the children with this tag, without None."""
+        """Return the results of ``read`` for the children with this tag, except those that are None."""
         parts = (read(part, pose_of(part), self.source) for part in element.all(tag))
         return tuple(part for part in parts if part is not None)
 
@@ -327,7 +327,7 @@ class _Reader:
         initial = source.number(element, "initial_joint_position", axis.initial_position)
         axis = axis._replace(initial_position=initial)
         if child == _WORLD:
-            # The simulators move a joint's child, so make the world the parent, and reverse the axis.
+            # MuJoCo and Gazebo move a joint's child, so make the world the parent, and reverse the axis.
             parent, child = child, parent
             axis, axis2 = (each._replace(xyz=_negative(each.xyz)) for each in (axis, axis2))
         pose = relative(links[child].pose, here)

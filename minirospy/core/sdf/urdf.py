@@ -103,7 +103,7 @@ class _Converter:
         self._kept = self._flagged("preserveFixedJoint")
         self._revolute = self._flagged("disableFixedJointLumping") - self._kept
         self._bodies: dict[str, _Body] = {}
-        self._names: dict[tuple[str, str], str] = {}  # name in the model by (link, collision name)
+        self._names: dict[tuple[str, str], str] = {}  # keyed by (link, collision name): the name in the model
 
     def convert(self) -> Element:
         """Return the ``<model>``. Raise SdfError if no part of the robot remains."""
@@ -435,7 +435,7 @@ _OWN_TAGS = frozenset(("material", "visual", "collision", "static")) | _WITHOUT_
 
 
 def _deepest_first(body: _Body, robot: Robot) -> Iterator[tuple[str, Pose]]:
-    """Yield a body's links in the order in which sdformat adds their parts: a link, then the whole list of each merged child."""
+    """Yield a body's links in the order in which sdformat adds their parts: a link, then all of each merged child's links."""
     poses = dict(body.merged)
     stack = [body.link.name]
     while stack:

@@ -266,7 +266,7 @@ class Registrations:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
                         # As in ROS, a service belongs to the node that registered it last.
-                        # The entry therefore says nothing about this node's registration.
+                        # The master's entry therefore says nothing about this node's registration.
                         self.taken.add(asked)
                         continue
                 else:
