@@ -25,7 +25,7 @@ _H = TypeVar("_H", bound="Handle")
 
 
 class Handle:
-    """The base class of publishers, subscriptions and services, which register in the background; awaiting it waits for that."""
+    """The base class of publishers, subscriptions and services. ``await handle`` waits until it is registered with the master."""
 
     _registration: asyncio.Task[None]
 
