@@ -25,7 +25,7 @@ _H = TypeVar("_H", bound="Handle")
 
 
 class Handle:
-    """An object that registers in the background: ``await handle`` waits until it is registered with the master."""
+    """The base class of publishers, subscriptions and services. ``await handle`` waits until it is registered with the master."""
 
     _registration: asyncio.Task[None]
 
@@ -53,7 +53,7 @@ class Handle:
 async def registered(
     register: Callable[[_T], Awaitable[None]], part: _T, what: str, faults: RateLimitedLogger
 ) -> None:
-    """Wait for a registration to finish. If the master refuses it, only log that, as rospy does."""
+    """Wait for a registration to finish. If the master refuses it, log the refusal instead of raising, as rospy does."""
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:

@@ -21,7 +21,7 @@ __all__ = ["RosoutHandler", "TerminalHandler"]
 
 
 class TerminalHandler(logging.Handler):
-    """Prints log lines like rospy: debug and info to stdout, other levels to stderr."""
+    """Prints log lines as rospy does: debug and info to stdout, other levels to stderr."""
 
     def __init__(self, node: Node) -> None:
         super().__init__()

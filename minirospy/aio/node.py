@@ -52,7 +52,7 @@ _Request = TypeVar("_Request", bound=Message)
 _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
-# maximum log lines in ten seconds, because a bridge may have thousands of topics
+# maximum log lines per ten seconds; a bridge may register thousands of topics
 MAX_REGISTRATION_FAULTS = 5
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
@@ -67,7 +67,7 @@ _UNSPECIFIED = _Unspecified()
 
 
 class Node:
-    """A node in the computation graph, which exists inside ``async with Node("name") as node:``.
+    """A node in the computation graph, used as ``async with Node("name") as node:``.
 
     ``name`` has no namespace; ``anonymous`` appends a number to it. ``argv`` contains remappings, private parameters
     and special names as on a command line (pass ``sys.argv`` in a program that roslaunch starts; the default is empty,
@@ -114,7 +114,7 @@ class Node:
         # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
 
-        # The shutdown reason from another process, such as the master if a new node has the same name
+        # The reason given by another process that requested the shutdown, such as the master if a new node took this name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
@@ -219,7 +219,7 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Ask the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
+        """Ask the node to shut down: :meth:`spin` returns, loops over messages end, sleeps are interrupted. Thread-safe.
 
         The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """
@@ -232,7 +232,7 @@ class Node:
 
     @property
     def is_started(self) -> bool:
-        """Return whether the node has connected to a master, and therefore is in the graph."""
+        """Return whether the node has connected to a master and joined the graph."""
         return self._is_started
 
     @property
@@ -261,7 +261,7 @@ class Node:
     # --- topics
 
     def subscribe(self, topic: str, message_class: type[_M], *, queue_size: int = 10) -> Subscription[_M]:
-        """Subscribe to ``topic`` and return its messages, for ``async for``.
+        """Subscribe to ``topic``; iterate over the result with ``async for`` to receive the messages.
 
         While the program is busy, the newest ``queue_size`` messages are queued; older ones are dropped and counted
         (``dropped``). The subscription starts immediately, in the background; ``await node.subscribe(...)`` waits until
@@ -284,7 +284,7 @@ class Node:
         type_: InterfaceType | None = None,
         on_change: Callable[[], object] | None = None,
     ) -> RawSubscription:
-        """Subscribe to ``topic``, of any type unless ``type_`` is given, and receive its messages as bytes.
+        """Subscribe to ``topic`` and receive its messages as bytes. Without ``type_``, accept any type.
 
         ``deliver(data, header)``, with the publisher's connection header, is called on the loop; so is ``on_change``,
         when a publisher has connected. Both must return quickly. ``deliver`` may keep the data. ``await

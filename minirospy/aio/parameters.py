@@ -47,7 +47,7 @@ class ParameterWatch:
         await runtime.master("unsubscribeParam", runtime.uri, name)
 
     def changed_in_worker(self, name: str, value: object) -> None:
-        """Notify the listeners of a change that the master has sent to the node's server."""
+        """Notify the listeners of a parameter update from the master."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._changed, name, value)
 

@@ -66,7 +66,7 @@ class RawSubscription(Handle):
         self._deliver(frame, header)
 
     def _end(self) -> None:
-        """Do nothing, because no task waits for messages here."""
+        """Do nothing, because no task waits for the messages of a raw subscription."""
 
 
 class RawService(Handle):
@@ -101,7 +101,7 @@ class RawService(Handle):
 
 
 def raw_class(type_: InterfaceType) -> type[Message]:
-    """Return a message class without fields that only specifies a topic's type, for ``advertise`` and ``publish_raw``."""
+    """Return a message class without fields, which only carries a topic's type for ``advertise`` and ``publish_raw``."""
     fields = {
         "_type": type_.name,
         "_md5sum": type_.md5sum,

@@ -59,7 +59,7 @@ class SimulatedTime:
     """The time in the last /clock message, in nanoseconds; 0 before the first one."""
 
     def __init__(self, stopping: asyncio.Event, on_silence: Callable[[], object] = lambda: None) -> None:
-        """Create the clock. ``on_silence()`` is called once if a sleep has waited two seconds for the first message."""
+        """Create the clock. ``on_silence()`` is called once if a sleep has waited two seconds for the first /clock message."""
         self.now = 0
         self._first = FirstTimeWait(on_silence)
         self._stopping = stopping

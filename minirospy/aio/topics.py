@@ -32,7 +32,7 @@ JOIN_SECONDS = 1.0
 
 
 class Subscription(Handle, Generic[_M_co]):
-    """The messages on a topic, for ``async for``; created by :meth:`Node.subscribe`.
+    """The messages on a topic, to iterate over with ``async for``; created by :meth:`Node.subscribe`.
 
     The iteration ends when the subscription is closed or the node shuts down.
     """
@@ -211,7 +211,7 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def wait_for_expected(self) -> None:
-        """Wait up to a second for subscribers to connect; the master listed them when the topic was registered."""
+        """Wait up to a second for the subscribers that the master listed at registration to connect."""
         await self
         state = self._state
         if state is None:
@@ -251,7 +251,7 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # Leave the topic when the subscription is garbage-collected: `async for ... break` discards it without closing it.
+        # Leave the topic when the subscription is garbage-collected: leaving `async for` by `break` does not close it.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 

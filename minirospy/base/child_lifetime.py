@@ -75,7 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """Context manager. If ``is_guarded`` is set, child processes end if this process ends before :meth:`close`."""
+    """A context manager that makes child processes end with this process until :meth:`close`, if ``is_guarded`` is set."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None
@@ -121,7 +121,7 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # This process belongs to another program's job, such as an IDE's or a service's, which lets no process leave.
+            # This process is in another program's job, such as an IDE's or a service's, and that job lets no process leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 

@@ -29,7 +29,7 @@ __all__ = [
 
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
-"""Seconds per wait of the main thread, which receives signals.
+"""Seconds per wait in the main thread, the thread that receives signals.
 
 On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just before a wait is handled only after it.
 """
@@ -206,6 +206,6 @@ class SimulatedClock:
 
     @staticmethod
     def _wait(sleeper: SignalSafeEvent) -> None:
-        """Wait until the clock is set or the stop event must be polled, because that event does not end this wait."""
+        """Wait until the clock is set, or until it is time to poll the stop event, which cannot interrupt this wait."""
         sleeper.wait(_POLL_SECONDS)
         sleeper.clear()

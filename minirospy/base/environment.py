@@ -46,8 +46,8 @@ _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
 LOOPBACK = "127.0.0.0/8, ::1"
-"""The networks that may connect to a local process. Listening only on loopback is not enough: if net.ipv4.route_localnet is
-set in the kernel, as on container hosts, neighbouring machines can connect to it.
+"""Networks whose hosts may connect to a local process. Listening only on loopback is not enough: if net.ipv4.route_localnet
+is set in the kernel, as on container hosts, neighbouring machines can connect to it.
 """
 
 
@@ -75,7 +75,7 @@ class Environment(NamedTuple):
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
-        """Read the record from ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
+        """Read the settings from ``environ`` (default: the process's environment); ``overrides``: master_uri, host, namespace.
 
         Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is not just a name or
         address, MINIROSPY_PORTS is not a range such as 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown,

@@ -283,7 +283,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """An error in text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole text)."""
+    """An error at ``line`` (from 1; 0: the whole text) of text that a user wrote; ``file`` is its path or another name."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)
@@ -344,7 +344,7 @@ class BagFormatError(BagError):
 
 
 class NoBagError(BagFormatError):
-    """The file does not start like a bag."""
+    """The file does not start with a bag's first line."""
 
 
 class BagVersionError(BagError):
@@ -457,7 +457,7 @@ class ThreadLimitError(ROSException):
 
 
 class NoThreadsAtEndError(ThreadLimitError):
-    """A thread cannot be started.
+    """A thread cannot be started after the main thread has exited.
 
     Python 3.12.0 to 3.12.2 start none after the main thread has exited (CPython issue 113964).
     """
@@ -505,7 +505,7 @@ class TransportTerminated(TransportException):
 
 
 class ServiceException(Exception):
-    """A service call failed: no provider, a broken link, or the handler's own error."""
+    """A service call failed: there is no provider, the connection broke, or the handler raised an error."""
 
 
 class TransformException(Exception):

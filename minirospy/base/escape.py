@@ -15,7 +15,7 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Includes direction marks: they reverse the text that follows, which could make a name look like another one.
+# Includes direction marks, which reverse the text that follows: a name could then look like another one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 
@@ -40,7 +40,7 @@ def has_controls(text: str) -> bool:
 
 
 def own_output() -> TextIO:
-    """Return a standard output for drawings that move the cursor; :class:`SafeTerminal` would escape those sequences.
+    """Return a standard output that does not escape control sequences, for drawings that move the cursor.
 
     The caller must escape untrusted text in the drawing.
     """
@@ -51,7 +51,7 @@ def own_output() -> TextIO:
 
 
 class SafeTerminal(io.TextIOWrapper):
-    """A standard stream on a terminal that displays control characters instead of executing them, as `ls` does for names.
+    """A standard stream that shows control characters on a terminal instead of executing them, as `ls` does for names.
 
     Sequences from the commands themselves (:data:`_OWN_SEQUENCE`), line feeds and tabs are written unchanged.
     """

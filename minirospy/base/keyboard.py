@@ -15,7 +15,7 @@ LOOK_SECONDS = 0.05  # seconds for which Keys.next waits for a key
 
 
 class Keys:
-    """Reads single keys from the terminal, without Enter and without echo. There are none if stdin is not a terminal."""
+    """Reads single keys from the terminal, without Enter and without echo. If stdin is not a terminal, there are no keys."""
 
     _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
     _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}

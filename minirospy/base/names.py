@@ -92,7 +92,7 @@ def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = No
 
 
 def anonymous_name(base: str) -> str:
-    """Return a unique name, different in each call, from ``base``, the host, the process id and a random number."""
+    """Return a unique name made from ``base``, the host, the process id and a random number."""
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
     number = int.from_bytes(os.urandom(8), "big") >> 1
     return f"{base}_{host}_{os.getpid()}_{number}"

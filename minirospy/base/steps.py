@@ -15,7 +15,7 @@ _T = TypeVar("_T")
 
 
 class Need(Enum):
-    """A request that a step may yield instead of None."""
+    """A scheduling request that a step yields instead of None: to run alone, or to pause."""
 
     ALONE = "no other work that takes much memory may run beside this"
     PAUSE = "there is nothing to do at present"
@@ -23,7 +23,7 @@ class Need(Enum):
 
 ALONE, PAUSE = Need
 
-Steps = Generator[Need | None, None, _T]  # work that yields between its steps and returns its result
+Steps = Generator[Need | None, None, _T]  # a generator that yields between its steps and returns its result
 
 SMALL_ITEMS = 2000  # number of items that take a few milliseconds to serialize
 

@@ -15,7 +15,7 @@ _V = TypeVar("_V", bound="TVal")
 
 
 class TVal:
-    """The common part of Time and Duration: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalized."""
+    """The base class of Time and Duration: ``secs`` and ``nsecs``, with 0 <= nsecs < 1e9 once normalized."""
 
     __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 

@@ -19,7 +19,7 @@ _TOKEN = re.compile(
     r"|<!\[CDATA\[.*?\]\]>"
     r"|(?P<declaration><\?xml\b.*?\?>)"
     r"|<\?.*?\?>"
-    r"|<!DOCTYPE(?=(?P<doctype>[^>\[]*))(?P=doctype)(?:\[[^\]]*\])?[^>]*>"  # lookahead: without it, quadratic time
+    r"|<!DOCTYPE(?=(?P<doctype>[^>\[]*))(?P=doctype)(?:\[[^\]]*\])?[^>]*>"  # the lookahead prevents quadratic time
     r"|(?P<end></[^\s<>]+\s*>)"
     r"|<(?P<tag>[A-Za-z_][^\s/>]*)(?P<attributes>(?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(?P<close>/?)>"
     r"|(?P<text>[^<]+)"
@@ -34,7 +34,7 @@ _FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]"
 _PLAIN_DECLARATION = re.compile(r"""<\?xml\s+version\s*=\s*(["'])1\.\d\1""")
 _ENCODING = re.compile(rb"""^\s*<\?xml\b[^>]*?\bencoding\s*=\s*["']([A-Za-z][\w.:-]*)["']""")
 
-_FALLBACK = "Latin-1"  # every byte is a character in it
+_FALLBACK = "Latin-1"  # can decode any bytes, because each byte is a character
 
 
 class Note(NamedTuple):
@@ -64,7 +64,7 @@ def parse_lenient(text: str | bytes) -> Parsed:
         try:
             return Parsed(parse_xml(rewritten), tuple(rewriting.notes.values()))
         except XmlSyntaxError:
-            # The lines and columns of the first error refer to the original text.
+            # Raise the first error, whose line and column refer to the original text.
             raise error from None
 
 
@@ -103,7 +103,7 @@ class _Rewriting:
                 self._note(f"everything after the end of <{root}> is ignored")
                 break
             if token == "<":
-                # No parser accepts this. Continuing the search would take quadratic time if the text has many of them.
+                # No parser accepts a bare "<" here. Stop searching: a text with many of them would take quadratic time.
                 parts.append(text[match.start() :])
                 break
             parts.append(self._token(match, is_first=match.start() == 0))

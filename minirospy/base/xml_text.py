@@ -21,14 +21,14 @@ MAX_LEVELS = 100  # maximum depth of nested tags; parsers and libraries recurse 
 # maximum tags per document; even a tag of 4 characters uses about 500 bytes of memory
 _MAX_ELEMENTS = 1_000_000
 _UNQUOTED = re.compile(rb"""<[^<"'>]*(?:"[^"]*"[^<"'>]*|'[^']*'[^<"'>]*)*?\s([\w:-]+)\s*=\s*([^\s"'<>/=]+)""")
-_MAX_ADVISED = 1000  # bytes of a line that are searched for a mistake; the searches take quadratic time
+_MAX_ADVISED = 1000  # maximum bytes of a line to search for a mistake; searches take quadratic time
 _TYPOGRAPHIC_QUOTE = re.compile(rb"=\s*(?:\xe2\x80[\x98-\x9f]|\xc2[\xab\xbb])")
 _UNCLOSED = re.compile(rb"""\s([\w:-]+)\s*=\s*(["'])[^"'<>]*=\2(?=[^\s/>?])""")
-# Patterns in a line that is not well-formed, and what to write instead.
+# Patterns of mistakes in a malformed line, each with the advice for it.
 _MISTAKES = (
     (re.compile(rb"&(?!#?\w+;)"), "& is written &amp;"),
     (re.compile(rb"""=\s*(?:"[^"<]*<[^"]*"|'[^'<]*<[^']*')"""), "< in a value is written &lt;"),
-    # The second part is for a comment that starts in another line.
+    # The second alternative matches a comment that starts on an earlier line.
     (re.compile(rb"<!--(?:(?!-->).)*?--(?!>)|\A[^<=]*--(?!>)"), "a comment contains no --"),
 )
 

@@ -136,7 +136,7 @@ def check_yaml(text: str, loader: Loader | None = None) -> None:
     except yaml.YAMLError:
         if loader is None or issubclass(loader, fast_loader()):
             raise
-        # PyYAML's loader in Python accepts more, such as {data:[1]}; it takes ten times as long.
+        # PyYAML's pure Python loader accepts more, such as {data:[1]}, but takes ten times as long.
         _check_events(yaml.parse(text, Loader=loader), has_aliases)
 
 

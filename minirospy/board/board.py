@@ -80,7 +80,7 @@ class Board:
         self._link.call(Release(pin))
 
     def set(self, pin: int, level: int) -> None:
-        """Drive an input to ``level`` (0 or 1) from outside, or set an output in the same way as another program."""
+        """Drive an input to ``level`` (0 or 1) from outside, or set an output as another program would."""
         self._link.call(Force(pin, level))
 
     @property

@@ -93,7 +93,7 @@ class BoardDirectory:
 
     @property
     def log_path(self) -> Path:
-        """The path of the log file for the error with which a server ended."""
+        """The path of the log file to which a failing server writes its error."""
         return self.folder / f"{self.name}.log"
 
 

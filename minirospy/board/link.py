@@ -235,7 +235,7 @@ class Link:
 
 
 class _Connection:
-    """A connected socket after the server's Welcome, which contained ``pins`` and ``person``."""
+    """A connection on which the server has sent its Welcome, with the ``pins`` and the ``person``."""
 
     def __init__(self, link: socket.socket, stream: Stream, welcome: Welcome, more: list[Message]) -> None:
         self._socket = link
@@ -278,7 +278,7 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without a responding server: the new server exited because of another one, which has exited since.
+            # Status 0 without a responding server: the new server exited because of another one, and that one has exited since.
             # Negative status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)
@@ -336,7 +336,7 @@ def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
     windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    # A temporary board is only for the processes started here, so it need not outlive this one.
+    # A temporary board only serves the processes started here, so it need not outlive this one.
     start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
     with open(os.devnull, "a") if windows else private_files.open_text(directory.log_path, "a") as log:
         process = start(

@@ -122,7 +122,7 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use it.
+        # BCM pins keyed by channel, for the channels that are set up. input() and output(), which must be fast, use this dict.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
         # The channels that cleanup() released in a signal handler, with their BCM pins: the interrupted call may still use them.
@@ -206,7 +206,7 @@ class Gpio:
         return int(self._linked().states[pin].function)
 
     def cleanup(self, channel: int | Sequence[int] | None = None) -> None:
-        """Reset the channels that this program set up to inputs; without an argument, also reset the numbering mode."""
+        """Reset this program's channels to inputs; without an argument, also reset the numbering mode."""
         with self._lock:
             everything = channel is None
             wanted = (
@@ -214,8 +214,8 @@ class Gpio:
             )
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
-                # In a shutdown hook, the interrupted program may have checked its flag already and be about to use a pin.
-                # That must not fail: in RPi.GPIO, which is written in C, the program's call would finish first.
+                # In a shutdown hook: the interrupted program may already have checked its stop flag, and be about to use a pin.
+                # That use must not fail: RPi.GPIO's calls are in C, so there the call would finish before the hook runs.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -400,7 +400,7 @@ class Gpio:
 
         with self._lock:
             if pin not in self._directions:
-                # During the call to the board, a signal handler has called cleanup().
+                # A signal handler called cleanup() during the call to the board.
                 return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin
@@ -458,7 +458,7 @@ class Gpio:
                 callbacks.schedule(detector)
 
     def _check_wiring(self, channel: int, pin: int, direction: int) -> None:
-        """Warn once per channel whose setup has no effect on the virtual board.
+        """Warn, once per channel, if the channel's setup has no effect on the virtual board.
 
         ``setwarnings(False)`` does not suppress the warning, because most listings start with that call.
         """

@@ -57,7 +57,7 @@ def main(argv: list[str]) -> int:
     if sys.platform == "win32":
         # Windows only: do not keep the log file open, because an open file and its folder cannot be removed there.
         sys.stderr = _LogOnDemand(directory.log_path)
-    # A board with saved state is not temporary, even if another process restarts it.
+    # A board with saved state stays permanent, even if a process that wants a temporary board restarts it.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
     with _locked(directory) as owned:
         if owned:

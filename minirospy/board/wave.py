@@ -10,11 +10,11 @@ from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
 
-PWM_LIMIT = 50.0  # Hz; a faster PWM is shown on the board at this frequency, with its own duty cycle
+PWM_LIMIT = 50.0  # Hz; the board shows a faster PWM at this frequency, with the PWM's duty cycle
 
 
 class Output(Protocol):
-    """The output channels' interface for a wave."""
+    """The interface through which a wave controls its output channel."""
 
     def write(self, pin: int, level: int) -> None:
         """Set the level at a pin."""
@@ -69,7 +69,7 @@ class Wave:
         self._gpio.unregister_wave(self)
 
     def _run(self) -> None:
-        # Without a board there is no pin to modulate.
+        # If the board is gone, there is no pin to modulate.
         with contextlib.suppress(BoardError):
             while not self._stopping:
                 self._changed.clear()

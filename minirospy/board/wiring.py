@@ -10,7 +10,7 @@ _PARTS = f"its LEDs are at {min(LEDS)} to {max(LEDS)}, its buttons at {' and '.j
 
 
 def wiring_fault(channel: int, pin: int, direction: int, *, is_board: bool) -> str:
-    """Return why using BCM ``pin`` in this direction has no effect; an empty string if it has one.
+    """Return the reason why using BCM ``pin`` in this direction has no effect, or "" if it has one.
 
     ``channel`` is the number that the program uses; ``is_board`` means that it is a GPIO.BOARD number.
     """
@@ -22,5 +22,5 @@ def wiring_fault(channel: int, pin: int, direction: int, *, is_board: bool) -> s
         return f"{name} is a button: as an output it reads no press, and on a real board a press is a short circuit"
     if is_board and (channel in LEDS or channel in BUTTONS):
         return f"nothing is wired: {name}; with GPIO.setmode(GPIO.BCM), {channel} is a part of the board"
-    # `minirospy board press` drives every input.
+    # An input without a wired part is fine, because `minirospy board press` can drive every input.
     return f"nothing is wired to {name}: {_PARTS}" if is_output else ""

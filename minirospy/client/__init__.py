@@ -156,7 +156,7 @@ __all__ = [
     "wait_for_service",
 ]
 
-# Do this before the first message is imported: if ROS 2 is sourced, its packages of the same names come first on the path.
+# Do this before the first message is imported: if ROS 2 is sourced, its packages with the same names come first on the path.
 prefer_ros1()
 find_packages_named_like_scripts()
 
@@ -179,7 +179,7 @@ def on_shutdown(h: Callable[[], object]) -> None:
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; the hooks run in this thread."""
     current_session().lifecycle.signal_shutdown(reason)
-    # Mark the calling thread as notified: from now on it only cleans up, and may sleep.
+    # Mark the calling thread as notified: it only cleans up from now on, and may sleep.
     current_session().poll_shutdown()
 
 
@@ -229,7 +229,7 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """Return ``name`` as remapped on the command line, as a global name, or ``name`` itself if it is not remapped."""
+    """Return the global name to which the command line remaps ``name``, or ``name`` itself if it is not remapped."""
     return current_session().identity.remap(name, caller_id)
 
 

@@ -28,7 +28,7 @@ class _Repeated:
     def __init__(self, due: float, line: str) -> None:
         self.due = due  # time when the next line may be logged
         self.line = line  # description of the last error
-        self.omitted = 0  # number of errors since the last line
+        self.omitted = 0  # number of errors not logged since the last line
 
 
 class CallbackErrors:
@@ -47,7 +47,7 @@ class CallbackErrors:
         self._lock = threading.RLock()
 
     def log(self, callback: object, error: BaseException, advice: str = "") -> None:
-        """Log ``error``, which ``callback`` raised, or count it.
+        """Log an error that ``callback`` raised, or only count it if the same error was logged recently.
 
         ``advice`` is printed once, outside the log: programs compare the log's text with ROS's.
         """

@@ -38,7 +38,7 @@ class Deferral:
             self.poll()
 
     def poll(self) -> None:
-        """Dispatch a pending signal if this is the main thread and it is outside of a critical section."""
+        """Dispatch a pending signal if this is the main thread and it is outside a critical section."""
         if self.pending and not self._depth and is_main_thread():
             self.dispatch()
 

@@ -29,7 +29,7 @@ class Identity:
     """
 
     def __init__(self, previous: Identity | None = None) -> None:
-        """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
+        """Use the identity ``previous``, except for topic names, until :meth:`take_name` is called."""
         # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node.
         # Programs may change this dict and `mappings`.
         self.remappings: dict[str, str] = previous.remappings if previous else {}
@@ -117,7 +117,7 @@ class Identity:
         return names.resolve(name, self.name, self.resolved_mappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the command line's remapping of ``name`` as written there, or ``name`` itself if it is not remapped."""
+        """Return the name to which the command line remaps ``name``, as written there, or ``name`` if it is not remapped."""
         mapped = self.mappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 

@@ -56,7 +56,7 @@ class _Interrupting:
 
 
 class Lifecycle:
-    """The node's shutdown: the functions that it calls, and their order."""
+    """Runs the node's shutdown: calls the registered functions in a fixed order."""
 
     def __init__(self, leave: Callable[[], object]) -> None:
         """Create the lifecycle. A shutdown calls ``leave()`` to remove the node from the graph."""
@@ -69,11 +69,11 @@ class Lifecycle:
         """
         # Set once the shutdown hooks have run; every blocking call then returns
         self.shutting_down = SignalSafeEvent()
-        self.left = SignalSafeEvent()  # set when the node has left the graph
+        self.left = SignalSafeEvent()  # set once the node has left the graph
         self.reason: object = None  # the reason passed with the shutdown request
 
         self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() still returns False
-        # Called after ``hooks``, including those that a hook has added
+        # Called after ``hooks``, including hooks added by other hooks
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
         """called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls"""
@@ -93,7 +93,7 @@ class Lifecycle:
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        # Without the deferral, a signal dispatched in between could shut the node down without calling this hook.
+        # Without the deferral, a signal dispatched here could shut the node down without calling this hook.
         with self.deferral, self._lock:
             if not self.is_shutdown():
                 (self.hooks if hooks is None else hooks).append(hook)
@@ -141,7 +141,7 @@ class Lifecycle:
         return _Interrupting(self, interrupt)
 
     def spin(self) -> None:
-        """Wait until the node shuts down. An interrupt shuts it down; in a notebook, it is raised and the node continues."""
+        """Wait until the node shuts down. An interrupt shuts the node down; in a notebook, the interrupt is only raised."""
         try:
             wait_for_event(self.shutting_down, None)
         except KeyboardInterrupt:

@@ -42,7 +42,7 @@ class DeferringHandler(logging.Handler):
 
 
 class RosStreamHandler(DeferringHandler):
-    """Prints log lines like rospy: debug and info to stdout, other levels to stderr, coloured on a terminal.
+    """Prints log lines as rospy does: debug and info to stdout, other levels to stderr, coloured on a terminal.
 
     ROSCONSOLE_FORMAT sets the format (http://wiki.ros.org/rosconsole#Console_Output_Formatting).
     """
@@ -50,7 +50,7 @@ class RosStreamHandler(DeferringHandler):
     def __init__(
         self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
     ) -> None:
-        """Print to ``stdout`` and ``stderr``. By default, these are ``sys.stdout`` and ``sys.stderr`` when a line is written."""
+        """Print to ``stdout`` and ``stderr``; by default, to ``sys.stdout`` and ``sys.stderr`` as set when a line is written."""
         super().__init__()
         self._colorize = colorize
         self._stdout = stdout

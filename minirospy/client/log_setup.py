@@ -52,7 +52,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     except OSError:
         _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
 
-    # A user's logging configuration file refers to this, and programs use it to find their log file.
+    # The user's logging configuration file refers to this variable, and programs use it to find their log file.
     os.environ["ROS_LOG_FILENAME"] = str(path)
     if not configured_by_file(session.identity.environment.home):
         _rosout.setLevel(logging.INFO)
@@ -146,7 +146,7 @@ def _log_to_file(session: Session, path: Path) -> None:
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):
-        """A handler whose class name is the one that programs written for rospy look for among the root logger's handlers."""
+        """A handler with the class name that programs written for rospy look for among the root logger's handlers."""
 
     try:
         file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
@@ -173,7 +173,7 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 def _link_latest(folder: Path) -> None:
     """Create the link ``latest`` next to a run's folder, pointing to that folder."""
     link = folder.parent / "latest"
-    # The file system does not support links, or another node was faster.
+    # The file system does not support links, or another node created the link first.
     with contextlib.suppress(OSError, NotImplementedError):
         if link.is_symlink():
             if link.resolve() == folder.resolve():

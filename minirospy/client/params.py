@@ -93,7 +93,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
 
 
 def set_param(param_name: str, param_value: object) -> None:
-    """Set a parameter; a dictionary sets a whole namespace. Numpy's numbers and arrays become numbers and lists.
+    """Set a parameter; a dictionary sets a whole namespace. Numpy numbers and arrays are sent as numbers and lists.
 
     Raise TypeError or OverflowError if XML-RPC has no type for a value, ROSException if the master fails.
     """
@@ -214,13 +214,13 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
 
 
 def as_xmlrpc_client(value: object) -> object:
-    """Wrap bytes and dates in a value in xmlrpc.client's classes, as Python's own XML-RPC client does."""
+    """Return a value with its bytes and dates wrapped in xmlrpc.client's classes, as from Python's own XML-RPC client."""
     if isinstance(value, dict):
         return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):
         return [as_xmlrpc_client(item) for item in value]
     if isinstance(value, bytes) or _is_date(value):
-        # Imported here, because http.client and its imports load slower than the rest of this module.
+        # Imported here, because http.client and its imports take longer to load than the rest of this module.
         import xmlrpc.client
 
         return xmlrpc.client.Binary(value) if isinstance(value, bytes) else xmlrpc.client.DateTime(value)

@@ -221,7 +221,7 @@ class PublishedTopic(SharedTopic):
 
     @property
     def is_latch(self) -> bool:
-        """Return whether a subscriber that connects later receives the last message; may be changed."""
+        """Return whether the last message is sent to subscribers that connect later. Programs may assign to it."""
         return self.publication.latch
 
     @is_latch.setter
@@ -331,7 +331,7 @@ class PublishedTopic(SharedTopic):
             _log.debug("the first message on %s went to nobody: it has no subscriber yet", self.resolved_name)
 
     def _fault_of(self, message: Any) -> str:
-        """Return why a message does not match its type, or an empty string. Unlike `_frame`, leave its header unchanged."""
+        """Return the reason why a message does not match its type, or "". Unlike `_frame`, do not change the message's header."""
         try:
             if isinstance(message, AnyMsg) or (self._has_header and message.header.frame_id is None):
                 return ""

@@ -80,7 +80,7 @@ class Service(Generic[_S_co]):
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
         self._since = time.monotonic()
-        self.seq = 0  # the number of responses, used as seq in responses that start with a header
+        self.seq = 0  # number of responses so far; it becomes ``seq`` in responses that start with a header
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
 

@@ -81,19 +81,19 @@ class ServiceProxy(Generic[_S_co]):
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # Number of calls that reached the service, used as seq in requests that start with a header.
+        # Number of calls that reached the service; it becomes ``seq`` in requests that start with a header.
         self._calls = 0
         self._transport: TCPROSTransport | None = (
             None  # a connection set by the program, or one that the program requested
         )
         self._transport_is_own = False  # the proxy opened the transport's connection, and may open another
         self._protocol: TCPROSServiceClient | None = None
-        # Held during calls that share a connection. Reentrant, because a signal may run a shutdown hook in the middle of
-        # a call of the same thread, and the hook may call the service.
+        # Held during calls that share a connection.
+        # Reentrant, because a signal may run a shutdown hook during this thread's call, and the hook may call the service.
         self._lock = threading.RLock()
-        self._is_calling = False  # a thread is in such a call
-        # Held while the connection changes hands, never during a call: a handler may read ``transport``, or another
-        # thread may read it to abort the call. Reentrant, because a signal may run a shutdown hook that does so.
+        self._is_calling = False  # True while a thread makes such a call
+        # Held while the connection changes hands, never during a call, because other threads may read ``transport`` then.
+        # Reentrant, because a signal may run a shutdown hook that also reads ``transport``.
         self._handover = threading.RLock()
 
     def __call__(self, *args: object, **kwds: object) -> Any:
@@ -114,7 +114,7 @@ class ServiceProxy(Generic[_S_co]):
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
             if self._is_calling:
-                # A shutdown hook interrupted this thread's call, whose response is still to come on the connection.
+                # A shutdown hook interrupted this thread's call, and the call's response is still to be read from the connection.
                 body = self._serialize(request)
                 return self._exchange(self._connect(body), body, keep=False)
             self._is_calling = True
@@ -125,7 +125,7 @@ class ServiceProxy(Generic[_S_co]):
 
     def _call_in_turn(self, request: Message) -> Message:
         """Call the service through the transport or the persistent connection, and return the response."""
-        # Look for a transport here, because another thread may have read or ended it while this one waited.
+        # Check for a transport only now: another thread may have taken or closed it while this one waited.
         transport = self._usable_transport()
         if transport is not None:
             return self._call_through(transport, request)
@@ -156,8 +156,8 @@ class ServiceProxy(Generic[_S_co]):
             if self._transport is None and client is not None:
                 from minirospy.client.tcpros import TCPROSTransport
 
-                # From here on the connection belongs to the transport, which the program may use or close. A call in
-                # progress still receives its response; the next call waits for that, and then uses the transport.
+                # From here on, the connection belongs to the transport, which the program may use or close.
+                # A call in progress still receives its response; the next call waits for that, and then uses the transport.
                 transport = TCPROSTransport(self.protocol, self.resolved_name)
                 transport.set_socket(client.detach(), client.uri)
                 transport.dest_address = split_uri(client.uri, "rosrpc")[:2]
@@ -192,8 +192,8 @@ class ServiceProxy(Generic[_S_co]):
         """Close the persistent connection; abort the call of another thread that uses it."""
         client = self._client
         if client and self._is_calling:
-            # Shut the socket down instead of closing it, because closing would not wake a thread that is reading from
-            # it. That thread then closes the socket.
+            # Do not close the socket here: that would not wake a thread that is reading from it.
+            # After a shutdown of the socket, the reading thread wakes up and closes it.
             client.hang_up()
         else:
             self._disconnect()
@@ -283,8 +283,7 @@ class ServiceProxy(Generic[_S_co]):
         try:
             request.serialize(buffer)
         except (SerializationError, OverflowError):
-            # Connect first, as rospy does, so that an error about a missing service or wrong type precedes
-            # serialization errors.
+            # Connect first, as rospy does: a missing service or a wrong type is reported before a serialization error.
             if self._client is None:
                 self._connect_by_master(None, b"").close()
             self._calls += 1
@@ -341,8 +340,8 @@ class ServiceProxy(Generic[_S_co]):
         uri = self._find_uri()
         try:
             if ahead and ahead.uri == uri:
-                # The server may have been about to exit when it accepted the connection, so connect again. Do not
-                # retry if the server does not respond, because it may have received the request.
+                # The server may have been about to exit when it accepted the connection, so connect again.
+                # Do not retry if the server does not respond, because it may have received the request.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)
                     return ahead

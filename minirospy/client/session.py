@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NEW_SECONDS", "Session", "current_session", "replace_session", "replace_session_in_fork"]
 
-NEW_SECONDS = 2.0  # a program that ends this soon after it has subscribed or offered a service lacks spin()
+NEW_SECONDS = 2.0  # seconds; a program that exits this soon after subscribing probably lacks spin()
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
@@ -240,9 +240,9 @@ class Session:
     def _warn_of_missing_spin(self) -> None:
         """Log a warning if the program ends without an error right after it has subscribed, or offered a service."""
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
-        # Every node offers the last two.
+        # Ignore the two logger services, which every node offers.
         own = {name: each for name, each in self.offered.items() if not name.endswith(_SERVICES_OF_NODES)}
-        # A program that polls or has waited ends on purpose, and so does an interactive session.
+        # A program that polls, or has waited, exits on purpose, and so does an interactive session.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if is_meant or hasattr(sys, "last_value") or not all(state.is_new for state in waiting.values()):
@@ -310,7 +310,7 @@ class Session:
                 flush=True,
             )
         if not self.lifecycle.is_shutdown_requested:
-            # Called after the hooks, once is_shutdown() has become true.
+            # The interrupts are called after the hooks, once is_shutdown() has become true.
             self.lifecycle.interrupts.append(self.signals.interrupt_later)
         self.lifecycle.signal_shutdown(reason)
 

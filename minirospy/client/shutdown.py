@@ -10,11 +10,11 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-# seconds for the main thread to start the hooks, and then again for it to see that is_shutdown() is true
+# seconds for the main thread to start the hooks, and the same again to see that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 # Seconds for the main thread to exit by itself after a request from another process.
-# This is longer than after a signal, because no user is waiting at the terminal.
+# The time is longer than after a signal, because no user is waiting at the terminal.
 # A main thread that polls is_shutdown() may be in a long iteration of its loop.
 _REQUEST_GRACE_SECONDS = 2.0
 _REQUEST_GRACE_OF_POLLS_SECONDS = 5.0
@@ -124,7 +124,7 @@ class ShutdownMachine:
     def main_ends_by_itself(self) -> bool:
         """Return whether the main thread needs no exception to exit, because it has exited or has been notified."""
         # Trust a main thread that polls to exit by itself.
-        # After a request from another process, do not: no user is there to press Ctrl-C again.
+        # Do not trust it after a request from another process, because no user is there to press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 

@@ -75,7 +75,7 @@ class SignalWatchdog:
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # If SIGHUP is ignored because of nohup, let it stay ignored.
+            # If SIGHUP is ignored because of nohup, keep ignoring it.
             if handler != self.on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
                 signal.signal(number, self.on_signal)
@@ -86,7 +86,7 @@ class SignalWatchdog:
             _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
-            # Restore the previous file descriptor: it belongs to an event loop that installed it first.
+            # Restore the previous wakeup descriptor, because it belongs to an event loop that was installed first.
             signal.set_wakeup_fd(previous)
 
     def release(self) -> None:
@@ -103,7 +103,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while the node still handles Ctrl-C. From then on, the system handles a third Ctrl-C."""
+        """Flush the program's output while the node handles Ctrl-C. Afterwards, a third Ctrl-C terminates the process."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:

@@ -28,7 +28,7 @@ _FIRST_WINDOW = 2.0
 
 
 class WindowLimits(NamedTuple):
-    """The limits of an adaptive window.
+    """The limits within which the length of a statistics window is adapted.
 
     The window's length doubles if it has fewer than ``min_elements`` messages, and halves if it has more than
     ``max_elements``. The length stays between ``min_size`` and ``max_size`` seconds.

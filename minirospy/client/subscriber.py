@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 __all__ = ["SubscribedTopic", "Subscriber", "wait_for_message"]
 
 _log = logging.getLogger("rosout")
-_own_log = logging.getLogger(__name__)  # for the terminal and the log file; not published
+_own_log = logging.getLogger(__name__)  # logs to the terminal and the log file, not to /rosout
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
-_SILENT_SECONDS = 5.0  # a wait for a message that takes longer is logged, as one for a service
+_SILENT_SECONDS = 5.0  # seconds; a longer wait for a message is logged, like one for a service
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
-"""Topics that are not counted: /statistics itself, and /clock, from which the times come."""
+"""Topics that are not counted: /statistics itself, and /clock, which sets the time."""
 
 
 class Subscriber(Topic[_M_co]):
@@ -77,7 +77,7 @@ class Subscriber(Topic[_M_co]):
         if buff_size <= 0:
             raise ROSException("buffer size must be a positive integer")
         if callback is not None and not callable(callback):
-            # rospy reports this only when a message arrives.
+            # Warn now, because rospy reports an invalid callback only when a message arrives.
             warnings.warn(
                 f"the callback {callback!r} for {self.resolved_name} is not a function: pass its name, without quotes "
                 "and parentheses",
@@ -134,7 +134,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
             patience = _SILENT_SECONDS if timeout is None else min(timeout, _SILENT_SECONDS)
             is_longer = timeout is None or timeout > _SILENT_SECONDS
             if not wait_for_event(arrived, patience) and is_longer:
-                # rospy says nothing here, so users would not notice a misspelled name. It is not for /rosout.
+                # rospy logs nothing here, so users would not notice a misspelled name. Do not publish this on /rosout.
                 peers = subscriber.get_num_connections()
                 why = "no message yet" if peers else "nothing publishes it"
                 _own_log.warning("wait_for_message(%s): %s, waiting...", subscriber.resolved_name, why)
@@ -149,7 +149,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
 
 
 class _Callback(NamedTuple):
-    """A subscriber's function and its additional argument."""
+    """A Subscriber's callback function and the additional argument for it."""
 
     function: Callable[..., object]
     args: object
@@ -178,7 +178,7 @@ class SubscribedTopic(SharedTopic):
         self._statistics: StatisticsPublisher | None = None
         self._misfits = RateLimitedLogger(_log)
         self._registered = False
-        self._since = time.monotonic()  # when the latest Subscriber was created
+        self._since = time.monotonic()  # time at which the latest Subscriber was created
 
     @property
     def has_callback(self) -> bool:
@@ -307,7 +307,7 @@ class SubscribedTopic(SharedTopic):
         return 0 if 0 in sizes else max(sizes, default=0)
 
     def _look_for_statistics(self) -> None:
-        """Count the received messages if the parameter is set.
+        """Count the received messages if the parameter /enable_statistics is set.
 
         Runs in a worker thread, so that no Subscriber waits for the master.
         """
@@ -388,7 +388,7 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
             callback.function(message, callback.args)
     except BaseException as error:
         add_numpy_note(error)
-        # As in rospy, sys.exit() has no effect in a link's thread, but inside the Subscriber() call it exits the program.
+        # As in rospy, sys.exit() has no effect in a link's thread, but exits the program if called inside Subscriber().
         if is_callers_thread and not isinstance(error, Exception):
             raise
         # Ignore errors in the callback during a shutdown: a hook may have released resources that the callback uses.

@@ -37,7 +37,7 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back during a sleep, to ``time`` seconds before its start.
+    """During a sleep, simulated time jumped back to ``time`` seconds before the sleep's start.
 
     As in rospy, also a KeyboardInterrupt.
     """
@@ -260,7 +260,7 @@ class Timer(threading.Thread):
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:
-                    # A callback that is not a function cannot be called again, so stop.
+                    # Stop if the callback is not callable, because the next call would fail, too.
                     # During a shutdown, ignore errors in the callback.
                     if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
                         raise

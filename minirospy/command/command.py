@@ -98,7 +98,7 @@ NO_MASTER = RosText(f"ERROR: {MasterUnreachableError.ros_text}")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return ROS's message for an error, with an empty text if ROS has none."""
+    """Return ROS's message for an error; its text is empty if ROS has none."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):
@@ -191,7 +191,7 @@ def _heed_break() -> None:
 
 
 def _heed_interrupts() -> None:
-    """Exit on SIGINT even if a script started the command with `&`, for which the shell sets the signal to be ignored.
+    """Exit on SIGINT even if a script started the command with `&`, which makes the shell ignore the signal for it.
 
     ROS's commands exit in this case too, because they are nodes and install their own handlers. Build commands do not
     call this function; they keep the shell's setting.

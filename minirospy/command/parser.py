@@ -277,7 +277,7 @@ class AssignmentParser(Parser):
 
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the other arguments and a dict of the assigned values.
+    """Return the arguments without the assignments, and a dict of the assigned values.
 
     Drop special names such as __ns, which nodes read themselves.
     """

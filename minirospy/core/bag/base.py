@@ -64,7 +64,7 @@ class BagReader(ABC):
     def blocks(
         self, connections: Sequence[int], start: int | None = None, end: int | None = None
     ) -> Iterator[Block]:
-        """Yield the same messages as :meth:`messages`, but in blocks, for reading millions of messages."""
+        """Yield the same messages as :meth:`messages`, in blocks, which is faster for millions of messages."""
 
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
@@ -117,7 +117,7 @@ class BagReader(ABC):
 
 
 class ScannedReader(BagReader):
-    """A reader for bags that may lack an index. Such bags are scanned."""
+    """A reader for bags that may lack an index; it then scans the bag to build one."""
 
     @abstractmethod
     def scan(self) -> Iterator[int]:

@@ -197,7 +197,7 @@ class ChunkStream:
         all_offsets: list[array[int]],
         known: Mapping[int, Connection],
     ) -> None:
-        """Compare each connection's record in the chunk, before its first message, with the one in the bag's index.
+        """Check that the connection records before the chunk's messages match those in the bag's index.
 
         This is done once per connection. Raise BagFormatError if the records differ, or if the chunk's index is wrong.
         """

@@ -30,7 +30,7 @@ __all__ = [
 NONE = "none"
 BZ2 = "bz2"
 LZ4 = "lz4"
-COMPRESSIONS = (NONE, BZ2, LZ4)  # in rosbag's order
+COMPRESSIONS = (NONE, BZ2, LZ4)  # in the same order as in rosbag
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
 """Maximum size, in bytes, of a compressed chunk's data: the longest message (1 GiB) and the records before it must fit."""

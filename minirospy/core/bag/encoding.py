@@ -63,7 +63,7 @@ def message_prefixes(connection: int) -> tuple[bytes, bytes]:
 
 
 def encode_fields(fields: Mapping[str, bytes]) -> bytes:
-    """Serialize a header with its length prefix, with the fields in the mapping's order."""
+    """Serialize a header, including its length prefix. The fields keep the mapping's order."""
     parts = [b""]
     for name, value in fields.items():
         field = name.encode() + b"=" + value

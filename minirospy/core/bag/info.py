@@ -67,7 +67,7 @@ class Summary(NamedTuple):
     end: float | None
     messages: int
     stored: list[Stored]
-    types: list[tuple[str, str]]  # types and their md5sums
+    types: list[tuple[str, str]]  # pairs of a type and its md5sum
     topics: list[Topic]
 
 
@@ -131,7 +131,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
 
 
 def span_out_of_order(reader: BagReader) -> tuple[float, float] | None:
-    """Return the times of the first and last messages if ROS's summary shows different times, else None.
+    """Return the times of the first and last messages if ROS's summary would show other times, else None.
 
     For bags, ROS takes the times from the first and last chunks in the file. Chunks that overlap slightly, as those of recorders
     do, count as in order.

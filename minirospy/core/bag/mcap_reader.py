@@ -32,7 +32,7 @@ __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
 _TRANSIENT_LOCAL = re.compile(r"durability: *(1|transient_local)\b")  # ROS 2's latching, as rosbag2 stores it
-_MAX_SCHEMA = 1_048_576  # characters; a ROS 1 full text; the largest in real packages have about 30,000
+_MAX_SCHEMA = 1_048_576  # maximum characters in a schema, a ROS 1 full text; the largest in real packages have about 30,000
 _MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
@@ -52,7 +52,7 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 
 
 class McapReader(BagReader):
-    """An MCAP file of ROS 1, or of ROS 2. Presents its channels as bag connections.
+    """An MCAP file from ROS 1 or ROS 2. Presents its channels as bag connections.
 
     Messages of ROS 2 are converted if the file has their definitions and ROS 1 has the type. Channels that cannot be
     converted are not read; ``foreign`` contains their topics, each with the reason. Raise BagFormatError if the file is
@@ -103,7 +103,7 @@ class McapReader(BagReader):
         return "MCAP 0 of ROS 2" if self._converters else "MCAP 0"
 
     def _add_foreign(self, channel: Channel, schema: Schema | None) -> None:
-        """Add a channel of ROS 2, or the reason why it cannot be converted."""
+        """Add a ROS 2 channel, or record the reason why it cannot be converted."""
         if schema is None:
             self.foreign[channel.topic] = "it has no definition"
             return
@@ -157,7 +157,7 @@ class McapReader(BagReader):
         selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
         # Read a chunk when its first message may be the next one.
         # This loads each chunk only once, and keeps several chunks in memory only if they overlap in time.
-        # Positions are unique, so runs are never compared.
+        # Positions are unique, so the heap never compares two runs.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
         while heap:
@@ -337,7 +337,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the mcap library, whose reads may request any length.
+    """A stream for the mcap library, which may request reads of any length.
 
     A read returns the available data, without allocating the requested length.
     """
@@ -426,7 +426,7 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
 
 
 def _chunk_infos(summary: Summary, known: Collection[int]) -> list[ChunkInfo]:
-    """Return the chunk infos. The first has the counts of the whole file, because the summary has none per chunk."""
+    """Return the chunk infos. The first one has the whole file's counts, because the summary has none per chunk."""
     assert summary.statistics is not None
     all_counts = summary.statistics.channel_message_counts
     counts = {number: count for number, count in all_counts.items() if number in known}

@@ -52,7 +52,7 @@ def mcap_faults() -> Iterator[None]:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
         # Decompressors raise these errors for lengths that exceed the memory.
-        # A seek to before the start of a short file raises them, too.
+        # Seeking before the start of a short file raises these errors, too.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
@@ -255,7 +255,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return new message indexes for the last chunk, whose own are incomplete, and add them to its chunk index."""
+        """Return new message indexes for the last chunk, because its own are incomplete, and add them to its chunk index."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 

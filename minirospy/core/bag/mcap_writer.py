@@ -27,7 +27,9 @@ __all__ = [
 ]
 
 CHUNK_SIZE = 4 * 1024 * 1024
-"""Bytes per chunk before compression, as in the MCAP tools. `rosbag info` reads a summary that has one record per chunk."""
+"""Bytes per chunk before compression, as in the MCAP tools. The summary, which `rosbag info` reads, has one record per
+chunk.
+"""
 
 # Dict from chunk compression to the library's name for it
 COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
@@ -112,7 +114,7 @@ class McapWriter:
             raise BagFormatError(f"the time {time} ns is before 1970")
         whole = b"".join((body, tail)) if tail else body
 
-        # Count over all connections, like the MCAP tools' converter.
+        # Number the messages across all connections, like the MCAP tools' converter.
         sequence = self._count % 2**32
         self._gathered += len(whole)
         self._count += 1

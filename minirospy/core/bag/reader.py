@@ -205,7 +205,7 @@ class _Run:
 
 
 class _Merge:
-    """Merges chunks that may overlap into blocks of messages in time order.
+    """Merges chunks, which may overlap, into blocks of messages in time order.
 
     Each chunk is a run of sorted messages. The data of pending runs stays in memory up to CACHE_SIZE; beyond that it is
     discarded and read again later, so that even a bag whose chunks all overlap needs no more memory.
@@ -307,7 +307,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if the index does not match the bag header; messages would be missing then."""
+    """Raise BagFormatError if the index does not match the bag header, because messages would then be missing."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:

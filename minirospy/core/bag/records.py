@@ -50,7 +50,7 @@ __all__ = [
 MAGIC = b"#ROSBAG V2.0\n"
 """The first line of a version 2.0 bag."""
 
-OP_MESSAGE_DEFINITION = 1  # only in version 1.2 bags
+OP_MESSAGE_DEFINITION = 1  # this record exists only in version 1.2 bags
 OP_MESSAGE_DATA = 2
 OP_BAG_HEADER = 3
 OP_INDEX_DATA = 4
@@ -98,7 +98,7 @@ class BagHeader(NamedTuple):
 
 
 class Connection(NamedTuple):
-    """One publisher's topic: ``id`` in the bag, ``topic``, and the publisher's connection header."""
+    """A connection in the bag: its ``id``, its ``topic``, and the publisher's connection header."""
 
     id: int
     topic: str

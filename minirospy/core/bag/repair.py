@@ -96,7 +96,7 @@ class _Rewriting:
         self._put(edit.data)
 
     def finish(self) -> int:
-        """Truncate the file at the current position; return how many bytes its end has moved."""
+        """Truncate the file at the current position; return the number of bytes by which its end has moved."""
         shift, self._read = self.shift, self._read + len(self._waiting)
         self._put(b"")
         self._stream.seek(self._written)
@@ -271,7 +271,7 @@ class Repair:
             found = next_chunk(self._stream, record.end, limit)
             following = limit if found is None else found
         if is_whole and following > end:
-            return end  # the damage is after the index
+            return end  # the damage is after the chunk's index
         if following > expected:
             self.problems.append(
                 f"index of the chunk at byte {record.position}: {following - expected} bytes are left out"
@@ -353,7 +353,7 @@ def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[
             found += [(time, number, at) for time, at in zip(*read_entries(stream, record), strict=True)]
             position = stream.tell()
     except BagFormatError:
-        pass  # the caller finds missing entries by comparison
+        pass  # the caller finds the missing entries when it compares the index with the chunk
     return position, sorted(found)
 
 

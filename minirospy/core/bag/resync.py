@@ -17,7 +17,7 @@ _BEFORE = (0, 13, 19, 20, 32, 33)
 
 
 def is_record(stream: BinaryIO, position: int, limit: int) -> bool:
-    """Return whether there is a record at ``position``, or the stream ends there (``limit``)."""
+    """Return whether ``position`` is the start of a record, or the end of the stream (``limit``)."""
     return position == limit or _op(stream, position, limit) in _OPS
 
 

@@ -42,9 +42,9 @@ __all__ = ["CHUNK_THRESHOLD", "BagWriter", "Buffer", "Continued"]
 
 Buffer = bytes | bytearray | memoryview
 
-CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is complete; ROS's default
+CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is complete, as in ROS
 
-_LARGE = 64 * 1024  # bytes; a message of this size or larger is not copied into the chunk
+_LARGE = 64 * 1024  # a message of at least this many bytes is not copied into the chunk
 
 _BILLION = 10**9
 _OVERHEAD = 46  # bytes in a message's record in addition to its body

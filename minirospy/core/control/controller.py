@@ -78,7 +78,7 @@ class Resources:
         return self._resources[interface]
 
     def joint(self, name: str, interface: Interface) -> Joint:
-        """Claim a joint, and return it, to be commanded through ``interface``.
+        """Claim a joint to command through ``interface``, and return it.
 
         Raise HardwareError if the joint does not exist in this interface.
         """

@@ -10,7 +10,7 @@ __all__ = ["CANCELLED", "MonitoredGoal", "Outcome"]
 
 
 class Outcome(NamedTuple):
-    """The outcome of a goal. ``result``: the first field values of the result message."""
+    """The outcome of a goal. ``result``: the values of the result message's first fields."""
 
     event: GoalEvent
     result: tuple[Any, ...] = ()

@@ -17,7 +17,7 @@ class GripperLimits(NamedTuple):
     """The conditions under which a goal is reached and a gripper counts as stalled. The defaults are ROS's."""
 
     goal_tolerance: float = 0.01  # rad or m
-    max_effort: float = 0.0  # N m or N; used while no goal specifies an effort
+    max_effort: float = 0.0  # N m or N; the maximum effort if no goal specifies one
     stall_velocity: float = 0.001  # rad/s or m/s; a slower gripper counts as not moving
     stall_timeout: int = 1_000_000_000  # ns without motion after which the goal is aborted
 

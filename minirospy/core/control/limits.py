@@ -27,7 +27,7 @@ class SoftLimits(NamedTuple):
     lower: float
     upper: float
     k_position: float  # 1/s
-    k_velocity: float  # N m s/rad or N s/m
+    k_velocity: float  # velocity gain, in N m s/rad or N s/m
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def _of_description(joint: UrdfJoint) -> JointLimits:
 
 
 def _limit(parameters: Parameters, flag: str, key: str, given: float, none: float = inf) -> float:
-    """Return a parameter if its flag is true, ``none`` if the flag is false, ``given`` if either of the two is not set."""
+    """Return a parameter's value if its flag is true, ``none`` if the flag is false, ``given`` if either is not set."""
     has = parameters.get(flag)
     if has is False:
         return none
@@ -133,7 +133,7 @@ class _Limiter:
         self.enforce: Callable[[float], bool] | None = None
 
     def reset(self, active: Interface | None) -> None:
-        """Restart from the joint's present position, because another interface, or no controller, has commanded it meanwhile."""
+        """Restart from the joint's present position, after another interface, or no controller, has commanded it."""
         self.active = active
         is_velocity = active is Interface.VELOCITY
         self.previous = 0.0 if is_velocity else self.joint.position

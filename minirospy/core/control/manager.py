@@ -35,12 +35,12 @@ from minirospy.core.control.hardware import (
 
 __all__ = ["BEST_EFFORT", "STRICT", "ControllerTable", "Loaded", "Switch", "describe_error"]
 
-BEST_EFFORT, STRICT = 1, 2  # as in controller_manager_msgs/SwitchController
+BEST_EFFORT, STRICT = 1, 2  # values of ``strictness`` in controller_manager_msgs/SwitchController
 
 _LIBRARY = (os.path.dirname(os.__file__), "<frozen ")  # prefixes of the standard library's file names
 _MINIROSPY = str(Path(__file__).parents[2])
 
-_RAISED = (Exception, SystemExit)  # exceptions from the user's code, which may call sys.exit
+_RAISED = (Exception, SystemExit)  # exceptions that user code may raise, including SystemExit from sys.exit()
 
 Log = Callable[[int, str], object]
 """Called with a rosgraph_msgs/Log level and a line of text."""
@@ -73,7 +73,7 @@ class Switch:
     start_asap: bool
     timeout: float  # maximum wait for the hardware; 0 or less: no limit
     requested: Time
-    is_begun: bool = False  # set once the hardware has been asked to switch
+    is_begun: bool = False  # True once the hardware has been asked to switch
     on_done: Callable[[], object] = lambda: None
 
 
@@ -171,7 +171,7 @@ class ControllerTable:
                     return None
                 is_started = False
             if is_started and is_stopped:
-                # "no" is ROS's spelling.
+                # ROS's spelling: "no" instead of "not"
                 self._log(
                     ERROR,
                     f"Could no start or stop controller '{name}' because of conflicting switching command",
@@ -255,7 +255,7 @@ class ControllerTable:
             self._log(ERROR, f"Controller '{name}' raised in close: {describe_error(error)}")
 
     def _named(self, names: Iterable[str], is_strict: bool, verb: str) -> list[Loaded] | None:
-        """Return the controllers with these names. Skip unknown names, or return None for one if ``is_strict``."""
+        """Return the controllers with these names. If a name is unknown, skip it, or return None if ``is_strict``."""
         found = []
         for name in names:
             if each := self.find(name):
@@ -267,7 +267,7 @@ class ControllerTable:
         return found
 
     def _advance(self, switch: Switch, time: Time) -> bool:
-        """Stop and start a change's controllers, as far as the hardware is ready; return whether the change is complete."""
+        """Stop and start the controllers for which the hardware is ready; return whether the change is complete."""
         if not switch.is_begun:
             self._hardware.do_switch(switch.hardware_start, switch.hardware_stop)
             switch.is_begun = True
@@ -302,7 +302,7 @@ class ControllerTable:
             if joint.active is not None:
                 continue
             if math.isfinite(joint.position):
-                joint.position_command = joint.position  # an old command must not move the joint
+                joint.position_command = joint.position  # so that an old command does not move the joint
             elif interface not in (Interface.VELOCITY, Interface.EFFORT):
                 each.state = ControllerState.STOPPED
                 self._log(

@@ -10,8 +10,8 @@ from collections import deque
 
 __all__ = ["AckermannOdometry", "DiffDriveOdometry", "Odometry"]
 
-MIN_STEP = 100_000  # ns; over a shorter time no velocity can be measured
-STRAIGHT = 1e-6  # rad; a motion that turns by less in one cycle counts as a straight line
+MIN_STEP = 100_000  # ns; minimum time over which to measure a velocity
+STRAIGHT = 1e-6  # rad; a motion that turns by less than this in one cycle counts as straight
 
 
 class Odometry:

@@ -9,7 +9,7 @@ from minirospy.core.control.parameters import Parameters
 __all__ = ["PublishRate", "nanoseconds"]
 
 MAX_BEHIND = (
-    1_000_000_000  # ns; after a longer gap, restart from now instead of publishing in each cycle to catch up
+    1_000_000_000  # ns; after a longer gap, restart the schedule now instead of catching up in each cycle
 )
 
 
@@ -23,7 +23,7 @@ class PublishRate:
 
     def __init__(self, hertz: float) -> None:
         self.set(hertz)
-        self._last: int | None = None  # ns; the scheduled time of the last message
+        self._last: int | None = None  # scheduled time of the last message, in ns
 
     @classmethod
     def read(cls, parameters: Parameters) -> PublishRate:
@@ -42,7 +42,7 @@ class PublishRate:
 
     def is_due(self, time: Time) -> bool:
         """Return whether to publish in this cycle. If time has jumped back, restart the schedule from there."""
-        period = self._period  # another thread may change it
+        period = self._period  # read once, because another thread may change it
         if period is None:
             return False
         now = nanoseconds(time)

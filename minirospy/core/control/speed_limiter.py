@@ -23,7 +23,7 @@ class Range:
 
 @dataclass(frozen=True)
 class SpeedLimiter:
-    """Limits in m or rad, and s; None means unlimited."""
+    """Limits on a velocity, its acceleration and its jerk, in s and m or rad; None means unlimited."""
 
     velocity: Range | None = None
     acceleration: Range | None = None

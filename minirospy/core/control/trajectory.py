@@ -35,10 +35,11 @@ __all__ = [
     "wraparound_offset",
 ]
 
-NEVER = 1 << 100  # ns; later than any uptime, even if ROS time often jumps ahead
+NEVER = 1 << 100  # ns; a time that is later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
-MAX_MAGNITUDE = 1e100  # maximum position or derivative; up to it, no segment coefficient overflows
-_SINGULARITY = 1e-9  # rad; this close to a half turn, the positions decide the direction, not rounding
+MAX_MAGNITUDE = 1e100  # maximum position or derivative; larger values could overflow a segment's coefficients
+# rad; this close to a half turn, the sign of the position difference decides, not a rounding error
+_SINGULARITY = 1e-9
 
 
 class ErrorCode(IntEnum):
@@ -77,7 +78,7 @@ class JointTolerances(NamedTuple):
     goal_time: int = 0  # ns after the end of the trajectory within which the joint may still reach its goal
 
 
-UNCHECKED = JointTolerances()  # for a joint that stops, or moves without a goal
+UNCHECKED = JointTolerances()  # tolerances for a joint that stops, or moves without a goal
 
 
 class Segment:
@@ -129,7 +130,7 @@ class Segment:
 
 
 def _coefficients(first: State, last: State, t: float) -> tuple[float, ...]:
-    """Return the polynomial's coefficients, lowest degree first, then those of its derivatives that are not among them."""
+    """Return the polynomial's coefficients, lowest degree first, then the additional coefficients of its derivatives."""
     p0, v0, a0 = first
     p1, v1, a1 = last
     distance = p1 - p0
@@ -158,7 +159,7 @@ def _coefficients(first: State, last: State, t: float) -> tuple[float, ...]:
 class Point(NamedTuple):
     """A point of a trajectory message, with values in the order of the message's joints. An empty derivative is not specified."""
 
-    time: int  # ns from the start of the message's trajectory
+    time: int  # time in ns from the start of the message's trajectory
     positions: Sequence[float]
     velocities: Sequence[float] = ()
     accelerations: Sequence[float] = ()
@@ -179,7 +180,7 @@ class Points:
     points: Sequence[Point]
     times: Sequence[int]
     first: int
-    stamp: int  # ns of ROS time at which the trajectory starts; 0: in the next cycle
+    stamp: int  # start of the trajectory in ns of ROS time; 0: in the next cycle
     warning: str = ""
 
     def next_after(self, elapsed: int) -> int:
@@ -270,8 +271,8 @@ class Tail(NamedTuple):
     points: Points
     column: int  # the joint's index in the message
     first: int  # the index of the first point
-    start: int  # ns; the time at which the message's trajectory starts
-    offset: float  # rad added to the positions: a number of whole turns
+    start: int  # start of the message's trajectory, in ns
+    offset: float  # offset of the positions in rad, a number of whole turns
     tolerances: JointTolerances
 
 
@@ -293,7 +294,7 @@ class JointPath:
             self._count += len(tail.points.times) - 1 - tail.first
         self._index = 0
         self.current = segments[0]
-        self.next_start = self._start(1)  # ns; NEVER in the last segment
+        self.next_start = self._start(1)  # ns; start of the next segment, or NEVER in the last one
 
     def advance(self, time: int) -> None:
         """Make the segment at ``time`` the current one. Times must not decrease."""

@@ -92,13 +92,13 @@ class TrajectoryFollower:
         self._requests: deque[tuple[Plan | None, MonitoredGoal | None]] = deque(maxlen=_MAX_REQUESTS)
         self._paths: list[JointPath] = []
         self.is_running = False
-        self.time = 0  # ns of ROS time at the last update
-        self.uptime = 0  # ns at the last update
-        self._clock = (0, 0, 0)  # time, period and uptime of the last update, for other threads
+        self.time = 0  # ROS time of the last update, in ns
+        self.uptime = 0  # uptime at the last update, in ns
+        self._clock = (0, 0, 0)  # time, period and uptime of the last update, as read by other threads
         self.positions: list[float] = []  # desired
         self.velocities: list[float] = []  # desired
         self.accelerations: list[float] = []  # desired
-        self.position_errors: list[float] = []  # desired - actual
+        self.position_errors: list[float] = []  # desired minus actual
         self.velocity_errors: list[float] = []
 
     def start(self, time: int, positions: Sequence[float], velocities: Sequence[float]) -> None:
@@ -309,7 +309,7 @@ class TrajectoryFollower:
         bridge_start = max(start, uptime)
         bridge_end = start + points.times[first]
         if bridge_end <= uptime:
-            bridge_end = uptime + 1  # all points have passed meanwhile: go to the last one
+            bridge_end = uptime + 1  # all points are in the past by now: go to the last one
 
         paths = []
         for path, column, tolerances, is_continuous in zip(
@@ -342,7 +342,7 @@ class TrajectoryFollower:
 
 
 def read_joints(parameters: Parameters, robot: Callable[[], Robot]) -> list[FollowedJoint]:
-    """Return the joints of the parameter ``joints``, with the tolerances of ``constraints``.
+    """Return the joints listed in the parameter ``joints``, with the tolerances in ``constraints``.
 
     Raise ControllerError if the parameter is missing or names a joint that the robot's description lacks; raise ValueError
     if a tolerance is not finite.
@@ -401,7 +401,7 @@ def _is_within(
 
 
 def _stop(start: int, position: float, velocity: float, duration: int, goal: MonitoredGoal | None) -> Segment:
-    """Return a segment that stops a joint: the first half of a motion that returns to ``position`` with ``-velocity``."""
+    """Return a segment that brings a joint to a stop: the first half of a motion that reverses ``velocity``."""
     first = State(position, velocity)
     turning = Segment(start, first, start + 2 * duration, State(position, -velocity))
     return Segment(start, first, start + duration, State(*turning.sample(start + duration)), goal)

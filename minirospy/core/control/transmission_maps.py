@@ -88,7 +88,7 @@ class DifferentialTransmission(TransmissionMap):
 
 
 class FourBarLinkageTransmission(TransmissionMap):
-    """Actuator 1 moves joint 1; joint 2 is actuator 2 minus joint 1's motion. Raise HardwareError if a reduction is 0."""
+    """Actuator 1 moves joint 1; joint 2 moves by actuator 2's motion minus joint 1's. Raise HardwareError if a reduction is 0."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class FourBarLinkageTransmission(TransmissionMap):
     ) -> None:
         a, b, c, d = _reductions(actuator_reduction, joint_reduction, joint_offset, "four-bar linkage")
         motion = ((_reciprocal(a * c), 0.0), (-_reciprocal(a * c * d), _reciprocal(b * d)))
-        # These are ROS's formulas, although the actuators' and the joints' powers are not equal.
+        # These are ROS's formulas, although they do not conserve power between actuators and joints.
         super().__init__(motion, ((a * c, 0.0), (-a * c * d, b * d)), joint_offset)
 
 

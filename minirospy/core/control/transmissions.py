@@ -31,7 +31,7 @@ def read_transmissions(
     Raise UrdfError if the text is not XML.
     """
     found: list[Transmission] = []
-    lines: dict[str, None] = {}  # without duplicates, which a transmission's joints may cause
+    lines: dict[str, None] = {}  # an ordered set: a transmission's joints may repeat a warning
     for element in parse_xml(text, file).all("transmission"):
         found += _read(element, lines.setdefault)
     for line in lines:

@@ -81,7 +81,7 @@ class Dispatcher:
         *,
         refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """Create the dispatcher. Exceptions in ``refusals`` raised by a method are treated like CallRefused."""
+        """Create the dispatcher. If a method raises one of the exceptions in ``refusals``, treat it like CallRefused."""
         self.methods = methods
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
@@ -124,7 +124,7 @@ class Dispatcher:
             return [ERROR, str(refusal), refused]
 
     def _dispatch_system(self, name: str, args: Sequence[object]) -> object:
-        """Call a standard XML-RPC server method: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
+        """Call a standard XML-RPC method: multicall, or one of http://xmlrpc-c.sourceforge.net/introspection.html."""
         if name == "system.listMethods":
             return sorted(self.methods)
         if name == "system.multicall":

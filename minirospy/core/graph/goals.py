@@ -75,7 +75,7 @@ class GoalEvent(Enum):
 
 
 class SimpleStep(Enum):
-    """How a change of the client's state affects the simple client."""
+    """The effect that a change of the client's state has on the simple client."""
 
     NONE = "nothing"
     ACTIVATE = "the goal has become active"
@@ -154,7 +154,7 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
         _G.ABORTED: _TO_RESULT,
         _G.PREEMPTING: (_C.PREEMPTING,),
     },
-    # Ignore an ACTIVE status: it may be a delayed one, older than the result whose status has been processed.
+    # Ignore an ACTIVE status: it may be older than the result that has already been processed.
     _C.WAITING_FOR_RESULT: {_G.ACTIVE: _STAYS, **_ENDED},
     _C.WAITING_FOR_CANCEL_ACK: {
         _G.PENDING: _STAYS,

@@ -50,7 +50,7 @@ _FEW = 200  # maximum number of nodes to notify in one step
 
 _ROWS = 500  # maximum number of table rows to collect in one step
 
-PARAMETERS = ""  # stands for the parameters in :meth:`MasterApi.defer`; no topic has this name
+PARAMETERS = ""  # represents the parameters in :meth:`MasterApi.defer`; no topic has this name
 
 # A notification from the master to a node after a change.
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
@@ -62,8 +62,8 @@ class MasterApi(ABC):
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
-        self.log: Callable[[str], object] = nothing  # called with a line for each registration
-        # called for each change, with the record that the journal stores
+        self.log: Callable[[str], object] = nothing  # called with a log line for each registration
+        # Called with the journal's record for each change
         self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal; returns the number by which a change refers to it."""
@@ -179,7 +179,7 @@ class MasterApi(ABC):
     def collect_system_state(self) -> Steps[Answer]:
         """Return the response to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
-            # Build one list at a time: memory must not hold one for each client that waits for a response.
+            # Build one list at a time, so that memory does not hold a list for each waiting client.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())
@@ -275,7 +275,7 @@ class MasterApi(ABC):
         def get() -> Steps[Answer]:
             # Count the items in a separate step, because counting takes time.
             if not self.parameters.is_small_at(name):
-                # Send one value at a time: while one is being sent, every change to it by another client requires a copy.
+                # Send one value at a time, because any change to a value that is being sent requires a copy.
                 yield ALONE
             return self._get(name)
 

@@ -75,7 +75,7 @@ class ParameterTree:
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that no caller has received since their creation; only these may be modified in place.
+        # The ids of the dictionaries not returned to any caller since their creation; only these may be modified in place.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # The subscribed keys, sorted so that all keys below a namespace are adjacent.
@@ -123,7 +123,7 @@ class ParameterTree:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Recalculate the memory in use, which may still include values that were replaced.
+        """Recalculate the memory in use, because the current figure may include values that have been replaced.
 
         Raise ParametersFullError if there is still too little.
         """
@@ -307,12 +307,12 @@ class ParameterTree:
         """Yield, one by one, the updates that a change requires; there may be many."""
         changed = _with_slash(path)
         for length in range(len(path) + 1):
-            # Skip the node that set the value: it already has it.
+            # Skip the node that set the value, because it knows the value.
             for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
                 if each.caller_id != setter:
                     yield ParameterUpdate(each.uri, changed)
 
-        # Also notify the node that set the namespace: its cached value of a parameter inside is outdated.
+        # Also notify the node that set the namespace: its cached values of parameters inside it are outdated.
         at = bisect_right(self._keys, changed)
         while at < len(self._keys) and self._keys[at].startswith(changed):
             key = self._keys[at]

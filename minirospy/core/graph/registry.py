@@ -65,7 +65,7 @@ class _NodeEntry:
         self.name = name
         self.uri = uri
         self.holder = intern(holder_of(uri))
-        self.size = 0  # bytes counted for this node
+        self.size = 0  # bytes of memory counted for this node
         self.entries: dict[str, int] = {}
 
     def add(self, name: str, kind: int) -> None:
@@ -249,7 +249,7 @@ class Registry:
         return dict(self.subscriber_rows())
 
     def services(self) -> dict[str, list[str]]:
-        """Return the node that offers each service, in a list."""
+        """Return a dict from service to a list with the node that offers it."""
         return dict(self.service_rows())
 
     def type_rows(self) -> Iterator[tuple[str, str]]:
@@ -389,7 +389,7 @@ class Registry:
             self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
-        """Yield an update for each subscriber to the topics, with the publishers at that moment."""
+        """Yield an update for each subscriber of the topics, with the topic's publishers at that moment."""
         for topic in topics:
             for uri in list(self._subscribers.get(topic, {}).values()):
                 yield PublisherUpdate(uri, topic)

@@ -89,6 +89,6 @@ def name_cost(name: str, kind: int, kinds: int) -> int:
     if kinds & kind:
         return 0
     text = text_cost(name)
-    # Count the name again: the parameter server has its own copy.
+    # Count a parameter's name again, because the parameter server has a separate copy.
     size = _KIND_BYTES[kind] + (text if kind == PARAMETER else 0)
     return size if kinds else size + _NAME_BYTES + text

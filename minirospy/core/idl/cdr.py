@@ -117,7 +117,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
 
 
 class _Position(NamedTuple):
-    """A position in CDR of which only the remainder after division by ``modulus`` (1, 2, 4 or 8) is known."""
+    """A position in CDR data, known only modulo ``modulus`` (1, 2, 4 or 8)."""
 
     modulus: int
     remainder: int
@@ -149,13 +149,13 @@ _UNKNOWN = _Position(1, 0)
 
 
 class _Walk:
-    """Computes positions through layouts; caches the results, because layouts are nested."""
+    """Computes the positions in layouts, and caches them, because layouts are nested."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, _Position], _Position] = {}
 
     def after(self, layout: Layout, start: _Position) -> _Position:
-        """Return what is known about the position after a layout."""
+        """Return the position after a layout, as far as it is known."""
         key = (id(layout), start)
         if key not in self._known:
             position = start
@@ -165,7 +165,7 @@ class _Walk:
         return self._known[key]
 
     def in_loop(self, layout: Layout, start: _Position) -> _Position:
-        """Return what is known about the position before each element, and after the last one."""
+        """Return the positions before each element and after the last one, as far as they are known."""
         while True:
             both = start.or_(self.after(layout, start))
             if both == start:
@@ -232,20 +232,20 @@ def _least_size(layout: Layout, absent: Side) -> int:
 
 
 class _Copy(NamedTuple):
-    """Bytes that are copied."""
+    """Bytes to copy."""
 
     size: int
 
 
 class _Swap(NamedTuple):
-    """Numbers of ``width`` bytes that are read, byte-swapped and written."""
+    """Numbers of ``width`` bytes to read, byte-swap and write."""
 
     width: int
     size: int
 
 
 class _Skip(NamedTuple):
-    """Bytes that are skipped."""
+    """Bytes to skip."""
 
     size: int
 
@@ -257,7 +257,7 @@ class _Zeros(NamedTuple):
 
 
 class _Constant(NamedTuple):
-    """Bytes that are written."""
+    """Constant bytes to write."""
 
     value: bytes
 
@@ -285,7 +285,7 @@ class _Generator:
         self._source = Source()
         self._is_cdr_source = is_cdr_source
         self._swaps = swaps
-        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items missing in the source message
+        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # the side whose items the source lacks
         self._walk = _Walk()
         self._position = _Position(8, 0)
         # pending items; _flush() merges them and writes them in as few lines as possible

@@ -50,7 +50,7 @@ class _Leaf(NamedTuple):
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:
-        """Return the expressions for the field's values in ``struct``."""
+        """Return the expressions for the field's values, as ``struct`` packs them."""
         if self.type.base in _TIMES:
             return [f"{self.path}.secs", f"{self.path}.nsecs"]
         return [self.path]
@@ -218,7 +218,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the source of the call that packs values. Read an inner message only once if it contains several of them."""
+        """Return the source of the call that packs values. Read a nested message only once if several values are in it."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -247,7 +247,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return the local name of a field's value, converted to the object whose length is written."""
+        """Return the name of the variable with a field's value, converted to the object whose length is written."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])

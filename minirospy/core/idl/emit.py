@@ -200,7 +200,7 @@ def emit_top(package: str, kinds: Sequence[str]) -> str:
         '        return importlib.import_module(f"{__name__}.{name}")',
         '    for kind in () if name.startswith("_") else kinds:',
         '        if name in importlib.import_module(f"{__name__}.{kind}").__all__:',
-        # Python replaces the text of an AttributeError in `from std_msgs import Bool`.
+        # Raise ImportError, because Python replaces an AttributeError's text in `from std_msgs import Bool`.
         "            raise ImportError(",
         '                f"cannot import name {name!r} from {__name__!r}; did you mean "',
         '                f"`from {__name__}.{kind} import {name}`?",',
@@ -384,7 +384,7 @@ class _Module:
 
 
 def _is_even(letters: str) -> bool:
-    """Return whether ``struct`` adds no padding between these format characters, which include floats.
+    """Return whether these format characters all have 8 bytes, so that ``struct`` adds no padding, and include a float.
 
     Return False for 32-bit floats, because in native byte order a value that is too large would become infinity instead of
     raising OverflowError.

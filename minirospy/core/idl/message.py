@@ -330,7 +330,7 @@ def _time_text(value: TVal, indent: str, offset: Time | None, width: int | None)
 
 
 def _integer(number: float, width: int) -> str:
-    # With %, because programs store floats in times, as in `stamp.secs = time.time()`.
+    # Format with %, because programs store floats in times, as in `stamp.secs = time.time()`.
     return "%*d" % (width, number)  # noqa: UP031 - format() refuses floats
 
 
@@ -474,7 +474,7 @@ _STRICT_CHECKS: dict[str, _Check] = {
     **dict.fromkeys(("float32", "float64"), _check_strict_float),
     **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
-    # checks like genpy's, which also accept numpy's numbers, because messages of genpy may contain those anyway
+    # like genpy's checks, but these also accept numpy's numbers, which genpy's messages may contain
 }
 
 
@@ -503,7 +503,7 @@ def _items_of_array(name: str, type_: str, value: object, checks: Mapping[str, _
     if len(shape) < 2:
         return cast("Iterable[object]", value)
     length = type_.partition("[")[2]
-    # Serializing counts the rows first; a column of the right length then fails, because each row is taken as a number.
+    # Serializing counts the rows first, so a column of the right length fails there: each row is taken as a number.
     is_refused = checks is _CHECKS and length == str(shape[0])
     if length and (is_refused or length != str(math.prod(shape))):
         hint = ": use reshape(-1)" if is_refused and length == str(math.prod(shape)) else ""

@@ -139,7 +139,7 @@ def _parse(text: str, package: str, name: str, where: str, first_line: int) -> M
 
 
 def _advice_for_field(type_: str, declared: str) -> str:
-    """Return what is wrong with a field's name, for the habits of C, C++ and Python."""
+    """Return a hint for a field name that is wrong because of a habit from C, C++ or Python."""
     if array := re.fullmatch(r"(\w+)\s*(\[\d*\])", declared):
         return f": an array is written {_cut(type_)}{array[2]} {array[1]}"
     if "//" in declared:

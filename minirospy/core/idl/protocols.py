@@ -27,7 +27,7 @@ __all__ = [
     "is_stamped",
 ]
 
-Buffer: TypeAlias = bytes | bytearray | memoryview  # the bytes that a message is read from
+Buffer: TypeAlias = bytes | bytearray | memoryview  # types of the bytes from which a message is read
 
 
 class Writer(Protocol):

@@ -21,7 +21,7 @@ from minirospy.core.idl.spec import PRIMITIVES, MessageSpec
 
 __all__ = ["MAX_LEVELS", "MAX_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
 
-# maximum number of characters in a full text; the largest ones in real packages have some 30,000
+# maximum number of characters in a full text; the largest ones in real packages have about 30,000
 MAX_TEXT = 1 << 20
 
 MAX_LEVELS = 50  # maximum depth of nested messages
@@ -29,7 +29,7 @@ MAX_LEVELS = 50  # maximum depth of nested messages
 # Maximum number of fields per message, including those of nested messages: the generated source has code for each of them
 _MAX_FIELDS = 4_000
 
-# Maximum number of fields in all types that a message uses; MoveIt's largest message has some 17,000
+# Maximum number of fields in all types that a message uses; MoveIt's largest message has about 17,000
 _MAX_FIELDS_IN_ALL = 32_000
 
 _MAX_BYTES = 1 << 27  # maximum total size in bytes of a message's fixed-length arrays in memory

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["debayered", "eight_bits", "yuv_to_bgr"]
 
-# Factors in steps of 2 ** -20: luminance; V for red; U and V for green; U for blue.
+# YUV-to-RGB factors, times 2 ** 20: for luminance; V in red; U and V in green; U in blue.
 _Y, _RED_V, _GREEN_U, _GREEN_V, _BLUE_U = 1220542, 1673527, -409993, -852492, 2116026
 _BITS = 20
 
@@ -64,7 +64,7 @@ def debayered(image: Pixels, pattern: str) -> Pixels:
             part = inner[rows, columns]
             own_values = values[1:-1, 1:-1][rows, columns]
             if own == "g":
-                neighbor = pattern[(1 - row) * 2 + column]  # the color in the same row
+                neighbor = pattern[(1 - row) * 2 + column]  # the other color in the same row
                 part[..., 1] = own_values
                 part[..., "bgr".index(neighbor)] = beside[rows, columns]
                 part[..., "bgr".index("b" if neighbor == "r" else "r")] = above[rows, columns]

@@ -28,7 +28,7 @@ _QUALITY = 95  # JPEG quality, OpenCV's default
 MAX_PIXELS = 100_000_000
 """Maximum number of pixels in a decoded image.
 
-A file of some kilobytes may have ten times as many pixels, and use gigabytes of memory.
+A file of a few kilobytes may have ten times as many pixels, and use gigabytes of memory.
 """
 
 

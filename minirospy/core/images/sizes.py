@@ -1,6 +1,6 @@
 """Read the width and height of a compressed image from its header. Pure: nothing is decompressed.
 
-A file of some kilobytes may have 10,000 x 10,000 pixels, for which a decoder uses a gigabyte, so servers check the size
+A file of a few kilobytes may have 10,000 x 10,000 pixels, for which a decoder uses a gigabyte, so servers check the size
 first. Sources: PNG (third edition), ITU T.81 (JPEG), GIF89a, RFC 9649 (WebP), TIFF 6.0, ITU T.800 (JPEG 2000), netpbm, BMP.
 """
 

@@ -19,8 +19,8 @@ from minirospy.core.meshes.mesh import MAX_TRIANGLES, Mesh, MeshMaterial
 
 __all__ = ["parse_dae"]
 
-MAX_NODES = 20_000  # node instances; nodes that instantiate each other can multiply
-MAX_DEPTH = 100  # nesting depth of nodes
+MAX_NODES = 20_000  # maximum node instances, because nodes that instantiate each other multiply
+MAX_DEPTH = 100  # maximum nesting depth of nodes
 PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 Matrix = NDArray[np.float64]
 Texcoords = NDArray[np.float32]
@@ -198,7 +198,7 @@ class _Reader:
     def _texcoords(
         self, inputs: list[XmlElement], indices: NDArray[np.int32], corners: NDArray[np.int32]
     ) -> Texcoords | None:
-        """Return the places of triangles' corners in the texture, or None if the file has none that can be used."""
+        """Return the texture coordinates of the triangles' corners, or None if the file has no usable ones."""
         found = _input(inputs, "TEXCOORD")
         if found is None:
             return None
@@ -221,7 +221,7 @@ class _Reader:
         return values
 
     def _values(self, url: str, count: int) -> Matrix | None:
-        """Return the first ``count`` numbers of each entry of a source, or None if the source does not exist."""
+        """Return the first ``count`` numbers in each entry of a source, or None if the source does not exist."""
         source = self._by_id.get(_reference(url))
         array = _child(source, "float_array") if source is not None else None
         if source is None or array is None:
@@ -235,7 +235,7 @@ class _Reader:
         return values[: len(values) // stride * stride].reshape(-1, stride)[:, :count]
 
     def _bindings(self, instance: XmlElement) -> dict[str, MeshMaterial]:
-        """Return the materials of an instance, by symbol."""
+        """Return an instance's materials, as a dict from symbol to material."""
         return {
             element.attributes.get("symbol", ""): self._material(
                 _reference(element.attributes.get("target", ""))

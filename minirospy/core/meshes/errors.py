@@ -8,7 +8,7 @@ __all__ = ["MeshError"]
 
 
 class MeshError(MinirospyError):
-    """Raised if a mesh is invalid, too large or of an unknown format. ``file`` is empty until the file reader sets it."""
+    """Raised if a mesh is invalid, too large or in an unknown format. ``file`` is empty until the file reader sets it."""
 
     def __init__(self, why: str, file: str = "") -> None:
         super().__init__(why, file)

@@ -13,7 +13,7 @@ from minirospy.core.sdf.model import Color, Vector
 
 __all__ = ["MAX_TRIANGLES", "Mesh", "MeshMaterial"]
 
-MAX_TRIANGLES = 2_000_000  # per file; larger arrays, and the data derived from them, exceed a gigabyte
+MAX_TRIANGLES = 2_000_000  # maximum per file; larger arrays and the data derived from them exceed a gigabyte
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Mesh:
 
     @property
     def crosses(self) -> NDArray[np.float64]:
-        """Return a vector (m, 3) for each triangle: its normal, as long as twice its area."""
+        """Return each triangle's normal vector (m, 3), whose length is twice the triangle's area."""
         corners = self.corners
         crosses: NDArray[np.float64] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         return crosses

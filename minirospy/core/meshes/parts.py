@@ -19,25 +19,26 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
-MAX_HULLS = 32  # maximum for a moving mesh; a mesh with more parts gets a single hull
-# A static mesh with more flat patches is simplified until it has fewer, because worlds have many small models with fine meshes.
+MAX_HULLS = 32  # maximum hulls for a moving mesh; a mesh with more parts gets a single hull
+# Maximum flat patches in a static mesh; a mesh with more is simplified, because worlds have many small, fine meshes.
 MAX_PRISMS = 1500
-MIN_PRISMS = 100  # for a small mesh
-PRISMS_PER_METER = 200  # along the longest side
-MAX_CONVEX = 5000  # triangles; testing a larger part for convexity would take seconds
-MAX_RAYS = 200  # rays cast from the largest triangles, to detect a hollow mesh
-MAX_TESTS = 2_000_000  # ray-triangle tests; these take 0.2 s
-HOLLOW = 0.1  # from this fraction of the surface facing other parts, a mesh is hollow, as a cup is
-THICKNESS = 0.02  # m; thickness of a prism below the surface
+MIN_PRISMS = 100  # minimum of the limit on a mesh's flat patches
+PRISMS_PER_METER = 200  # limit on a mesh's flat patches, per metre of its longest side
+MAX_CONVEX = 5000  # maximum triangles in a part that is tested for convexity; more would take seconds
+MAX_RAYS = 200  # maximum rays, cast from the largest triangles to detect a hollow mesh
+MAX_TESTS = 2_000_000  # maximum ray-triangle tests, which take 0.2 s
+HOLLOW = 0.1  # minimum fraction of a hollow mesh's surface that faces other parts of it, as in a cup
+THICKNESS = 0.02  # m; thickness of the prism below a flat patch of the surface
 FLAT = 1e-6  # fraction of the mesh's size; anything thinner has no hull
-TOLERANCE = 1e-4  # fraction of the part's size by which vertices of a convex part may be in front of a face
+# Fraction of the part's size; no vertex of a convex part is further than this in front of a face
+TOLERANCE = 1e-4
 
 Points = NDArray[np.float64]
 Triangles = NDArray[np.int32]
 
 
 class Parts(NamedTuple):
-    """Meshes whose convex hulls collide. ``are_exact``: together they are identical to the mesh."""
+    """Meshes whose convex hulls are used for collisions; ``are_exact`` if together they equal the original mesh."""
 
     meshes: list[Mesh]
     are_exact: bool
@@ -58,7 +59,7 @@ def collision_parts(
         if len(parts) > MAX_HULLS:
             return Parts([_thickened(mesh)], False)
         hollow = list(map(is_hollow, parts))
-        most = MAX_HULLS // max(sum(hollow), 1)  # for each hollow part
+        most = MAX_HULLS // max(sum(hollow), 1)  # maximum hulls per hollow part
         hulls: list[Mesh] = []
         for part, splits in zip(parts, hollow, strict=True):
             hulls += (split(part, most) if splits and most > 1 else None) or [_thickened(part)]
@@ -101,7 +102,7 @@ def is_convex(part: Mesh) -> bool:
     size = float(np.ptp(vertices, axis=0).max())
     normals = _normals(part)
     offsets = np.einsum("ij,ij->i", normals, vertices[triangles[:, 0]])
-    for start in range(0, len(normals), 512):  # in blocks, to limit memory
+    for start in range(0, len(normals), 512):  # in blocks, to limit the memory
         rows = slice(start, start + 512)
         heights = normals[rows] @ vertices.T - offsets[rows, None]
         if heights.max() > TOLERANCE * size:
@@ -164,7 +165,7 @@ def _compact(vertices: Points, triangles: Triangles) -> Mesh:
 
 
 def _edges(triangles: Triangles) -> NDArray[np.int64]:
-    """Return the edges (3 n, 2) of triangles as they are passed: all first ones, all second ones, all third ones."""
+    """Return the triangles' edges (3 n, 2): all first edges, then all second ones, then all third ones."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     return edges.astype(np.int64)
 
@@ -235,7 +236,7 @@ def _simplified(mesh: Mesh, cell: float) -> Mesh:
 
 
 def _has_area(mesh: Mesh) -> NDArray[np.bool_]:
-    """Return for each triangle whether it has an area."""
+    """Return whether each triangle has an area above zero."""
     corners = mesh.corners
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas = np.linalg.norm(mesh.crosses, axis=1)

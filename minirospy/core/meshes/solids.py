@@ -12,10 +12,10 @@ from minirospy.core.meshes.mesh import Mesh
 
 __all__ = ["polyline_mesh", "terrain"]
 
-MAX_POINTS = 2000  # per polyline; triangulation takes quadratic time
+MAX_POINTS = 2000  # maximum points per polyline; triangulation takes quadratic time
 MIN_EAR = 1e-12  # m^2
-NO_ELEVATION = -12_000.0  # m; below the deepest sea; lower values mark missing data
-MAX_TERRAIN = 2049  # pixels per side; four million triangles
+NO_ELEVATION = -12_000.0  # m, below the deepest sea; lower values mark missing data
+MAX_TERRAIN = 2049  # maximum pixels per side: four million cells
 
 
 def polyline_mesh(points: Sequence[tuple[float, float]], height: float) -> Mesh:

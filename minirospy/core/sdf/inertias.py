@@ -40,7 +40,7 @@ def _about(inertial: Inertial, centre: Vector) -> Inertia:
 
 
 def turned_inertia(inertia: Inertia, rotation: Quaternion) -> Inertia:
-    """Return R I R^T."""
+    """Return the rotated inertia R I R^T."""
     if rotation[3] == 1.0:
         return inertia
     xx, xy, xz, yy, yz, zz = inertia

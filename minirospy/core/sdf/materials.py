@@ -13,7 +13,7 @@ from minirospy.core.sdf.text import Element
 __all__ = ["named_material", "read_material"]
 
 _MAX_SCRIPT_BYTES = 1024 * 1024
-_MAX_SCRIPTS = 100  # files per folder of a model's scripts
+_MAX_SCRIPTS = 100  # maximum files per folder of a model's scripts
 _PICTURES = (".jpg", ".jpeg", ".png")
 
 _BLOCK = re.compile(r"^[ \t]*material\s+([^\s{:]+)\s*(?::[^\n{]*)?\s*\{", re.MULTILINE)
@@ -21,7 +21,7 @@ _COLOR = re.compile(r"^\s*(ambient|diffuse|emissive)\s+([\d.eE+\- \t]+)", re.MUL
 _TEXTURE = re.compile(r"^\s*texture\s+(\S+)", re.MULTILINE)
 
 
-# Diffuse colours, and the names of the materials that have them. Those with a picture have the picture's average colour.
+# Diffuse colours, each with the names of its materials. A material with a picture has the picture's average colour.
 _TABLE: dict[Color, str] = {
     (0.7, 0.7, 0.7, 1.0): "Grey Gray",
     (0.175, 0.175, 0.175, 1.0): "DarkGrey DarkGray",

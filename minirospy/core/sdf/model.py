@@ -58,7 +58,7 @@ class Pose(NamedTuple):
 
 
 IDENTITY = Pose()
-MIN_STEP = 1e-9  # s; time is counted in nanoseconds
+MIN_STEP = 1e-9  # s, because time is counted in whole nanoseconds
 
 
 class Box(NamedTuple):
@@ -189,7 +189,7 @@ class Sensor:
     kind: str
     element: Element
     pose: Pose = IDENTITY
-    update_rate: float = 0.0  # Hz; 0: each step
+    update_rate: float = 0.0  # measurements per second; 0: one in each step
     is_always_on: bool = False
     topic: str = ""
     plugins: tuple[Plugin, ...] = ()
@@ -290,11 +290,11 @@ class Model:
 
 
 class Physics(NamedTuple):
-    """The engine's parameters. The defaults are Gazebo's."""
+    """The physics engine's parameters; the defaults are Gazebo's."""
 
     step: float = 0.001
     real_time_factor: float = 1.0
-    update_rate: float = 1000.0  # Hz; 0: as fast as possible
+    update_rate: float = 1000.0  # steps per second; 0: as fast as possible
     gravity: Vector = (0.0, 0.0, -9.8)
     iterations: int = 50
     sor: float = 1.3

@@ -108,7 +108,7 @@ class _Reader:
         self._collect()
         frames: dict[str, Frame] = {}
         for name, frame in self._all_frames():
-            frames.setdefault(name, frame)  # if a link and a joint share a name, it refers to the link
+            frames.setdefault(name, frame)  # a name that a link and a joint share refers to the link
         self.frames = Frames(frames)
         self_collide = source.flag(element, "self_collide", False)
 
@@ -252,7 +252,7 @@ class _Reader:
             raise self.source.error(element, f"model [{self.name}]: {error}") from None
 
     def _in_link(self, part: Element, link: str) -> Pose:
-        """Return the pose of a link's part in the link."""
+        """Return a link part's pose relative to the link."""
         frame, value = self._placed(part.first("pose"), link)
         try:
             return self.frames.relative(value, frame, link)
@@ -299,7 +299,7 @@ class _Reader:
         read: Callable[[Element, Pose, Source], _Part | None],
         pose_of: Callable[[Element], Pose],
     ) -> tuple[_Part, ...]:
-        """Return the children with a tag that can be used."""
+        """Return the results of ``read`` for the children with this tag, except those that are None."""
         parts = (read(part, pose_of(part), self.source) for part in element.all(tag))
         return tuple(part for part in parts if part is not None)
 
@@ -327,7 +327,7 @@ class _Reader:
         initial = source.number(element, "initial_joint_position", axis.initial_position)
         axis = axis._replace(initial_position=initial)
         if child == _WORLD:
-            # MuJoCo and Gazebo move the child. Make the world the parent, and reverse the axis.
+            # MuJoCo and Gazebo move a joint's child, so make the world the parent, and reverse the axis.
             parent, child = child, parent
             axis, axis2 = (each._replace(xyz=_negative(each.xyz)) for each in (axis, axis2))
         pose = relative(links[child].pose, here)
@@ -344,7 +344,7 @@ class _Reader:
         return _KINDS.get(text)
 
     def _link_of(self, name: str) -> str:
-        """Return the link that a name in a joint refers to: a link, or the link to which the frame of this name is attached."""
+        """Return the link that a joint refers to by name: a link, or the link to which a frame is attached."""
         for _ in range(len(self.attached) + 1):
             if name not in self.attached or name in self.links:
                 break
@@ -368,7 +368,7 @@ class _Reader:
 
 
 def _joint_key(name: str) -> str:
-    """Return the key of a joint's frame, which contains a newline, as no name does."""
+    """Return the key of a joint's frame; it contains a newline, which no frame name does."""
     return f"joint\n{name}"
 
 

@@ -79,7 +79,7 @@ class _Reader:
     names: set[str] = field(default_factory=set)
     numbers: dict[str, Iterator[int]] = field(
         default_factory=dict
-    )  # next numbers to append to names already in use
+    )  # for each name in use, the next numbers to append
     ambient: Color = World.ambient
     background: Color = World.background
     camera: Pose | None = None

@@ -69,7 +69,7 @@ def read_surface(element: Element | None, source: Source) -> Surface:
 
 
 def read_geometry(owner: Element, source: Source) -> Geometry | None:
-    """Return the shape of a visual or a collision. Return None, with a warning, if it is missing, unknown or has no file."""
+    """Return a visual's or collision's shape. If it is missing or unknown, or has no file, return None with a warning."""
     name = f"{owner.tag} [{owner.attributes.get('name', '')}]"
     geometry = owner.first("geometry")
     shapes = geometry.children if geometry is not None else []

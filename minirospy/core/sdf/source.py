@@ -21,24 +21,24 @@ Resolve = Callable[[str], "str | None"]
 URIs start with ``model://``, ``package://`` or ``file://``.
 """
 
-MAX_FILE_BYTES = 64 * 1024 * 1024  # bytes; the largest worlds of Gazebo's users have 10 MB
-MAX_INCLUDES = 16  # nesting depth of files and models; a greater depth is a mistake or an attack
-MAX_WARNINGS = 200  # lines per model or world; nobody reads more
-MAX_PARTS = 20_000  # links, joints and models per world or spawn request
+MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
+MAX_INCLUDES = 16  # maximum nesting of files and models; a greater depth is a mistake or an attack
+MAX_WARNINGS = 200  # maximum warnings per model or world; nobody reads more
+MAX_PARTS = 20_000  # maximum links, joints and models per world or spawn request
 _INFINITE = 1e16  # sdformat writes infinite limits as this number; larger numbers overflow in the simulation
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no", "")
 
 
 def no_files(uri: str) -> str | None:
-    """Return ``uri`` if it is an absolute path that exists. A resolver without search paths."""
+    """Resolve a URI without search paths: return ``uri`` if it is an absolute path that exists."""
     path = uri.removeprefix("file://")
     return path if os.path.isabs(path) and os.path.exists(path) else None
 
 
 @dataclass
 class Shared:
-    """Data shared by all files of one reading: documents and found paths by name, and the number of parts so far."""
+    """Data shared by all files that are read together: documents and found paths by name, and the number of parts so far."""
 
     documents: dict[str, Element] = field(default_factory=dict)
     found: dict[str, str | None] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Source:
-    """A file and its context.
+    """A file that is being read, and its context.
 
     file: its name in messages. folder: the base of relative URIs, or an empty string. version: its SDF version. chain: the paths
     of the including files, ending with its own. depth: the number of enclosing models.
@@ -176,7 +176,7 @@ class Source:
         return x, y, z
 
     def color(self, element: Element | None, tag: str, default: Color | None) -> Color | None:
-        """Return a child's colour; without an opacity it is opaque."""
+        """Return a child's colour, which is opaque if it has no opacity."""
         if (child := _given(element, tag)) is None:
             return default
         red, green, blue, *opacity = (min(max(value, 0.0), 1.0) for value in self.finite(child, (3, 4)))
@@ -214,7 +214,7 @@ class Source:
         values = []
         for part in element.text.split():
             try:
-                value = float(part if "_" not in part else "")  # Python accepts 1_000
+                value = float(part if "_" not in part else "")  # float() accepts underscores, as in 1_000
             except ValueError:
                 raise self.error(
                     element, f"<{element.tag}> is '{_short(element.text)}': '{_short(part)}' is not a number"

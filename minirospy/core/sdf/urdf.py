@@ -43,7 +43,7 @@ __all__ = ["read_urdf"]
 
 _WORLD = "world"
 _LUMP = "_fixed_joint_lump__"
-_MIN_MASS = 1e-6  # kg; sdformat treats a smaller mass as 0
+_MIN_MASS = 1e-6  # kg; sdformat treats a smaller mass as zero
 _TRUE = ("1", "true", "yes")
 _FALSE = ("0", "false", "no")
 
@@ -103,7 +103,7 @@ class _Converter:
         self._kept = self._flagged("preserveFixedJoint")
         self._revolute = self._flagged("disableFixedJointLumping") - self._kept
         self._bodies: dict[str, _Body] = {}
-        self._names: dict[tuple[str, str], str] = {}  # (link, its collision's name) -> that in the model
+        self._names: dict[tuple[str, str], str] = {}  # keyed by (link, collision name): the name in the model
 
     def convert(self) -> Element:
         """Return the ``<model>``. Raise SdfError if no part of the robot remains."""
@@ -194,7 +194,7 @@ class _Converter:
     def _with_mass(self) -> list[str]:
         """Return the names of the links that remain, in tree order, and warn about the others."""
         kept: list[str] = []
-        lost: dict[str, int] = {}  # topmost massless link -> the links below it
+        lost: dict[str, int] = {}  # dict from the topmost massless link to the links below it
         cause: dict[str, str] = {}
         for name, body in self._bodies.items():
             joint = self._robot.parent_joint(name)
@@ -316,7 +316,7 @@ class _Converter:
         collision.children.append(surface)
 
     def _add_link_extensions(self, link: Element, owner: str, pose: Pose) -> None:
-        """Copy the link's children from ``<gazebo reference="owner">``. Sensors and lights of merged links are moved along."""
+        """Copy the link's children from ``<gazebo reference="owner">``. Adjust poses of a merged link's sensors and lights."""
         children = self._extensions.get(owner, [])
         # As in sdformat, unknown tags come last, so <turnGravityOff> overrides <gravity>.
         for child in sorted(children, key=lambda child: child.tag not in _LINK_TAGS):
@@ -356,7 +356,7 @@ class _Converter:
     # ---- joints
 
     def _joint(self, joint: UrdfJoint) -> Element | None:
-        """Return the ``<joint>``, or None if the joint's type leaves the child free."""
+        """Return the ``<joint>``, or None if a joint of this type does not restrict its child."""
         kind = self._joint_kind(joint)
         if kind is None:
             what = f"joint [{joint.name}] is {joint.type.value}, which Gazebo does not know: link [{joint.child}] is free"
@@ -435,7 +435,7 @@ _OWN_TAGS = frozenset(("material", "visual", "collision", "static")) | _WITHOUT_
 
 
 def _deepest_first(body: _Body, robot: Robot) -> Iterator[tuple[str, Pose]]:
-    """Yield a body's links in the order in which sdformat adds their parts: a link, then the whole list of each merged child."""
+    """Yield a body's links in the order in which sdformat adds their parts: a link, then all of each merged child's links."""
     poses = dict(body.merged)
     stack = [body.link.name]
     while stack:

@@ -45,7 +45,7 @@ class _Walk(NamedTuple):
 
 
 class TransformBuffer(FrameTree):
-    """The frame tree over the last ``cache_time`` nanoseconds, with lookups in it."""
+    """Looks up transforms in the frame tree of the last ``cache_time`` nanoseconds."""
 
     # --- lookups
 

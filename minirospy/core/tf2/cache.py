@@ -12,7 +12,7 @@ from minirospy.core.tf2.rotation import slerp
 
 __all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
-# Maximum number of expired samples before the lists are trimmed; trimming at each insertion would move all samples
+# Maximum number of expired samples before the lists are trimmed, because each trimming moves all samples
 _COMPACT_ABOVE = 32
 
 

@@ -89,7 +89,7 @@ class RefusalLog:
         self._written: dict[tuple[str, str], tuple[float, int]] = {}
 
     def __call__(self, refusal: Refusal) -> None:
-        """Report a refused transform by ``write(text, is_error)``, or only count it if that was reported recently."""
+        """Pass a refusal to ``write(text, is_error)``, or only count it if the same one was written recently."""
         key = refusal.frame, refusal.kind
         now = self._clock()
         last, held_back = self._written.get(key, (-math.inf, 0))

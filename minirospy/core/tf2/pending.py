@@ -70,7 +70,7 @@ class Layout:
         self._offsets = found
         self._index = {offsets.child: index for index, offsets in enumerate(found)}
         self._arrivals: list[Arrival] = []
-        self._dropped = 0  # number of messages before the first one in the list
+        self._dropped = 0  # number of messages dropped from the start of the list
         # Per transform: index of the next message to decode, counted from the first one ever received
         self._decoded = [0] * len(found)
         # Per transform: the newest stamp when expired messages were last dropped

@@ -32,7 +32,7 @@ class FrameTree:
     ) -> None:
         self.cache_time = cache_time
         self._on_refused = on_refused
-        self._frames: dict[str, Frame] = {}  # in order of first appearance
+        self._frames: dict[str, Frame] = {}  # keyed by name, in order of first appearance
         self._layouts = Layouts()
         self._lazy: dict[str, list[Layout]] = {}  # dict from child frame to the layouts that contain it
         self._arrived = 0

@@ -37,7 +37,7 @@ def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
 
 
 def robot_from_element(root: Element, file: str = "robot_description") -> Robot:
-    """Return the robot that a parsed description describes. Raise UrdfError as :func:`parse_robot` does."""
+    """Build the robot from a parsed description. Raise UrdfError as :func:`parse_robot` does."""
     if root.tag != "robot":
         raise UrdfError(file, root.line, "Could not find the 'robot' element in the xml file")
     if "name" not in root.attributes:

@@ -33,11 +33,11 @@ __all__ = [
     "split_sizes",
 ]
 
-CHUNK = 64 * 1024  # bytes per receive while messages are small
+CHUNK = 64 * 1024  # bytes to receive per call while messages are small
 
 LENGTH_BYTES = 4  # bytes in the length prefix of a frame or connection header
 
-MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
+MAX_FRAME = 1024 * 1024 * 1024  # maximum bytes in a frame; a longer one is rejected as invalid
 
 SPLIT = 1 << 31  # flag bit in the length field: the size of the trailing array follows
 
@@ -71,7 +71,7 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """The target for a message's ``serialize``: joins small byte strings once, and keeps large ones separate."""
+    """The target for a message's ``serialize``; joins small byte strings, and keeps large ones separate."""
 
     __slots__ = ()
     write = list.append

@@ -14,7 +14,7 @@ __all__ = ["MAX_HEADER", "Header", "parse_header", "serialize_header"]
 
 Header = dict[str, str]
 
-MAX_HEADER = 4 * 1024 * 1024  # bytes; the largest full texts take some 20 kB
+MAX_HEADER = 4 * 1024 * 1024  # maximum bytes in a header; the largest full texts have about 20 kB
 
 _LENGTH = struct.Struct("<I")
 

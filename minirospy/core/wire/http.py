@@ -25,7 +25,7 @@ __all__ = [
     "serialize_response_head",
 ]
 
-MAX_BODY = 64 * 1024 * 1024  # bytes; a parameter may contain a whole robot description
+MAX_BODY = 64 * 1024 * 1024  # maximum bytes in a body; a parameter may contain a whole robot description
 
 _MAX_HEAD = 64 * 1024
 _SHORT_HEAD = 512
@@ -49,7 +49,7 @@ class HttpHead(NamedTuple):
     start: str
     headers: dict[str, str]
     method: str  # the method of a request
-    keep_alive: bool  # the connection can be used for another request after this one
+    keep_alive: bool  # True if the connection can be used for another request after this one
     # the body's length if Content-Length is the only header that specifies it, else -1
     plain_length: int
 
@@ -192,7 +192,7 @@ class HttpReader:
         self._in_body = False
 
     def continue_line(self) -> bytes:
-        """Return the response for which a peer waits after it has sent ``Expect: 100-continue``."""
+        """Return the response that a peer awaits after sending ``Expect: 100-continue``."""
         self.wants_continue = False
         return _CONTINUE
 

@@ -15,7 +15,7 @@ _LARGE_MESSAGES = r"; (\d{1,18}) of (\d{1,18}) large messages by shared memory(?
 
 
 class LargeMessages(NamedTuple):
-    """How many of a connection's large messages went through a ring, and why the others did not ("" if most did)."""
+    """A connection's large messages: how many went through a ring, and why the others did not ("" if most did)."""
 
     shared: int
     all: int

@@ -46,31 +46,31 @@ PREPARE_WORD = 0xC0000001  # the publisher wants to offer a ring
 OFFER_WORD = 0xC0000002  # the ring's size follows; the ring's file descriptors are sent with these bytes
 PLACE_WORD = 0xC0000003  # a message's offset, size and trailing array's size follow
 
-# Bytes that a subscriber sends to the publisher
+# Bytes with which a subscriber answers the publisher
 READY = b"r"  # answer to PREPARE_WORD: the subscriber now receives file descriptors
 MAPPED = b"m"  # answer to OFFER_WORD: the subscriber has mapped the ring and will read from it
 REFUSED = b"n"  # answer to OFFER_WORD: the subscriber cannot map the ring
 
-# The shortest message, in bytes, that is sent through a ring. Measured with one subscriber: at 0.9 MB (VGA), a ring's bookkeeping
-# costs as much CPU time as it saves; at 6 MB, the ring saves a quarter.
+# The minimum size, in bytes, of a message that is sent through a ring, measured with one subscriber.
+# At 0.9 MB (VGA), a ring's bookkeeping costs as much CPU time as it saves; at 6 MB, the ring saves a quarter.
 MIN_MESSAGE = 1_000_000
 
-MAX_RING = 64 * 1024 * 1024  # bytes per topic; enough for two 4K images (25 MB each)
-MAX_PLACES = 16  # per ring; enough for a few subscribers, and few enough for the processor's cache
-MIN_PLACES = 2  # one for writing while another is read
+MAX_RING = 64 * 1024 * 1024  # maximum bytes per topic; enough for two 4K images (25 MB each)
+MAX_PLACES = 16  # maximum per ring; enough for a few subscribers, and few enough for the processor's cache
+MIN_PLACES = 2  # one place for writing while a subscriber reads another
 PAGE = 64 * 1024  # bytes; the largest page size of common Linux machines, so that no two places share a page
-MAX_MESSAGE = MAX_RING // MIN_PLACES  # bytes; the longest message that is sent through a ring
+MAX_MESSAGE = MAX_RING // MIN_PLACES  # maximum bytes of a message that is sent through a ring
 
-# Maximum bytes of messages that one subscriber may hold at a time; the most that a Unix socket buffers. Beyond this, messages for
-# a slow subscriber wait in the publisher's queue, where its drop rule applies.
+# Maximum bytes of messages that one subscriber may hold at a time; a Unix socket buffers at most this much.
+# Beyond this, messages for a slow subscriber wait in the publisher's queue, where its drop rule applies.
 MAX_HELD = 4 * 1024 * 1024
 ALWAYS_HELD = 2  # places that a subscriber may hold regardless of size: one to read, one waiting
 
 _WORD = struct.Struct("<I")
 _OFFER = struct.Struct("<II")
 _ANNOUNCEMENT = struct.Struct("<IIII")
-OFFER_BYTES = _OFFER.size - _WORD.size  # without the word
-ANNOUNCEMENT_BYTES = _ANNOUNCEMENT.size - _WORD.size  # without the word
+OFFER_BYTES = _OFFER.size - _WORD.size  # bytes that follow OFFER_WORD
+ANNOUNCEMENT_BYTES = _ANNOUNCEMENT.size - _WORD.size  # bytes that follow PLACE_WORD
 
 
 class Announcement(NamedTuple):

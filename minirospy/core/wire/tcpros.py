@@ -132,7 +132,7 @@ def service_client_header(
     probe: bool = False,
     extra: Mapping[str, str] | None = None,
 ) -> Header:
-    """Return the header that a service client sends first. With ``probe``, it only tests whether the service is alive."""
+    """Return the header that a service client sends first. With ``probe``, the client only tests whether the service is alive."""
     fields = {"callerid": caller_id, "md5sum": md5sum, "service": service}
     if persistent:
         fields["persistent"] = "1"

@@ -19,7 +19,7 @@ _MAX_TAGS = 2_000_000
 _MAX_OPEN = 60
 
 _SPACE = r"[ \t\r\n]*"
-# Characters in text, except for references, "]]>", and characters that XML changes or forbids.
+# Matches text without references, without "]]>", and without characters that XML changes or forbids.
 _TEXT = r"[\t\n !-%'-;=?-~]*"
 _STRING = rf"<value>(?:<string>({_TEXT})</string>|({_TEXT}))</value>"
 

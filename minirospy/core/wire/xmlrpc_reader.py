@@ -17,7 +17,7 @@ from minirospy.base.errors import RpcProtocolError
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 
 MAX_DEPTH = 64
-MAX_ELEMENTS = 1_000_000  # maximum number of elements per document; parsing this many takes some seconds
+MAX_ELEMENTS = 1_000_000  # maximum number of elements per document; parsing this many takes a few seconds
 
 _MIB = 1024 * 1024
 MAX_MEMORY = 64 * _MIB  # maximum bytes in memory of all long strings in one document

@@ -17,7 +17,7 @@ __all__ = ["Output", "escape", "is_numpy", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-# size in bytes above which the writer asks that no other response be written at the same time
+# size in bytes above which no other response may be written at the same time
 _ALONE_BYTES = 1024 * 1024
 
 
@@ -128,7 +128,7 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Complete a piece from the current parts; return the value that a step yields.
+        """Complete a piece from the current parts; return ALONE if the rest should be written alone, else None.
 
         Raise RpcProtocolError if the limit is exceeded.
         """

@@ -94,7 +94,7 @@ class Journal:
         # During an incremental rewrite: the records appended since it started, and the new file's descriptor.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Counts the rewrites in steps that have finished or been abandoned; a rewrite compares it to see if it was abandoned.
+        # Number of incremental rewrites finished or abandoned; a rewrite that sees it change has been abandoned.
         self._rewrites = 0
 
     @property

@@ -59,7 +59,7 @@ _COLLECT_SECONDS = 60.0
 _COLLECT = (2000, 5, 1_000_000_000)
 """The garbage collector's thresholds.
 
-It examines at most 10,000 objects, in some 4 ms; the oldest generation is not collected automatically.
+It examines at most 10,000 objects, in about 4 ms; the oldest generation is not collected automatically.
 """
 
 SWEEP_SECONDS = 10.0  # seconds between checks for dead nodes if the master is nearly full
@@ -119,7 +119,7 @@ class Master(MasterApi):
         self.touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None
         self._sweeping: asyncio.Task[None] | None = None
-        self.stopped = asyncio.Event()  # set when the master has been asked to stop
+        self.stopped = asyncio.Event()  # set once the master has been asked to stop
 
     @property
     def port(self) -> int:

@@ -46,7 +46,7 @@ responds.
 """
 
 _CLOSING_CALL_SECONDS = 3600.0
-_PROBE_SECONDS = 3.0  # seconds between a closing node's checks whether the master still responds
+_PROBE_SECONDS = 3.0  # seconds between a closing node's checks that the master still responds
 
 NOTICE_SECONDS = 3.0  # seconds before a closing node logs that it is still waiting for the master
 
@@ -71,7 +71,7 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Register the entries of ``tables``: kind ("Publisher") -> name -> publication, subscription or service.
+        """Register the entries of ``tables``: per kind ("Publisher"), a dict from name to publication, subscription or service.
 
         Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """
@@ -148,7 +148,7 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> object:
-        """Look up the address of this node or of one of its services.
+        """Ask the master for the address of this node or of one of its services.
 
         Raise MasterUnreachableError or RpcError if the look-up fails.
         """
@@ -194,7 +194,7 @@ class Registrations:
         self._registering.discard(task)
         if not task.cancelled():
             # Retrieve the task's exception, because asyncio logs exceptions that are never retrieved.
-            # A caller that is waiting also receives it. Otherwise it is ignored: the call will be retried.
+            # A waiting caller also receives the exception. Without one, ignore it, because the call will be retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -266,7 +266,7 @@ class Registrations:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
                         # As in ROS, a service belongs to the node that registered it last.
-                        # The entry therefore says nothing about this node's registration.
+                        # The master's entry therefore says nothing about this node's registration.
                         self.taken.add(asked)
                         continue
                 else:

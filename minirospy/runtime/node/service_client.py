@@ -170,14 +170,14 @@ class PeerEndedError(WireError):
 
 
 class Reader:
-    """Exact reads from a blocking socket; surplus bytes are buffered for the next read.
+    """Reads exact numbers of bytes from a blocking socket; buffers surplus bytes for the next read.
 
     A small request or response arrives whole, so a single receive returns both its length and its body.
     """
 
     def __init__(self, sock: socket.socket) -> None:
         self._receive = sock.recv
-        self.rest = b""  # bytes received beyond the last read
+        self.rest = b""  # bytes received beyond those of the last read
 
     def read(self, count: int, *, at_end_ok: bool = False) -> bytes:
         """Return ``count`` bytes, or b"" if ``at_end_ok`` and the peer closed before the first byte.

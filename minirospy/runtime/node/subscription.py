@@ -286,7 +286,7 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # After the refusal a newer list of publishers arrived. Use it: no further one may come.
+                # A newer list of publishers arrived after the refusal. Use it, because no further list may come.
                 # Retry now, because the publisher may accept.
                 self.retry(uri, error)
         except _NoPublisher as error:
@@ -368,7 +368,7 @@ class Subscription:
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # The Unix socket does not connect: the processes are isolated from each other, for example by a sandbox.
+            # Connecting to the Unix socket failed: the processes are isolated from each other, for example by a sandbox.
             # Use TCP.
             host, port = unix.host, unix.port
         else:

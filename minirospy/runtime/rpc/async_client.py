@@ -109,7 +109,7 @@ class AsyncRpcClient:
         return connection
 
     def keep(self, connection: _Connection) -> None:
-        """Keep a connection as idle, so that the next call can use it."""
+        """Keep an idle connection, so that the next call can use it."""
         if self.closed:
             connection.close()
             return

@@ -42,9 +42,9 @@ REQUEST_SECONDS = 30.0
 _LINGER_SECONDS = 2.0
 """Keep reading from a refused client for this many seconds; closing earlier resets the connection, and the response is lost."""
 
-_SHORT_BODY = 4096  # bytes; a longer body is read in steps
+_SHORT_BODY = 4096  # maximum bytes of a short body; a longer one is read in steps
 
-# Bytes; requests longer than this are processed one by one, because their values may take several times as much memory.
+# Maximum bytes of a request that is processed together with others; its values may take several times as much memory
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (
@@ -208,7 +208,7 @@ class Connection:
             return b""
 
     def readable(self) -> None:
-        """Read, unless other connections have their turn; the loop then calls this again in its next iteration."""
+        """Read, unless it is other connections' turn; in that case, the loop calls this again in its next iteration."""
         if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 __all__ = ["MAX_UNREAD", "Outbox"]
 
-MAX_UNREAD = 256 * 1024  # bytes; a client that has not read this much gets no further responses
+MAX_UNREAD = 256 * 1024  # maximum unread bytes; a client with more gets no further responses
 
 
 class Outbox:
@@ -19,7 +19,7 @@ class Outbox:
     def __init__(self, sock: socket.socket) -> None:
         self._sock = sock
         self._pieces: deque[memoryview] = deque()
-        self.size = 0  # bytes in the queue
+        self.size = 0  # number of bytes in the queue
 
     def __bool__(self) -> bool:
         """Return whether the queue contains bytes."""

@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 # Maximum total bytes of all clients' requests that are incomplete or being read; above it, the largest are refused
 MAX_HELD = 72 * 1024 * 1024
-LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are never refused because of MAX_HELD
+LARGE_REQUEST = 32 * 1024  # a request of at most this many bytes is never refused because of MAX_HELD
 
 # Maximum bytes of unread responses to all clients together.
 # Above it, disconnect the client that has gone longest without reading.
@@ -57,7 +57,7 @@ Thousands of clients may connect together; the server accepts all of them, 30 us
 
 _ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from them
 
-# Number of connections to read before accepting new ones, which takes some 1 ms; thousands may be readable together
+# Number of connections to read before accepting new ones, which takes about 1 ms; thousands may be readable together
 _READS_AT_ONCE = 16
 
 # Maximum number of connections to read per loop iteration, and the maximum seconds; the rest are read first in the next one
@@ -107,8 +107,8 @@ class RpcServer:
         self._bind_host = bind_host
         self._ports = ports
         self._most = max_idle
-        # If only few clients may stay connected, clients that are accepted together may displace each other, so read
-        # from each first.
+        # If only a few clients may stay connected, read from each before accepting the next:
+        # clients that are accepted together may displace each other.
         self._reads_all = max_idle is not None and max_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)

@@ -65,7 +65,7 @@ class OutLink:
         self.sent = 0
         self.dropped = 0
         self.large = 0  # number of messages that are long enough for shared memory
-        self._last_large = 0  # size in bytes of the last of them
+        self._last_large = 0  # size in bytes of the last such message
         self.ring = ring  # this end of the shared memory, or None if the subscriber cannot read any
 
         self._is_same_host = sock.family not in FAMILIES
@@ -115,7 +115,7 @@ class OutLink:
 
     @property
     def obstacle(self) -> str:
-        """Return why large messages do not go through shared memory, or "" if they do, or there were none."""
+        """Return the reason why large messages do not go through shared memory, or "" if they do or there were none."""
         if not self.large:
             return ""
         if self.ring:
@@ -231,7 +231,7 @@ class OutLink:
         if self._outbox and self._has_to_wait(buffers):
             return
         if sharing and self.ring:
-            # Announce it only if the outbox is empty, because announcements and frames must arrive in message order.
+            # Announce the message only if the outbox is empty, because announcements and frames must arrive in order.
             try:
                 if self.ring.announce(sharing, may_wait=self._may_stay()):
                     return

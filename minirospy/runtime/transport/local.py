@@ -18,7 +18,7 @@ from minirospy.runtime.transport import sockets
 __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answer", "reach", "this_host"]
 
 PROTOCOL = "UNIXROS"
-_PREFIX = "minirospy-"  # the start of socket names
+_PREFIX = "minirospy-"  # the prefix of socket names
 
 TRUSTED_USERS = frozenset({0})  # ids of the users that are trusted in addition to this process's own: root
 

@@ -24,7 +24,7 @@ class RateLimitedLogger:
         self._limit = lines
         self._logged = 0
         self._omitted = 0
-        self._end = 0.0  # when the current ten-second window ends
+        self._end = 0.0  # time at which the current ten-second window ends
 
     def close(self) -> None:
         """Log the number of lines omitted since the last report. Idempotent."""

@@ -41,7 +41,7 @@ from minirospy.runtime.transport.sockets import (
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, for frames that are read in steps
+_TURN_CHUNK = 4096  # bytes per receive, and per connection's buffer, for frames that are read in steps
 
 _DRAIN_BYTES = 64 * 1024 * 1024
 # maximum bytes to allocate per receive, so that a large length prefix alone cannot make this process allocate much memory
@@ -188,8 +188,8 @@ class _FrameSource:
         self._was_large = False
         self._may_busy_poll = may_busy_poll(sock)
         self._is_fast = False
-        # On a Unix socket, a reset means end of file: Linux reports it after all data if the publisher closed before reading an
-        # answer about shared memory.
+        # On a Unix socket, a reset means end of file.
+        # Linux reports it, after all data, if the publisher closed before reading an answer about shared memory.
         self._is_unix = sock.family not in FAMILIES
         self._ring = RingReceiver() if shares_memory else None
 

@@ -41,7 +41,7 @@ __all__ = [
 FIELD = "shared_memory"
 """The field of the connection header by which a subscriber declares that it can read from a ring."""
 
-QUIET_SECONDS = 5.0  # time without a large message after which a ring's memory is given back
+QUIET_SECONDS = 5.0  # seconds without a large message after which a ring's memory is given back
 
 # Seconds for which a publishing thread waits for a subscriber to release a place: the same as for a full socket.
 _WAIT_SECONDS = 0.005
@@ -65,7 +65,7 @@ def may_share(sock: socket.socket) -> bool:
 
 
 def obstacle(sock: socket.socket, *, is_same_host: bool) -> str:
-    """Return why a publisher's connection that has no :class:`RingSender` has none."""
+    """Return the reason why a publisher's connection has no :class:`RingSender`."""
     if sock.family != getattr(socket, "AF_UNIX", None):
         if not is_same_host:
             return "the subscriber is on another machine or in another container"
@@ -133,7 +133,7 @@ class _Memory:
         """Create and map the file, which has no memory at first. Raise OSError if that fails."""
         self.layout = layout
         self.places = Places(layout.places)
-        self._backed = [0] * layout.places  # bytes with allocated memory at the start of each place
+        self._backed = [0] * layout.places  # number of bytes with allocated memory at the start of each place
         self.file = os.memfd_create("minirospy-ring", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
         self.read_only = -1
         try:
@@ -197,17 +197,17 @@ class SharedRing:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.lock = threading.Lock()
         self.memory: _Memory | None = None
-        self.trouble = ""  # why there is no memory, set by turn_off()
+        self.trouble = ""  # the reason why there is no memory, set by turn_off()
         self._loop = loop
         self._senders: set[RingSender] = set()
         self._retired: list[
             _Memory
-        ] = []  # replaced memories that a connection still uses, and that are still allocated
+        ] = []  # replaced memories that are still allocated, and that a connection still uses
         self._is_off = False
         self._was_used = False
         self._timer: asyncio.TimerHandle | None = None
         self._is_watched = False  # whether the timer runs, or is about to
-        # by pidfd of a subscriber that closed its connection while it held places: the memory, and the connection
+        # dict from the pidfd of a subscriber that closed its connection while it held places, to the memory and connection
         self._closed: dict[int, tuple[_Memory, RingSender]] = {}
 
     @property
@@ -218,7 +218,7 @@ class SharedRing:
             return sum(memory.backed_bytes for memory in memories)
 
     def share(self, frame: LargeFrame) -> Sharing:
-        """Return an object that writes ``frame`` into the ring once the first connection needs it."""
+        """Return an object that writes ``frame`` into the ring when the first connection needs it."""
         with self.lock:
             self.collect()
         return Sharing(self, frame)
@@ -243,15 +243,15 @@ class SharedRing:
         Call this on the loop, with the lock held.
         """
         if memory not in self._retired:
-            return  # no other connection uses it, so it is freed when its subscriber unmaps it
+            return  # no other connection uses this memory, so it is freed when the subscriber unmaps it
         try:
             file = os.pidfd_open(process)
         except ProcessLookupError:
-            # It has exited, and its parent has been notified.
+            # The subscriber has exited, and its parent has been notified.
             self._release(memory, sender)
             return
         except (OSError, AttributeError):
-            # The memory stays until the other subscribers have a new ring, that is until the next large messages.
+            # The memory stays allocated until the next large messages have given the other subscribers a new ring.
             return
         self._closed[file] = memory, sender
         self._loop.add_reader(file, self._exited, file)
@@ -414,12 +414,12 @@ class RingSender:
     def __init__(self, shared: SharedRing, sock: socket.socket) -> None:
         self.step = Step.NEW
         self.announced = 0  # number of messages that went through the ring
-        self._trouble = ""  # why the ring is not used, set with Step.OFF
+        self._trouble = ""  # the reason why the ring is not used, set with Step.OFF
         self._ring = shared
         self._sock = sock
         self._process = peer(sock).process
         self.memory: _Memory | None = None  # the memory that was offered last
-        self._counter = -1  # the eventfd that counts the subscriber's releases, of the last offer
+        self._counter = -1  # the eventfd in the last offer, which counts the subscriber's releases
         self._is_releasing = True  # whether the last wait for a release was successful
 
     def obstacle(self, large: int, last_size: int) -> str:
@@ -483,7 +483,7 @@ class RingSender:
             self._turn_off("the subscriber has released more than it held")
 
     def close(self) -> None:
-        """Forget the connection. If its subscriber holds places, it may still read them, so the ring is replaced.
+        """Forget the connection. If the subscriber holds places, replace the ring, because it may still read them.
 
         Call this on the loop.
         """
@@ -574,7 +574,7 @@ class RingSender:
         self.step = Step.OFF
 
     def _forget_memory(self) -> None:
-        """Release all places of the previous ring, which the subscriber had read before it answered :data:`ring.READY`."""
+        """Release all places of the previous ring. The subscriber had read them before it answered :data:`ring.READY`."""
         memory, self.memory = self.memory, None
         if memory:
             memory.places.release(self, memory.places.held_by(self))

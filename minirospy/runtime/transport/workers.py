@@ -37,7 +37,7 @@ class Workers:
         """
         with self._lock:
             if self._idle:
-                # A claimed worker always takes an entry: one that exits without an entry first leaves the idle workers.
+                # A claimed worker always takes this work: before it exits, an idle worker removes itself from the idle ones.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
@@ -62,7 +62,7 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # This worker was claimed just as it was about to exit, so an entry will arrive in a moment.
+                # This worker was claimed just as it was about to exit, so work for it will arrive in a moment.
                 function, args = self._work.get()
 
 
