@@ -42,9 +42,9 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # with at most this many statuses, publish them immediately after each change
+_FEW_STATUSES = 50  # maximum length of a status list that is published immediately after each change
 
-# For longer lists: seconds to pause per status, so that publishing does not use all CPU time.
+# Seconds to pause per status after publishing a longer list, so that publishing does not use all CPU time.
 _SECONDS_A_STATUS = 1e-4
 
 
@@ -200,7 +200,7 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish all goals' statuses. If there are many, wait for a pause first."""
+        """Publish all goals' statuses: immediately if the list is short, otherwise after a pause."""
         with self.lock:
             pause = len(self.status_list) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -238,7 +238,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and self._find(goal_id.id) is None:
-                # If the goal arrives after this request, it will be recalled immediately.
+                # The goal is recalled immediately if it arrives after this request.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._add(tracker)
                 tracker.end()
@@ -269,7 +269,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """Process a goal whose ID is already known, because the goal was sent twice or cancelled before it arrived."""
+        """Process a goal with a known ID: it was sent twice, or cancelled before it arrived."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status
@@ -361,7 +361,7 @@ class _StatusThread:
 
 
 def _status_frequency(name: str) -> float:
-    """Return the rate, in Hz, of publishing all statuses.
+    """Return how often to publish all statuses, in Hz.
 
     Raise ActionException if the parameter is not a number above 0.
     """

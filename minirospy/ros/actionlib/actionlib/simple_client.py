@@ -105,7 +105,7 @@ class SimpleActionClient:
             return False
 
         def is_over() -> bool:
-            # The goal is also over if the done callback has sent the next goal, or another thread has sent one.
+            # The wait is also over if the done callback or another thread has sent a new goal.
             return (
                 self.gh is None or self.simple_state == SimpleGoalState.DONE or self._finished is waited_for
             )
