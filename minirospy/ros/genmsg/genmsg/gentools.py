@@ -23,7 +23,7 @@ def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
 
 
 def compute_full_text(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the full definition of a message or service, with the messages that it uses, as in connection headers and bags.
+    """Return the full definition of a message or service, including the messages that it uses, as in bags.
 
     Raise KeyError if :func:`load_depends` has not been called for ``spec``.
     """
