@@ -20,7 +20,7 @@ __all__ = [
 
 
 class ROSBagException(Exception):
-    """The base class of rosbag's errors; ``value`` is the message."""
+    """Base class of rosbag's errors; ``value`` is the message."""
 
     def __init__(self, value: str | None = None) -> None:
         super().__init__(value)
@@ -31,14 +31,14 @@ class ROSBagException(Exception):
 
 
 class ROSBagFormatException(ROSBagException):
-    """Raised if the bag's bytes violate the format."""
+    """Raised if a bag's bytes violate the format."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
 
 
 class ROSBagUnindexedException(ROSBagException):
-    """Raised if the bag was not closed, or its index is damaged."""
+    """Raised if a bag was not closed or its index is damaged."""
 
     def __init__(self, *args: object) -> None:
         super().__init__("Unindexed bag")
