@@ -45,7 +45,7 @@ class ROSBagUnindexedException(ROSBagException):
 
 
 class ROSBagEncryptNotSupportedException(ROSBagException):
-    """Raised if the bag is encrypted or encryption was requested. Neither is supported."""
+    """Raised if a bag is encrypted or encryption was requested; neither is supported."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
@@ -60,7 +60,7 @@ class ROSBagEncryptException(ROSBagException):
 
 @contextmanager
 def as_ros_errors() -> Iterator[None]:
-    """Convert minirospy's bag errors to rosbag's exceptions, because programs catch those."""
+    """Convert minirospy's bag errors to rosbag's exceptions, which programs catch."""
     try:
         yield
     except BagError as error:

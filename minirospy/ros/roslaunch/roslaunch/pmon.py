@@ -50,7 +50,7 @@ __all__ = [
 
 
 class ApiLauncher(Launcher):
-    """A launcher that notifies listeners and stores a Process for each node that it started."""
+    """A launcher that notifies listeners and keeps a Process for each started node."""
 
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
@@ -61,7 +61,7 @@ class ApiLauncher(Launcher):
         self.known: dict[str, LaunchedProcess] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
-        """Return a node's command. Raise LaunchError if the command cannot be built."""
+        """Return a node's command. Raise LaunchError if it cannot be built."""
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
@@ -70,7 +70,7 @@ class ApiLauncher(Launcher):
 
     @property
     def log_folder(self) -> str:
-        """Return the folder for the nodes' log files."""
+        """Return the folder for nodes' log files."""
         return str(self._master.log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
@@ -82,7 +82,7 @@ class ApiLauncher(Launcher):
         self.notify(process.name, process.exit_code or 0)
 
     def notify(self, name: str, code: int) -> None:
-        """Notify all listeners that a process has exited; print the error of a listener that fails."""
+        """Notify all listeners of a process's exit; print the error of any listener that fails."""
         for listener in tuple(self.listeners):
             try:
                 listener.process_died(name, code)
@@ -91,11 +91,11 @@ class ApiLauncher(Launcher):
 
 
 class FatalProcessLaunch(RLException):
-    """Raised if a process failed to start, and the launch cannot continue."""
+    """Raised if a process failed to start and the launch cannot continue."""
 
 
 class LaunchedProcess(Process):
-    """A node's process: running, or created by create_node_process() and not yet started."""
+    """A node's process, running or, after create_node_process(), not yet started."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         # Do not set `args`, `env`, `spawn_count` and `exit_code`: as properties, they return the process's current
@@ -113,7 +113,7 @@ class LaunchedProcess(Process):
         self.log_dir = launcher.log_folder
         self._launcher = launcher
         self._node = node
-        self.process: processes.Process | None = None  # the most recently started process
+        self.process: processes.Process | None = None  # the last process started
 
     @property
     def started(self) -> bool:
@@ -127,7 +127,7 @@ class LaunchedProcess(Process):
 
     @property
     def popen(self) -> subprocess.Popen[bytes] | ForkedProcess | None:
-        """Return the process, with the interface of subprocess.Popen."""
+        """Return the process with the interface of subprocess.Popen."""
         return self.process.popen if self.process else None
 
     @property
