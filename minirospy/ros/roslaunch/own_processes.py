@@ -140,7 +140,7 @@ class OwnProcesses:
         self._closing = threading.Event()
         self._on_exit = on_exit  # called with an exited process's name and exit status
         self._on_required_exit = on_required_exit
-        self._on_last_exit = on_last_exit  # called at each poll once all processes have exited and no more will come
+        self._on_last_exit = on_last_exit  # called at each poll if no process is left or will come
 
     def start(self, name: str) -> None:
         """Start the polling thread with this name, unless it is running or there is no process."""

@@ -50,7 +50,7 @@ PRELOADED = (
 """The modules that are loaded in a node after it has created publishers, subscribers and services."""
 
 LENGTH_SIZE = 8  # bytes of a request's length prefix
-FDS = 4  # file descriptors per request: stdin, stdout, stderr and a pipe on which roslaunch lets the node start
+FDS = 4  # file descriptors per request: stdin, stdout, stderr, and a pipe that signals the node to start
 READY, REFUSED = b"ready", b"refused"  # replies other than a process id
 
 _SUFFIXES = (".py", ".pyc", ".so")  # suffixes of importable files

@@ -111,7 +111,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # If the parent were killed while starting a process outside the job, that process would remain suspended.
+        # Otherwise, killing this process while it starts the guardian would leave the guardian suspended.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,

@@ -19,7 +19,7 @@ __all__ = ["Supervisor"]
 _RESPAWN_SECONDS = 0.1  # minimum seconds between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds per wait of the main thread, which receives signals.
+"""Maximum seconds of each wait in the main thread, which receives signals.
 
 A signal just before a wait (on Windows, any signal) is handled only after that wait. Changed files and remote processes
 are checked between waits.
