@@ -229,7 +229,7 @@ def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
 
 @functools.cache
 def read_passed_on() -> dict[str, dict[str, str]]:
-    """Return the names that star imports bring into real ROS's modules, which have no ``__all__``.
+    """Return the names that star imports provide in real ROS, because its modules have no ``__all__``.
 
     The result maps modules to the modules that define the names ("" if the names are modules themselves), and these to the
     names, separated by spaces: NAME, or NAME=NAME_THERE.

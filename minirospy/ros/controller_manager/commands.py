@@ -72,7 +72,7 @@ def main() -> int:
 
 
 def new_group_parser() -> argparse.ArgumentParser:
-    """Return the parser of ``controller_group``."""
+    """Return the parser for ``controller_group``."""
     parser = argparse.ArgumentParser(prog="controller_group", description="Controller Group Utility")
     commands = parser.add_subparsers(title="Commands", metavar="", dest="command")
     commands.add_parser("list", help="list available groups")

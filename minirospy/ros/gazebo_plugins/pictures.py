@@ -39,7 +39,7 @@ class _DrawingThread:
         self._is_warned = False
 
     def join(self) -> None:
-        """Add a user."""
+        """Add a user; the first one starts the thread."""
         with self._lock:
             self._users += 1
             if self._thread is None:

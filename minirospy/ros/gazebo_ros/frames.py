@@ -22,7 +22,7 @@ WORLD_FRAMES = ("", "world", "map", "/map")
 
 
 def find_link(simulation: Simulation, name: str) -> SimLink | None:
-    """Return the link ``model::link`` or, as in Gazebo, the first link with an unscoped name; otherwise None."""
+    """Return the link ``model::link`` or, as in Gazebo, the first link with that unscoped name; None if there is none."""
     model, _, link = name.partition("::")
     if link:
         found = simulation.models.get(model)

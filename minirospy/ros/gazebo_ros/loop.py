@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 
 DEFAULT_TICK_HZ = 250.0  # rate of /clock and the models' states; a 1000 Hz clock keeps every Python node busy
 MAX_LAG_SECONDS = 0.1  # if the simulation lags by more than this, it does not catch up
-MAX_STEPPING_SECONDS = 0.1  # maximum wall time per tick: with 1 ns steps, a tick may have too many steps
+MAX_STEPPING_SECONDS = 0.1  # maximum wall time per tick, so that jobs can run; a step may be as short as 1 ns
 
 MAX_WAIT_SECONDS = 60.0  # maximum wait for the next steps; longer waits may overflow
 

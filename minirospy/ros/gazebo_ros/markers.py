@@ -96,7 +96,7 @@ class WorldMarkers:
 
 
 def has_moved(before: NDArray[np.float64], now: NDArray[np.float64]) -> bool:
-    """Return whether any of the (n, 7) poses, or their number, has visibly changed."""
+    """Return whether any of the (n, 7) poses has visibly changed, or their number has changed."""
     return before.shape != now.shape or bool((abs(now - before) > MIN_CHANGE).any())
 
 

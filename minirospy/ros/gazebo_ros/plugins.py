@@ -301,7 +301,7 @@ class PeriodicPlugin(ModelPlugin):
         return publisher
 
     def is_needed(self) -> bool:
-        """Return whether an output has a subscriber, or True without outputs: then another plugin uses the data."""
+        """Return whether any output has a subscriber. Return True without outputs, because another plugin may use the data."""
         return not self._outputs or any(each.get_num_connections() for each in self._outputs)
 
     def sense(self) -> None:
@@ -324,7 +324,7 @@ class PeriodicPlugin(ModelPlugin):
 
 
 class SensorPlugin(PeriodicPlugin):
-    """A sensor plugin, with the sensor's rate unless ``load`` sets ``self.rate``.
+    """A sensor plugin. It runs at the sensor's rate unless ``load`` sets ``self.rate``.
 
     If ``load`` sets ``self.shown_rays``, the simulation's window can show them.
     """

@@ -43,7 +43,7 @@ class Server:
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
         self._published_ns = -1
-        self._told = len(loop.simulation.warnings)  # gzserver itself logs these first warnings
+        self._told = len(loop.simulation.warnings)  # gzserver itself logs the initial warnings
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         self._window: Window | None = None

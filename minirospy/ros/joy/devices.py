@@ -78,8 +78,7 @@ class LinuxDevice:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # Open the device twice: the first events report its state, but after the first open()
-            # they may report the state at the last close().
+            # Open the device twice: after the first open(), the initial events may report the state at the last close().
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:

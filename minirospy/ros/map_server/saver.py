@@ -35,7 +35,7 @@ class SaverOptions(NamedTuple):
 
 
 def parse_options(words: Sequence[str]) -> SaverOptions | None:
-    """Return the options, or None for ``-h``. Raise UsageError, with ROS's message if there is one, if they are invalid."""
+    """Return the options, or None for ``-h``. Raise UsageError (with ROS's message, if any) if they are invalid."""
     options = SaverOptions()
     rest = iter(words)
     for word in rest:

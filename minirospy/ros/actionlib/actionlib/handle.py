@@ -33,7 +33,7 @@ _WHERE_FROM = {
 
 
 class StatusTracker:
-    """Tracks the status of a goal, or of a goal that was cancelled before it arrived."""
+    """Tracks a goal's status, even if the goal was cancelled before it arrived."""
 
     def __init__(
         self, goal_id: GoalID | None = None, status: int | None = None, goal: ActionGoal | None = None

@@ -29,7 +29,7 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which the server may not list the goal: not listed yet, or no longer listed."""
+"""States in which the server may not list the goal: not yet, or no longer."""
 
 
 class ClientGoalHandle:
@@ -274,7 +274,7 @@ class GoalManager:
         return ClientGoalHandle(machine)
 
     def update_statuses(self, status_array: GoalStatusArray) -> None:
-        """Process a list of statuses, for all goals even if a goal's callback raises an error.
+        """Process a status list for all goals, even if a goal's callback raises an error.
 
         Raise the first of these errors at the end, and log the others.
         """

@@ -220,7 +220,7 @@ class ActionServer:
             self._publish(self.status_pub, message)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
-        """Process a cancel request: for one goal ID, for all goals up to a time stamp, or for all goals."""
+        """Process a cancel request: for one goal ID, for all goals up to a timestamp, or for all goals."""
         time.sleep(CANCEL_SECONDS)
 
         with self.lock:
@@ -294,7 +294,7 @@ class ActionServer:
 
     def _find(self, id: str) -> StatusTracker | None:
         """Return the goal in the list with this ID, or None."""
-        # Comparing lists compares the identity of their items first, which is fast.
+        # List comparison first compares the items' identity, which is fast.
         if self._indexed != self.status_list:
             self._indexed = list(self.status_list)
             self._by_id = {tracker.status.goal_id.id: tracker for tracker in reversed(self._indexed)}
@@ -339,7 +339,7 @@ class _StatusThread:
             threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
 
     def hurry(self, seconds: float) -> None:
-        """Call ``publish`` in ``seconds``, unless a call is already due before that."""
+        """Call ``publish`` after ``seconds``, unless a call is due earlier."""
         due = time.monotonic() + seconds
         if due < self._due:
             self._due = due

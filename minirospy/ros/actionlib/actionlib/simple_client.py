@@ -41,7 +41,7 @@ class SimpleActionClient:
         self.active_cb: Callable[[], object] | None = None
         self.feedback_cb: FeedbackCallback | None = None
         self._set_simple_state(SimpleGoalState.PENDING)
-        # Held while a goal is sent, because the server's response may arrive before the goal's handle is stored.
+        # Held while sending a goal: the server may respond before the goal's handle is stored.
         self._lock = threading.RLock()
         self._finished: ClientGoalHandle | None = None
         self._news = Waiting()

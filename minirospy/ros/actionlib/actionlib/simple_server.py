@@ -130,7 +130,7 @@ class SimpleActionServer:
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()`` to be called when a goal arrives. If the server has an execute callback, log a warning instead."""
+        """Set the callback ``cb()`` for new goals. If the server has an execute callback, log a warning instead."""
         if self.execute_callback:
             rospy.logwarn(
                 "Cannot call SimpleActionServer.register_goal_callback() because an executeCallback exists. "
@@ -140,7 +140,7 @@ class SimpleActionServer:
             self.goal_callback = cb
 
     def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()`` to be called when preemption of the active goal is requested."""
+        """Set the callback ``cb()`` for requests to preempt the active goal."""
         self.preempt_callback = cb
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:

@@ -29,7 +29,7 @@ _END_SECONDS = 20.0
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests of the chosen packages, or of all; return 1 if a test failed.
+    """Run the tests of the chosen packages (default: all); return 1 if a test failed.
 
     Raise BuildError or NotFoundError if a test cannot be run, MinirospyError on Ctrl-C.
 

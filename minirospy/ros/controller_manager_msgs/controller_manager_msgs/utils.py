@@ -156,7 +156,7 @@ def filter_by_resources(
 
 
 def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
-    """Return the sorted names in a namespace that contain a parameter ``type``, like those of controllers."""
+    """Return the sorted names of the controllers in a namespace: names that contain a parameter ``type``."""
     prefix = namespace if namespace.endswith("/") else namespace + "/"
     below = [name.split(prefix, 1)[1].split("/") for name in list_params(namespace) if prefix in name]
     return sorted(parts[0] for parts in below if len(parts) == 2 and parts[1] == "type")

@@ -23,7 +23,7 @@ MAX_TRIANGLES = 20_000  # decomposing a finer mesh would take minutes
 
 
 class Decomposition:
-    """Splits hollow meshes into convex parts. ``warnings`` lists each split mesh, or once that coacd is missing."""
+    """Splits hollow meshes into convex parts. ``warnings`` names each split mesh; if coacd is missing, it says so once."""
 
     def __init__(self, warnings: list[str]) -> None:
         self._warnings = warnings

@@ -212,8 +212,8 @@ class Engine:
         """Store the first geom that each ray hits, and its distance or -1. ``vectors``: (n, 3) unit vectors in world axes."""
         # Newer MuJoCo versions have an argument for normals.
         normals = (None,) if self._has_normals else ()
-        # MuJoCo checks a body's first ``body_geomnum`` geoms for each ray. Exclude the contact geoms after them:
-        # a room that is a single mesh has thousands of contact geoms.
+        # MuJoCo checks a body's first ``body_geomnum`` geoms for each ray. Exclude the contact geoms after them.
+        # A room that is a single mesh has thousands of contact geoms.
         counts = self.model.body_geomnum
         all_counts = counts.copy()
         counts[:] = self._ray_counts

@@ -447,7 +447,7 @@ class SimModel:
         self._set_free_velocities(linear, angular, origin)
 
     def move(self, base: Pose, state: State) -> None:
-        """Move the model rigidly, so that a frame at the pose ``base`` gets ``state``. The joints stop."""
+        """Move the model rigidly, which moves its frame from the pose ``base`` to ``state``. The joints stop."""
         self.engine.refresh()
         change = compose(state.pose, inverse(base))
         for joint in self.all_joints():

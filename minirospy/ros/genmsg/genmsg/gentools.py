@@ -11,7 +11,7 @@ __all__ = ["compute_full_text", "compute_md5", "compute_md5_text"]
 
 
 def compute_md5_text(msg_context: MsgContext, spec: MsgSpec) -> str:
-    """Return the text whose md5sum is the message's md5sum. Raise KeyError if the message uses an unknown message."""
+    """Return the text from which a message's md5sum is computed. Raise KeyError if the message uses an unknown message."""
     return digest.md5_text(parsed_message(spec), lookup_in(msg_context))
 
 

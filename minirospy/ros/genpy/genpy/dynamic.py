@@ -54,6 +54,6 @@ def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception
     except (InvalidMsgSpec, MsgNotFound) as found:
         return found
     except (ValueError, RecursionError):
-        # genmsg finds no error, such as for an invalid name or a message that contains itself: use minirospy's text.
+        # Use minirospy's text for an error that genmsg does not detect, such as a message that contains itself.
         pass
     return InvalidMsgSpec(str(error))

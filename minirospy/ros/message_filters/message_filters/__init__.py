@@ -229,7 +229,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         allow_headerless: bool = False,
         reset: bool = False,
     ) -> None:
-        """Connect the inputs. ``slop`` is the largest difference between timestamps, in seconds.
+        """Connect the inputs. ``slop`` is the maximum difference between timestamps, in seconds.
 
         ``allow_headerless``: stamp a message without a header with its arrival time.
         """

@@ -11,7 +11,7 @@ __all__ = ["StampQueue", "closest_stamps"]
 
 
 class StampQueue(MutableMapping[Time, object]):
-    """One input's messages, keyed by time stamp: a dict as in ROS, plus a sorted list of the stamps."""
+    """One input's messages, keyed by timestamp: a dict as in ROS, plus a sorted list of the stamps."""
 
     __slots__ = ("_entries", "order")
 

@@ -46,7 +46,7 @@ def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callabl
 
 
 def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
-    """Convert a message or a list of messages to an array; return None for None. Raise ValueError without a converter."""
+    """Convert a message or a list of messages to an array; return None for None. Raise ValueError if there is no converter."""
     if msg is None:
         return None
     plural = isinstance(msg, Sequence)
@@ -62,7 +62,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
 
 
 def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
-    """Convert an array to a message, or to a list of messages if ``plural``. Raise ValueError without a converter."""
+    """Convert an array to a message, or to a list of messages if ``plural``. Raise ValueError if there is no converter."""
     function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
     if function is None:
         raise ValueError(

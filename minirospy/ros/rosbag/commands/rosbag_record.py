@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Yield the words with ``--split=N`` and ``--split N``, used in old launch files, replaced by ``--split --size N``."""
+    """Yield the words, replacing ``--split=N`` and ``--split N`` from old launch files with ``--split --size N``."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()

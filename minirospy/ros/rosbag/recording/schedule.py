@@ -16,7 +16,7 @@ _SECOND = 10**9
 
 
 class PlayOptions(NamedTuple):
-    """The options of `rosbag play`. Times are in nanoseconds; times in the bag are in bag time."""
+    """The options of `rosbag play`. Times are in nanoseconds; positions in the bag are in bag time."""
 
     prefix: str = ""
     immediate: bool = False

@@ -51,7 +51,7 @@ class Output:
             print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
-        """Write all lines, even earlier ones, to roslaunch-HOST-PID.log in ``folder``; return the file's path.
+        """Write all lines, including earlier ones, to roslaunch-HOST-PID.log in ``folder``; return the file's path.
 
         Raise OSError if the file cannot be written.
         """

@@ -430,7 +430,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Passes printed lines, either only errors or all others, to a function."""
+    """Passes printed lines to a function: error lines if ``errors``, otherwise all other lines."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function

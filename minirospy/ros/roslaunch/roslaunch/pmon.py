@@ -132,7 +132,7 @@ class LaunchedProcess(Process):
 
     @property
     def pid(self) -> int:
-        """Return the process id, or -1 before the start."""
+        """Return the process id, or -1 before the process starts."""
         return self.process.pid if self.process else -1
 
     @property

@@ -329,7 +329,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master; get the data for ROS's rosmaster from its API."""
+    """Print one line about the running master. For ROS's rosmaster, get the data from the Master API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
