@@ -143,7 +143,7 @@ def _decode_str(v: str | bytes) -> str:
 
 
 def _median(values: Sequence[float]) -> float:
-    """Return the median, or NaN without values."""
+    """Return the median, or NaN if there are no values."""
     if not values:
         return math.nan
     ordered, middle = sorted(values), len(values) // 2

@@ -35,7 +35,7 @@ class NodeStarter:
         self._preload = Preload()
 
     def prepare(self, nodes: Sequence[NodeSpec]) -> None:
-        """Start preloaded processes to fork similar ``nodes`` from."""
+        """Start the preloaded processes that will fork similar ``nodes``."""
         if len(nodes) < MIN_NODES:
             return
         starts = []

@@ -39,7 +39,7 @@ _MIRRORED = frozenset(
 
 @dataclass(frozen=True)
 class Start:
-    """What a process is started with: its command line, environment and working folder."""
+    """The inputs for starting a process: its command line, environment and working folder."""
 
     command: tuple[str, ...]
     environ: Mapping[str, str]
@@ -135,7 +135,7 @@ class ForkedProcess:
 
 
 def _start_time(pid: int) -> bytes | None:
-    """Return a process's start time, which tells it from a later process with the same id, or None if it has exited."""
+    """Return a process's start time, which distinguishes it from a later process with the same id; None if it has exited."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
     except (FileNotFoundError, ProcessLookupError):
@@ -151,7 +151,7 @@ class Preload:
         self._parents: dict[_Kind, _Parent] = {}
 
     def prepare(self, starts: Sequence[Start]) -> None:
-        """Start the processes from which to fork ``starts``. They import rospy while the launch continues.
+        """Start the preloaded processes that will fork ``starts``. They import rospy while the launch continues.
 
         Do nothing if the environment variable MINIROSPY_PRELOAD is 0.
         """
@@ -214,7 +214,7 @@ class _Parent:
             theirs.close()
 
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
-        """Fork a process, or return None if its program must be started normally. Raise OSError without a reply."""
+        """Fork a process, or return None if its program must be started normally. Raise OSError if there is no reply."""
         if not self._is_ready:
             if self._socket.recv(len(self._protocol.READY)) != self._protocol.READY:
                 raise ConnectionError("the process exited, or cannot fork nodes")

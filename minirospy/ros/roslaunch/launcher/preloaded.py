@@ -117,7 +117,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
 
 
 def hides_module(folder: str, loaded: set[str]) -> bool:
-    """Return whether importing one of the top-level modules ``loaded`` could find a file in ``folder`` first."""
+    """Return whether an import of a top-level module in ``loaded`` could find a file in ``folder`` first."""
     with os.scandir(folder) as entries:
         for entry in entries:
             stem, _, suffix = entry.name.partition(".")

@@ -111,7 +111,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # Otherwise, killing this process while it starts the guardian would leave the guardian suspended.
+        # If this process is killed while it starts the guardian outside its job, the guardian remains suspended.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,

@@ -276,7 +276,7 @@ class Launcher:
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
-        """Watch until all nodes, or a required one, have exited or stop() is called; return the exit status.
+        """Watch the nodes until all of them or a required one have exited, or stop() is called; return the exit status.
 
         ``forever``: continue even if no node is left.
         """

@@ -138,7 +138,7 @@ class Supervisor:
     # --- called in the thread that runs the launch
 
     def watch(self, *, forever: bool = False) -> int | None:
-        """Watch until all processes, or a required one, have exited or stop() is called.
+        """Watch the processes until all of them or a required one have exited, or stop() is called.
 
         Return the exit status, or None if no process is left. ``forever``: continue even if no process is left.
         """

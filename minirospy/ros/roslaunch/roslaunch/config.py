@@ -188,7 +188,7 @@ def load_config_default(
 
 
 def get_roscore_filename() -> str | None:
-    """Return None: the master has no launch file for nodes to start with it."""
+    """Return None: the master does not start nodes from a launch file."""
     return None
 
 

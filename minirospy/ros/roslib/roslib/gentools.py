@@ -78,7 +78,7 @@ def compute_md5(get_deps_dict: Dependencies, rospack: object = None) -> str:
 
 
 def compute_md5_text(get_deps_dict: Dependencies, spec: MsgSpec, rospack: object = None) -> str:
-    """Return the text whose md5sum is the message's md5sum."""
+    """Return the text from which a message's md5sum is computed."""
     return gentools.compute_md5_text(_context(get_deps_dict["spec"]), spec)
 
 

@@ -49,7 +49,7 @@ class Depend(NamedTuple):
 
 
 class VersionControl(NamedTuple):
-    """Where the package's source repository is."""
+    """The location of the package's source repository."""
 
     type: str
     url: str

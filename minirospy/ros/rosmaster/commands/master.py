@@ -191,7 +191,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Reject an empty value, such as an unset variable: it would give every address access to the master.
+        # Reject an empty value, for example from an unset variable: it would give every address access to the master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -482,7 +482,7 @@ class _Shown(logging.Handler):
 
 
 def _show(line: str) -> None:
-    """Print a line; if stdout is closed (`roscore -v | head`), ignore it."""
+    """Print a line; ignore a closed stdout (`roscore -v | head`)."""
     with contextlib.suppress(OSError):
         # Print in a single write, because another thread may print the warning about ROS_MASTER_URI.
         print(f"{line}\n", end="", flush=True)
@@ -491,7 +491,7 @@ def _show(line: str) -> None:
 def _log_to_file(
     folder: Path, *, verbose: bool, level: str | None
 ) -> tuple[Path | None, Callable[[str], object]]:
-    """Log to ``folder``/master.log and, if possible, create a link ``latest`` to the folder next to it.
+    """Log to ``folder``/master.log; next to the folder, create a link ``latest`` to it if possible.
 
     Return the file, and the function that logs registrations. If the file cannot be written, the master runs without a log.
     """

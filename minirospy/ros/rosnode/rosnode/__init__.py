@@ -86,7 +86,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
-    """Return `NODE (URI)` for the node with this URI that uses ``topic`` in ``system_state``, else the URI."""
+    """Return `NODE (URI)` for the node with this URI that uses ``topic`` in ``system_state``; if there is none, return the URI."""
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
@@ -303,7 +303,7 @@ _rosnode_cmd_ping = _verb("ping")
 
 
 def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
-    """Run `rosnode kill`; return its exit status. Raise ROSNodeException for a name that is not a node's."""
+    """Run `rosnode kill`; return its exit status. Raise ROSNodeException if a name is not a node."""
     names = [script_resolve_name(ID, word) for word in argv[2:] if not word.startswith("-")]
     if names:
         try:

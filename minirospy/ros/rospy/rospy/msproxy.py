@@ -142,7 +142,7 @@ def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return the proxy for the XML-RPC server at ``uri``, always the same object, or None if ``uri`` is invalid."""
+    """Return the proxy for the XML-RPC server at ``uri`` (always the same object), or None if ``uri`` is invalid."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)

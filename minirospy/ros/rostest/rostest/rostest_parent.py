@@ -17,7 +17,7 @@ __all__ = ["ROSTestLaunchParent"]
 
 
 class ROSTestLaunchParent(ROSLaunchParent):
-    """Runs a configuration's nodes, and tests with them, with a new master on a free port.
+    """Starts a new master on a free port, and runs a configuration's nodes and tests with it.
 
     ``reuse_master``: use the master at ROS_MASTER_URI instead; ``clear`` first deletes its parameters. ``port`` has no effect.
     """

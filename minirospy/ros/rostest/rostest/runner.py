@@ -172,7 +172,7 @@ def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None
 
 
 def setUp(self: RosTestCase) -> None:
-    """Prepare a test's launch. The classes from createUnitTest() use this function as setUp method."""
+    """Prepare a test's launch. The classes from createUnitTest() use this function as their setUp method."""
     self.test_parent = ROSTestLaunchParent(
         self.config, [self.test_file], reuse_master=self.reuse_master, clear=self.clear
     )
@@ -183,7 +183,7 @@ def setUp(self: RosTestCase) -> None:
 
 
 def tearDown(self: RosTestCase) -> None:
-    """Terminate a test's launch. The classes from createUnitTest() use this function as tearDown method."""
+    """Terminate a test's launch. The classes from createUnitTest() use this function as their tearDown method."""
     printlog("tearDown[%s]", self.test_file)
     if self.test_parent:
         self.test_parent.tearDown()

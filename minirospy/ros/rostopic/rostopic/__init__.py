@@ -133,7 +133,7 @@ class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
 def get_topic_type(
     topic: str, blocking: bool = False
 ) -> tuple[str | None, str | None, Callable[[Message], object] | None]:
-    """Return (type, topic, function that extracts the field from a message), or (None, None, None) without such a topic.
+    """Return (type, topic, function that extracts the field from a message), or (None, None, None) if there is no such topic.
 
     ``topic`` may include a field name. If ``blocking``, wait until the topic exists or the node shuts down.
     """

@@ -123,7 +123,7 @@ class ROSTopicDelay:
             self._window.add(now, msg.header.stamp.to_sec())
 
     def get_delay(self) -> Statistics | None:
-        """Return (mean, minimum, maximum, standard deviation, number of messages), or None without new messages."""
+        """Return (mean, minimum, maximum, standard deviation, number of messages), or None if there is no new message."""
         report = self._report()
         return report and (report.mean, report.min, report.max, report.std_dev, report.window)
 

@@ -30,7 +30,7 @@ __all__ = [
 
 
 def paths(path: str | None) -> list[str]:
-    """Return the folders in a variable such as PATH."""
+    """Return the folders listed in the value of a variable such as PATH."""
     return path.split(os.pathsep) if path else []
 
 
