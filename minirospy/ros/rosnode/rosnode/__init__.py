@@ -86,7 +86,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
-    """Return `NODE (URI)` for the node with this URI that uses ``topic`` in ``system_state``; if there is none, return the URI."""
+    """Return `NODE (URI)` for the node with this URI that uses ``topic`` in ``system_state``, or only the URI."""
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
