@@ -28,7 +28,7 @@ __all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "read_pas
 PACKAGE = Path(__file__).parents[1]
 _PASSED_ON = PACKAGE / "ros" / "passed_on.json"  # written by tests/referee/compare_surface.py
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
-"""Folders of the Python modules that belong to no ROS package, keyed by module."""
+"""Folders of Python modules that do not belong to a ROS package, keyed by module."""
 _NAMED_OTHERWISE = {
     "camera_info_manager_py": ("camera_info_manager",),
     "python_orocos_kdl": ("PyKDL",),
@@ -61,27 +61,27 @@ _WITHOUT_STANDARD_LIBRARY = {
     *("genmsg", "genpy", "image_geometry", "sensor_msgs"),
 }
 """Packages that in real ROS import no XML, XML-RPC or logging handlers. Programs that use only messages start faster."""
-_GENERATED = "generated from minirospy/"  # marks generated modules, in their docstrings
+_GENERATED = "generated from minirospy/"  # marks generated modules in their docstrings
 _METADATA = "rospy-1.17.0.egg-info"  # programs query rospy's version through importlib.metadata
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
 _WIDTH = 118  # maximum line length in characters
 
 _DEFINED = {"msg": ("msg", "action"), "srv": ("srv",)}
-"""Maps each module of generated classes to the folders that contain the definitions."""
+"""Maps each generated module to the folders that contain its definitions."""
 
 _HOOKS = {"__getattr__", "__dir__"}
-"""Module functions that provide names that are not defined in the module (PEP 562)."""
+"""Module functions that look up names missing from the module (PEP 562)."""
 
 
 class Origin(NamedTuple):
-    """Where a name is imported from: ``from module import name``, or ``import module`` if ``name`` is empty."""
+    """The source of an imported name: ``from module import name``, or ``import module`` if ``name`` is empty."""
 
     module: str
     name: str
 
 
 class _Source(NamedTuple):
-    """The names that a module's top level defines, read from its source."""
+    """The names defined at a module's top level, read from its source."""
 
     public: tuple[str, ...] | None
     """``__all__``, or None if the module does not define it."""
@@ -126,7 +126,7 @@ def overlay_files() -> dict[str, str]:
 
 @functools.cache
 def modules() -> dict[str, Path]:
-    """Return a dict that maps each module, such as ``rosgraph.names``, to the file that defines its names."""
+    """Map each module, such as ``rosgraph.names``, to the file that defines its names."""
     roots = dict(_ALSO)
     for folder in sorted((PACKAGE / "ros").iterdir()):
         if folder.is_dir():
@@ -151,14 +151,14 @@ def _python_modules(package: Path) -> Iterator[str]:
 
 
 def exported(source: Path) -> dict[str, Origin]:
-    """Return the names that the module in `overlay/` re-exports, each with the module it is imported from."""
+    """Return the names that the module in `overlay/` re-exports, each with the module that provides it."""
     read = _read(source)
     names = dict.fromkeys([*(read.public or ()), *sorted(read.passed_on)])
     return {name: _origin(Origin(_dotted(source), name)) for name in names}
 
 
 def _origin(asked: Origin) -> Origin:
-    """Return the place that defines a name. Follow modules that only re-export the name."""
+    """Return the origin of a name, following modules that only re-export it."""
     source = _source_of(asked.module)
     if source is None:
         return asked
@@ -167,7 +167,7 @@ def _origin(asked: Origin) -> Origin:
         return asked
     module = _by_source().get(f"{inner.module}.{inner.name}")
     if module is not None:
-        # If the overlay has a module of this name, too, use that one.
+        # If the overlay also has a module of this name, use that one.
         # `rosgraph.names` must be the module that `import rosgraph.names` returns.
         parent, _, name = module[0].rpartition(".")
         is_kept = asked.name == name or asked.module == inner.module
@@ -213,12 +213,12 @@ def _text(name: str, source: Path) -> str:
 
 
 def listed(source: Path) -> list[str]:
-    """Return the public names in the ``__all__`` of the module in a file."""
+    """Return the public names in a module file's ``__all__``."""
     return sorted(name for name in _read(source).public or () if not name.startswith("_"))
 
 
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
-    """Map the names that a star import brings from other modules to their `MODULE` or `MODULE:NAME`."""
+    """Map the names that star imports bring from other modules to `MODULE` or `MODULE:NAME`."""
     found = {}
     for place, names in read_passed_on().get(module, {}).items():
         for each in names.split():
@@ -229,7 +229,7 @@ def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
 
 @functools.cache
 def read_passed_on() -> dict[str, dict[str, str]]:
-    """Return the names that star imports bring in real ROS because its modules have no ``__all__``.
+    """Return the names that star imports provide in real ROS, because its modules have no ``__all__``.
 
     The result maps modules to the modules that define the names ("" if the names are modules themselves), and these to the
     names, separated by spaces: NAME, or NAME=NAME_THERE.
@@ -239,7 +239,7 @@ def read_passed_on() -> dict[str, dict[str, str]]:
 
 
 def _submodules(package: str) -> dict[str, str]:
-    """Return a dict that maps the names of a package's submodules to their full names."""
+    """Map the names of a package's submodules to their full names."""
     depth = package.count(".") + 1
     names = [
         each.rpartition(".")[2]
@@ -252,7 +252,7 @@ def _submodules(package: str) -> dict[str, str]:
 
 
 def _text_of_later(module: str, names: dict[str, str], starred: list[str]) -> list[str]:
-    """Return source lines that look up these names at first use. Type checkers and editors do not see such names."""
+    """Return source lines that look up these names at first use, hidden from type checkers and editors."""
     return [
         "",
         "import typing as _typing",
@@ -273,7 +273,7 @@ def _text_of_later(module: str, names: dict[str, str], starred: list[str]) -> li
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:
-    """Join the words with commas into wrapped, indented lines."""
+    """Join the words with commas, wrapped and indented."""
     lines: list[str] = []
     for word in words:
         if lines and len(lines[-1]) + len(word) + 2 <= _WIDTH:
@@ -298,7 +298,7 @@ def _dotted(source: Path) -> str:
 
 @functools.cache
 def _by_source() -> dict[str, tuple[str, Path]]:
-    """Return a dict keyed by dotted name in this package, with each module's name in the overlay and its file."""
+    """Map each module's dotted name in this package to its name in the overlay and its file."""
     return {_dotted(source): (name, source) for name, source in modules().items()}
 
 

@@ -27,17 +27,17 @@ def isstring(s: object) -> bool:
 
 
 def is_global(name: str | None) -> bool | str | None:
-    """Return whether a name is global (starts with ``/``); return None or an empty name unchanged."""
+    """Return whether a name starts with ``/``; return None or an empty name unchanged."""
     return name and name[0] == SEP
 
 
 def is_private(name: str | None) -> bool | str | None:
-    """Return whether a name is private (starts with ``~``); return None or an empty name unchanged."""
+    """Return whether a name starts with ``~``; return None or an empty name unchanged."""
     return name and name[0] == PRIV_NAME
 
 
 def namespace(name: str) -> str:
-    """Return a name's namespace, with a trailing slash. Raise ValueError for None, TypeError for another type."""
+    """Return a name's namespace with a trailing slash. Raise ValueError for None, TypeError for other non-strings."""
     if name is None:
         raise ValueError("name")
     if not isinstance(name, str):
@@ -58,19 +58,19 @@ def canonicalize_name(name: str) -> str:
 
 
 def load_mappings(argv: Sequence[str]) -> dict[str, str]:
-    """Return the remappings on a command line, unresolved, without private parameters."""
+    """Return the command line's remappings, unresolved, without private parameters."""
     arguments = names.parse_arguments(argv)
     return {**arguments.remappings, **arguments.special}
 
 
 def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the namespace from the command line (``__ns:=``) or from the environment, with slashes at both ends."""
+    """Return the namespace from the command line (``__ns:=``) or the environment, with slashes at both ends."""
     named = names.parse_arguments(sys.argv if argv is None else argv).special.get("__ns")
     return make_global_ns(named or (os.environ if env is None else env).get("ROS_NAMESPACE") or GLOBALNS)
 
 
 def make_global_ns(name: str) -> str:
-    """Return a name as a global namespace, with slashes at both ends. Raise ValueError for a private name."""
+    """Convert a name to a global namespace, with slashes at both ends. Raise ValueError for a private name."""
     if is_private(name):
         raise ValueError(f"cannot turn [{name}] into a global name")
     name = name if is_global(name) else SEP + name

@@ -42,7 +42,7 @@ _SERVICE_SECONDS = 5
 
 
 def main() -> int:
-    """Run ``controller_manager``; return its exit status: 1 for an unknown command, 0 even after an error from the manager."""
+    """Run ``controller_manager``; return 1 for an unknown command, but 0 even if the manager reports an error."""
     words = rospy.myargv()[1:]
     try:
         rospy.init_node("controller_manager", anonymous=True)
@@ -72,7 +72,7 @@ def main() -> int:
 
 
 def new_group_parser() -> argparse.ArgumentParser:
-    """Return the parser of ``controller_group``."""
+    """Return the parser for ``controller_group``."""
     parser = argparse.ArgumentParser(prog="controller_group", description="Controller Group Utility")
     commands = parser.add_subparsers(title="Commands", metavar="", dest="command")
     commands.add_parser("list", help="list available groups")
@@ -86,7 +86,7 @@ def new_group_parser() -> argparse.ArgumentParser:
 
 
 def main_of_groups(argv: Sequence[str] | None = None) -> int:
-    """Run ``controller_group``; return its exit status: 1 without a command or a controller manager."""
+    """Run ``controller_group``; return 1 if the command or a controller manager is missing."""
     parser = new_group_parser()
     arguments = parser.parse_args(rospy.myargv()[1:] if argv is None else argv)
     if arguments.command is None:
@@ -115,7 +115,7 @@ def _print_groups(groups: dict[str, Sequence[str]]) -> None:
 
 
 def _use_group(groups: dict[str, Sequence[str]], group: str, is_switch: bool) -> None:
-    """Load and start a group's controllers. ``is_switch``: skip those already running, and stop the other groups' controllers."""
+    """Load and start a group's controllers. If ``is_switch``, skip running ones and stop the other groups' controllers."""
     wanted = list(dict.fromkeys(groups.get(group, ())))
     if not wanted:
         rospy.logerr(f"There is no controller defined in group {group}")

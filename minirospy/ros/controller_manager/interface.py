@@ -42,7 +42,7 @@ def list_controller_types() -> None:
 
 
 def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
-    """Reload the controllers' modules. ``force_kill``: stop and unload all controllers first. ``restore``: load them again."""
+    """Reload the controllers' modules. ``force_kill``: first stop and unload all controllers. ``restore``: load them again."""
     before = _call("list_controllers", ListControllers).controller if restore else []
     print(f"Restore: {restore}")
     is_done = bool(_call("reload_controller_libraries", ReloadControllerLibraries, force_kill).ok)
@@ -98,7 +98,7 @@ def start_controller(name: str) -> bool:
 
 
 def start_controllers(names: Sequence[str]) -> bool:
-    """Start all of these controllers together, or none."""
+    """Start all these controllers together, or none of them."""
     return start_stop_controllers(start_controllers=names)
 
 
@@ -108,14 +108,14 @@ def stop_controller(name: str) -> bool:
 
 
 def stop_controllers(names: Sequence[str]) -> bool:
-    """Stop all of these controllers together, or none."""
+    """Stop all these controllers together, or none of them."""
     return start_stop_controllers(stop_controllers=names)
 
 
 def start_stop_controllers(
     start_controllers: Sequence[str] = (), stop_controllers: Sequence[str] = ()
 ) -> bool:
-    """Start and stop controllers in the same cycle of the loop: all or none."""
+    """Start and stop controllers in the same control cycle: all of them or none."""
     start, stop = list(start_controllers), list(stop_controllers)
     if not _call(
         "switch_controller", SwitchController, start, stop, SwitchControllerRequest.STRICT, False, 0.0

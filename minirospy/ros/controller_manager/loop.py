@@ -34,9 +34,9 @@ _BILLION = 1_000_000_000
 _END_SECONDS = 5.0  # maximum wait for the loop to finish at shutdown, in case a driver hangs
 _SLEEP_SECONDS = 0.1  # maximum sleep, so that a slow loop notices a stop request
 _REPORT_SECONDS = 1.0
-_WARN_SECONDS = 10.0  # between two warnings about overruns or about non-finite commands
-_WARN_SHARE = 0.05  # warn if more of a second's cycles overrun; a busy computer delays single ones
-# Maximum time for which another computing thread holds the GIL; Python's default is 5 ms.
+_WARN_SECONDS = 10.0  # seconds between warnings about overruns or non-finite commands
+_WARN_SHARE = 0.05  # largest share of overrun cycles without a warning; a busy computer delays a few
+# Maximum time in seconds that another thread holds the GIL; Python's default is 5 ms.
 _SWITCH_SECONDS = 0.0002
 
 
@@ -48,13 +48,13 @@ def run(hardware: RobotHardware, rate: float = 100.0, namespace: str = "") -> in
     loop = ControlLoop(hardware, rate, namespace)
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
     gc.collect()
-    gc.freeze()  # so that later garbage collections skip the imported modules
+    gc.freeze()  # exclude the imported modules from later garbage collections
     loop.start()
     return loop.wait()
 
 
 class ControlLoop:
-    """A control loop in a separate thread, with its controller manager. ``limits``: by default from the node's parameters."""
+    """Runs a control loop and its controller manager in a thread. ``limits`` default to those in the node's parameters."""
 
     def __init__(
         self,
@@ -71,14 +71,14 @@ class ControlLoop:
             limits = limits_of_parameters(hardware, self.manager.namespace)
         self._limits = LimitEnforcer(hardware.joints.values(), limits)
         self._times = CycleTimes(round(_BILLION / rate))
-        self._invalid: dict[str, None] = {}  # joints with a non-finite command since the last report, as keys
+        self._invalid: dict[str, None] = {}  # joints with non-finite commands since the last report, as keys
         self._stop = SignalSafeEvent()
         self._ended = SignalSafeEvent()
         self._status = 0
         self._thread = threading.Thread(target=self._run, name="control loop", daemon=True)
 
     def start(self) -> None:
-        """Start the loop. It ends when the node shuts down, or when :meth:`stop` is called."""
+        """Start the loop. It runs until the node shuts down or :meth:`stop` is called."""
         rospy.on_shutdown(self.stop)
         threading.Thread(target=self._report, name="control loop diagnostics", daemon=True).start()
         self._thread.start()
@@ -94,7 +94,7 @@ class ControlLoop:
             self._ended.set()
 
     def wait(self) -> int:
-        """Wait until the loop has finished; return the exit status: 1 if the hardware failed or hangs, else 0."""
+        """Wait until the loop has finished; return 1 if the hardware failed or hangs, else 0."""
         wait_for_event(self._ended, None)
         return self._status
 
@@ -116,7 +116,7 @@ class ControlLoop:
             self._ended.set()
 
     def _end(self) -> None:
-        """Stop the controllers, then write once more so that the driver sees the released joints."""
+        """Stop the controllers, then call the driver's write() a last time so that it sees the released joints."""
         now = rospy.get_rostime()
         period = Duration(*divmod(self._times.period, _BILLION))
         self.manager.stop(now)
@@ -154,7 +154,7 @@ class ControlLoop:
             now, started = now_of_wall(), clock()
             if is_reset := now < last_wall:
                 self._log_jump(last_wall - now)
-            # The period comes from the monotonic clock, because the system time may be changed.
+            # Measure the period with the monotonic clock, because the system time may change.
             self._cycle(Time(*divmod(now, _BILLION)), Duration(*divmod(started - last, _BILLION)), is_reset)
             last_wall, last = now, started
             ended = clock()
@@ -169,7 +169,7 @@ class ControlLoop:
         last = deadline = clock.now()
         while not self._stop.is_set():
             try:
-                # Limit the wait to one period, because time may have jumped back during the last cycle.
+                # Limit the wait to one period: the system time may have jumped back during the last cycle.
                 if not clock.sleep(min(max(1, deadline - clock.now()), period), self._stop):
                     return
             except ROSTimeMovedBackwardsException:
@@ -191,7 +191,7 @@ class ControlLoop:
         rospy.logwarn("time jumped back by %.3f s: the controllers are started again", nanoseconds / _BILLION)
 
     def _report(self) -> None:
-        """Publish the loop's timing once per second. Runs in a separate thread."""
+        """Publish the loop's timing once per second, in a separate thread."""
         try:
             publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
             known, warned = 0, -_WARN_SECONDS
@@ -208,11 +208,11 @@ class ControlLoop:
                 self._log_invalid()
         except rospy.ROSException:
             return  # the node is shutting down
-        if not rospy.is_shutdown_requested():  # otherwise the node unregisters all its topics together
+        if not rospy.is_shutdown_requested():  # otherwise rospy's shutdown unregisters all topics together
             publisher.unregister()
 
     def _log_invalid(self) -> None:
-        """Log the joints whose commands were not finite, if any."""
+        """Log the joints with non-finite commands, if any."""
         if self._invalid:
             invalid, self._invalid = self._invalid, {}
             rospy.logerr_throttle(
@@ -249,7 +249,7 @@ class ControlLoop:
 
 
 def limits_of_parameters(hardware: RobotHardware, namespace: str) -> dict[str, JointLimits]:
-    """Return a robot's joint limits: from robot_description, overridden by the parameters NAMESPACE/joint_limits.
+    """Return a robot's joint limits from robot_description, overridden by the parameters NAMESPACE/joint_limits.
 
     Raise ValueError if a limit is invalid.
     """

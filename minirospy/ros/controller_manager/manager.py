@@ -45,9 +45,7 @@ _LOG = {
     ERROR: rospy.logerr,
     FATAL: rospy.logfatal,
 }
-_EXTRA_SECONDS = (
-    1.0  # as in ROS, a switch with a timeout returns this long after it, even if the loop has stopped
-)
+_EXTRA_SECONDS = 1.0  # seconds for which a switch may exceed its timeout if the loop has stopped, as in ROS
 _BASE_CLASS = "controller_interface::ControllerBase"
 
 
@@ -65,13 +63,13 @@ class ControllerManager:
     """
 
     def __init__(self, hardware: RobotHardware, namespace: str = "") -> None:
-        """Offer the services. Raise ROSInitException before init_node."""
+        """Offer the services. Raise ROSInitException if init_node has not been called."""
         self.hardware = hardware
         self.namespace = "/" + rospy.resolve_name(namespace or rospy.get_namespace()).strip("/")
         self.table = ControllerTable(hardware, log)
         self._plugins: dict[str, Plugin] | None = None
-        self._lock = threading.RLock()  # held by the service call in progress
-        self._waiting: list[threading.Event] = []  # set by the next update
+        self._lock = threading.RLock()  # held during each service call
+        self._waiting: list[threading.Event] = []  # events that the next update sets
         self._has_updated = False
         self._is_closed = False
 
@@ -93,7 +91,7 @@ class ControllerManager:
         ]
 
     def update(self, time: Time, period: Duration, reset_controllers: bool = False) -> None:
-        """Update the running controllers, then start and stop controllers as services have requested.
+        """Update the running controllers, then start and stop the controllers that services have requested.
 
         ``reset_controllers``: restart the running controllers first, for example after a simulation reset.
         """
@@ -149,7 +147,7 @@ class ControllerManager:
         start_asap: bool = False,
         timeout: float = 0.0,
     ) -> bool:
-        """Start and stop controllers in one update, and wait for it; return whether that succeeded. Failures are logged.
+        """Start and stop controllers in the next update and wait for it; return whether that succeeded. Failures are logged.
 
         As in ROS, a start that the hardware aborts counts as a success. A start that fails in the controller does not, unlike in
         ROS. Wait without limit if ``timeout`` is 0, else for ``timeout`` plus one second.
@@ -172,7 +170,7 @@ class ControllerManager:
             return is_done and not has_failed and not rospy.is_down() and not self._is_closed
 
     def stop(self, time: Time) -> None:
-        """Stop all controllers and refuse further requests. Call this in the loop's thread, or after the loop. Idempotent.
+        """Stop all controllers and refuse further requests. Call this in the loop's thread or after the loop. Idempotent.
 
         Afterwards, a last ``hardware.write`` can stop the joints, before :meth:`close` calls the master and the controllers'
         code.
@@ -190,7 +188,7 @@ class ControllerManager:
         loaded, self.table.loaded = self.table.loaded, ()
         for each in reversed(loaded):
             self.table.close(each)
-        if not rospy.is_shutdown_requested():  # otherwise the node unregisters all its services together
+        if not rospy.is_shutdown_requested():  # otherwise rospy's shutdown unregisters all services together
             for service in self._services:
                 service.shutdown("the controller manager is closed")
 
@@ -200,7 +198,7 @@ class ControllerManager:
             service.shutdown()
 
     def _wait_for_update(self) -> bool:
-        """Wait until the loop has used the new table; return False if the node is shutting down."""
+        """Wait until the loop uses the new table; return False if the node is shutting down."""
         if self._has_updated and not self._is_closed:
             updated = SignalSafeEvent()
             self._waiting.append(updated)
@@ -284,7 +282,7 @@ class ControllerManager:
 
 
 def find_description(namespace: str, name: str = "robot_description") -> str | None:
-    """Return the parameter ``name`` in a namespace, or in the closest one above that has it; None if there is none."""
+    """Return the parameter ``name`` from a namespace or its closest parent that has it, or None."""
     while True:
         namespace = namespace.rstrip("/")
         text = rospy.get_param(f"{namespace}/{name}", None)
@@ -296,7 +294,7 @@ def find_description(namespace: str, name: str = "robot_description") -> str | N
 
 
 def read_robot(namespace: str, name: str = "robot_description") -> Robot:
-    """Return the robot of a parameter, searched upwards from a namespace. Raise ControllerError if none is valid."""
+    """Return the robot described by a parameter in a namespace or its parents. Raise ControllerError if there is no valid one."""
     text = find_description(namespace, name)
     if text is None:
         raise ControllerError(f"Could not find parameter {name} on parameter server")
@@ -307,7 +305,7 @@ def read_robot(namespace: str, name: str = "robot_description") -> Robot:
 
 
 def _invalid_name(name: str) -> str:
-    """Return roscpp's error text if a graph name is invalid, else an empty string."""
+    """Return roscpp's error text for an invalid graph name, or an empty string."""
     for number, character in enumerate(name):
         is_letter = character.isascii() and (character.isalpha() or character == "/")
         if number == 0 and not is_letter:

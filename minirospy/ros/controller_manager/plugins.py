@@ -44,7 +44,7 @@ class Plugin(NamedTuple):
     """A controller class that can be loaded. ``name``: its type in parameters. ``origin``: the file that declares it."""
 
     name: str
-    python: str  # the dotted path of the class, or its name in C++
+    python: str  # the class's dotted path, or its C++ name
     origin: str
     folder: Path | None = None  # the package's folder
 
@@ -91,7 +91,7 @@ def find_plugins(warn: Callable[[str], object] = lambda line: rospy.logwarn("%s"
 
 
 def forget_modules(plugins: Iterable[Plugin]) -> None:
-    """Make the next load of these controllers re-read their files, except minirospy's own modules."""
+    """Make the next load of these controllers reimport their modules, except minirospy's."""
     folders = [
         each.folder.resolve() for each in plugins if each.folder and not each.folder.is_relative_to(_OWN)
     ]
@@ -122,7 +122,7 @@ def _of_file(file: Path, folder: Path) -> Iterator[Plugin]:
 
 
 def _find_module(module: str, folder: Path) -> None:
-    """Make a module of an unbuilt or unsourced package importable, from the package's folder or its folder ``src``."""
+    """Make a module of an unbuilt or unsourced package importable from the package's folder or its subfolder ``src``."""
     spec = importlib.util.find_spec(module)
     if spec is None or spec.origin is None:  # a folder without code
         for place in (folder / "src", folder):

@@ -25,7 +25,7 @@ from minirospy.ros.rosparam.rosparam import RosParamException, load_file, set_pa
 __all__ = ["main", "new_parser"]
 
 _SERVICES = ("load_controller", "switch_controller", "unload_controller")
-_MESSAGE_SECONDS = 1.0  # gives the manager's log time to appear before the spawner's, as in ROS
+_MESSAGE_SECONDS = 1.0  # seconds for the manager's log to appear before the spawner's, as in ROS
 
 
 def new_parser() -> argparse.ArgumentParser:
@@ -56,7 +56,7 @@ def new_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program; return its exit status, which is 0 even if there is no controller manager."""
+    """Run the program; return 0, even if there is no controller manager."""
     arguments = new_parser().parse_args(rospy.myargv()[1:] if argv is None else argv)
     rospy.init_node("spawner", anonymous=True)
     if arguments.shutdown_timeout is not None:
@@ -86,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class _Spawner:
-    """The loaded controllers, and the manager's services."""
+    """Loads, starts and stops controllers through the manager's services."""
 
     def __init__(self, prefix: str) -> None:
         self._prefix = prefix
@@ -96,7 +96,7 @@ class _Spawner:
         self._loaded: list[str] = []
 
     def wait_for_services(self, timeout: float | None) -> bool:
-        """Return whether all services are there within ``timeout`` seconds each; before the first /clock, wait longer."""
+        """Return whether every service appears within ``timeout`` seconds; wait longer until the first /clock message."""
         while True:
             try:
                 for name in _SERVICES:
@@ -114,7 +114,7 @@ class _Spawner:
                 return False
 
     def load(self, names: Sequence[str]) -> None:
-        """Load controllers; those that fail are left out."""
+        """Load the controllers, omitting those that fail."""
         for name in names:
             rospy.loginfo("Loading controller: " + name)
             if self._load(name).ok:
@@ -138,7 +138,7 @@ class _Spawner:
         try:
             rospy.loginfo("Stopping all controllers...")
             if not self._loaded:
-                return  # the manager may be busy loading the controller, and would not respond
+                return  # the manager may be busy loading the controller and would not respond
             self._switch([], self._loaded, SwitchControllerRequest.STRICT, False, 0.0)
             rospy.loginfo("Unloading all loaded controllers...")
             for name in reversed(self._loaded):
@@ -150,7 +150,7 @@ class _Spawner:
 
 
 def _controllers(words: Sequence[str]) -> list[str]:
-    """Return the controllers' names. If a word is a file, set the parameters in it and use the names in it."""
+    """Return the controllers' names. If a word is a file, set its parameters and use the names in it."""
     names: list[str] = []
     for word in words:
         if not Path(word).is_file():

@@ -21,7 +21,7 @@ _HELP = """./unspawner name1 name2 name3
 
 
 def main() -> int:
-    """Run the program; return its exit status, 1 after the help."""
+    """Run the program; return 1 after printing the help, else 0."""
     if len(sys.argv) == 1 or sys.argv[1] in ("-h", "--help"):
         print(_HELP)
         return 1
@@ -41,7 +41,7 @@ def main() -> int:
     def stop_again(_: object) -> None:
         try:
             stop()
-        except rospy.ServiceException as error:  # the manager may return later
+        except rospy.ServiceException as error:  # the manager may come back later
             rospy.logwarn("%s", error)
 
     def start() -> None:

@@ -87,7 +87,7 @@ def cvtColorForDisplay(
 
 
 def _guessed(encoding: str) -> str:
-    """Return bgr8 as the output encoding. Raise RuntimeError if an image with this encoding cannot be displayed."""
+    """Return bgr8, the default output encoding. Raise RuntimeError if an image with this encoding cannot be displayed."""
     bits = 0
     try:
         number = type_of_encoding(encoding)
@@ -100,7 +100,7 @@ def _guessed(encoding: str) -> str:
 
 
 def _labels(image: Pixels) -> Pixels:
-    """Convert an image of labels to a color image."""
+    """Convert an image of class labels to a color image."""
     import numpy as np
 
     colors = np.frombuffer(_LABEL_COLORS, np.uint8).reshape(-1, 3)[:, ::-1]
@@ -115,7 +115,7 @@ def _scaled(image: Pixels, low: float, high: float) -> Pixels:
 
     values = image.astype(np.float64) - low
     if image.dtype.kind != "f":
-        # OpenCV subtracts in the image's own data type.
+        # OpenCV subtracts in the image's data type.
         limits = np.iinfo(image.dtype)
         values = np.clip(np.rint(values), limits.min, limits.max)
     # OpenCV multiplies in float32, except for these types.

@@ -63,7 +63,7 @@ def analyzer_loader() -> int:
 
     class AnalyzerLoader(unittest.TestCase):
         def runTest(self) -> None:
-            """Create the analyzers and make them report."""
+            """Create the analyzers and run their reports."""
             group = load_group("", "~")
             assert group.is_complete, "Analyzer group failed to initialize: see its log messages"
             assert group.report(rospy.get_time())
@@ -81,7 +81,7 @@ def load_group(base_path: str, namespace: str) -> AnalyzerGroup:
 
 
 def toplevel_level(levels: Iterable[int]) -> int:
-    """Return the level of the whole tree: stale only if all levels are stale; -1 if there are no levels."""
+    """Return the level of the whole tree: stale only if every level is stale; -1 if there are no levels."""
     found = list(levels)
     highest = max(found, default=-1)
     return 2 if highest > 2 and min(found) <= 2 else highest

@@ -24,7 +24,7 @@ Params = Mapping[str, Any]
 
 
 class Log(Protocol):
-    """Receives the analyzers' warnings and errors about parameters and statuses."""
+    """Interface for logging the analyzers' warnings and errors about parameters and statuses."""
 
     def warn(self, text: str) -> None:
         """Report a problem that can be ignored."""
@@ -35,7 +35,7 @@ class Log(Protocol):
 
 @dataclass
 class Item:
-    """A received status, and its arrival time."""
+    """A received status with its arrival time."""
 
     name: str
     time: float
@@ -83,7 +83,7 @@ class Analyzer(Protocol):
 
 
 class _Items:
-    """One analyzer's items, with a header status."""
+    """An analyzer's items, with a header status."""
 
     def __init__(
         self, path: str, name: str, timeout: float, num_items: int = -1, discard_stale: bool = False
@@ -117,7 +117,7 @@ class _Items:
         was_stale = self._last_level == STALE and now - self._last_change > self._timeout
         if header.level != self._last_level:
             self._last_level, self._last_change = header.level, now
-        # Omit the header, too, if it has no items and has been stale for longer than the timeout.
+        # Also omit the header if it has no items and has been stale for longer than the timeout.
         if self._discard_stale and not items and was_stale:
             return []
         return [header, *(item.status(self.path, item.name in old) for item in items)]
@@ -150,7 +150,7 @@ class GenericAnalyzer(_Items):
             return _words(params.get(key, []), log)
 
         prefixes = words("find_and_remove_prefix")
-        # As in ROS, both parameters apply.
+        # As in ROS, use the prefixes from both parameters.
         self._starts = prefixes + words("startswith")
         self._removed = [_shown(word) for word in prefixes + words("remove_prefix")]
         self._names = words("name")
@@ -215,7 +215,7 @@ class DiscardAnalyzer(GenericAnalyzer):
 
 
 class IgnoreAnalyzer:
-    """An analyzer that accepts and reports nothing. Used to disable a section of the parameters."""
+    """An analyzer that matches and reports nothing, to disable a section of the parameters."""
 
     path = name = ""
 
@@ -233,7 +233,7 @@ class IgnoreAnalyzer:
 
 
 class OtherAnalyzer(_Items):
-    """Accepts the statuses that no other analyzer accepts, and reports them until they are stale."""
+    """Reports the statuses that no other analyzer accepts, until they are stale."""
 
     def __init__(self, base_path: str, as_errors: bool) -> None:
         super().__init__(f"{base_path}/Other", "Other", _TIMEOUT, discard_stale=True)
@@ -305,7 +305,7 @@ class AnalyzerGroup:
         self._analyzers.append(analyzer)
 
     def add(self, analyzer: Analyzer) -> None:
-        """Add an analyzer."""
+        """Add an analyzer to the group."""
         self._analyzers.append(analyzer)
 
     def remove(self, analyzer: Analyzer) -> bool:
@@ -382,7 +382,7 @@ def _number(value: object, default: float) -> float:
 
 
 def _words(value: object, log: Log) -> list[str]:
-    """Return a parameter as a list if it is a string or a list of strings; otherwise report an error and return []."""
+    """Return a string or list parameter as a list of strings; report an error and return [] for any other value."""
     if isinstance(value, str):
         return [value]
     if not isinstance(value, list):

@@ -30,7 +30,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 class _Command(NamedTuple):
-    """A velocity command, and the ROS time of its arrival in nanoseconds."""
+    """A velocity command, with its arrival in ROS time (nanoseconds)."""
 
     linear: float  # m/s
     angular: float  # rad/s
@@ -48,14 +48,14 @@ class MobileBase(Controller):
     """
 
     def __init__(self) -> None:
-        self._command = _STOP  # replaced by the cmd_vel callback
-        self._last = (0.0, 0.0)  # the velocities in the last cycle, linear and angular
+        self._command = _STOP  # the cmd_vel callback replaces this object
+        self._last = (0.0, 0.0)  # the last cycle's linear and angular velocity
         self._before_last = (0.0, 0.0)
-        self._now = 0  # ns; the time of the last cycle
+        self._now = 0  # the last cycle's time in ns
         self._is_running = False
 
     def measure(self, odometry: Odometry, time: int) -> bool:
-        """Add the wheels' motion to the odometry. If a wheel position is NaN, change nothing and return False."""
+        """Update the odometry from the wheels' motion; return False, without changes, if a wheel position is NaN."""
         raise NotImplementedError
 
     def drive(self, linear: float, angular: float) -> None:
@@ -67,7 +67,7 @@ class MobileBase(Controller):
         raise NotImplementedError
 
     def read_rate(self, context: ControllerContext) -> float:
-        """Read and return the odometry's rate, the first parameter that ROS logs."""
+        """Read and return the odometry's publish rate, the first parameter that ROS logs."""
         self._name = context.name
         hertz = context.parameters.finite("publish_rate", 50.0)
         self.log_info(f"Controller state will be published at {hertz:g}Hz.")
@@ -75,7 +75,7 @@ class MobileBase(Controller):
         return hertz
 
     def read_parameters(self, context: ControllerContext) -> None:
-        """Read the parameters that all bases have. Raise ControllerError or ValueError if one is invalid."""
+        """Read the parameters common to all bases. Raise ControllerError or ValueError if one is invalid."""
         parameters = context.parameters
         self._open_loop = parameters.flag("open_loop", False)
         window = parameters.integer("velocity_rolling_window_size", 10)
@@ -97,7 +97,7 @@ class MobileBase(Controller):
         self._angular_limits = SpeedLimiter.read(parameters.below("angular/z"))
 
     def open_topics(self, context: ControllerContext) -> None:
-        """Open ``odom``, ``/tf`` and ``cmd_vel``. Raise ControllerError if a covariance is not set."""
+        """Open ``odom``, ``/tf`` and ``cmd_vel``. Raise ControllerError if a covariance parameter is missing."""
         self._pose_covariance = _covariance(context.parameters, "pose_covariance_diagonal")
         self._twist_covariance = _covariance(context.parameters, "twist_covariance_diagonal")
         self._odom = self.open_publisher(f"{context.namespace}/odom", OdometryMessage)
@@ -108,11 +108,11 @@ class MobileBase(Controller):
         self.opened.callback(self._subscriber.unregister)
 
     def open_publisher(self, topic: str, message_class: type[_M]) -> RealtimePublisher[_M]:
-        """Open a topic that ``close`` will close."""
+        """Open a topic and register it for ``close``."""
         return self.opened.enter_context(closing(RealtimePublisher(topic, message_class, queue_size=100)))
 
     def starting(self, time: Time) -> None:
-        """Stop the wheels; the odometry continues from its present pose."""
+        """Stop the wheels; the odometry continues from its current pose."""
         self._command = _STOP
         self._last = self._before_last = (0.0, 0.0)
         self._now = nanoseconds(time)
@@ -130,7 +130,7 @@ class MobileBase(Controller):
         """Update and publish the odometry, then command the wheels."""
         now = nanoseconds(time)
         if now < self._now:
-            self._command = _STOP  # its timestamp is now in the future, so it would never time out
+            self._command = _STOP  # the clock jumped back, so this command would never time out
         self._now = now
         is_measured = True
         if self._open_loop:
@@ -153,7 +153,7 @@ class MobileBase(Controller):
         self.driven(time, period, linear, angular)
 
     def driven(self, time: Time, period: Duration, linear: float, angular: float) -> None:
-        """Publish the commanded velocities, if this base publishes them."""
+        """Publish the commanded velocities; the default does nothing."""
 
     def log_info(self, text: str) -> None:
         """Log a line under the controller's name."""
@@ -209,7 +209,7 @@ def enabled(flag: bool) -> str:
 
 
 def _covariance(parameters: Parameters, key: str) -> list[float]:
-    """Return the covariance with these six numbers on its diagonal. ROS's controller aborts its process if they are missing."""
+    """Return the covariance matrix with six diagonal values from a parameter. If they are missing, ROS aborts the process."""
     diagonal = parameters.numbers(key)
     if diagonal is None or len(diagonal) != 6:
         raise ControllerError(f"Parameter '{parameters.namespace}/{key}' must be a list of 6 numbers")
@@ -240,7 +240,7 @@ def log_origin(name: str, joint: Joint) -> None:
 
 
 def wheel_radius(robot: Robot, joint: Joint, *, allow_sphere: bool) -> float:
-    """Return the radius of the wheel below a joint, from its collision geometry, a cylinder or sphere.
+    """Return the radius of the wheel driven by a joint, from its collision geometry, a cylinder or sphere.
 
     If there is none, log the reason and raise ControllerError.
     """

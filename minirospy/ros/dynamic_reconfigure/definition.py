@@ -15,10 +15,10 @@ __all__ = ["Definition", "close_server"]
 
 
 class Definition(ParameterGenerator):
-    """A configuration. Call ``add`` as in a .cfg file, then assign the properties to the module's names."""
+    """A configuration: call ``add`` as in a .cfg file, then assign the properties to the generated module's names."""
 
     def __init__(self) -> None:
-        """Define a configuration without parameters. Unlike in a .cfg file, no folders are needed."""
+        """Define a configuration without parameters. Unlike a .cfg file, it needs no folders."""
         self.group = self.Group(self, "Default", "", True, 0, 0)
         self.constants = []
 
@@ -44,7 +44,7 @@ class Definition(ParameterGenerator):
 
     @property
     def level(self) -> Mapping[str, int]:
-        """The bits passed to the server's callback when a parameter changes."""
+        """Return the bits passed to the server's callback when each parameter changes."""
         return self._values("level")
 
     @property
@@ -57,7 +57,7 @@ class Definition(ParameterGenerator):
 
 
 def close_server(server: Server) -> None:
-    """Close a server's service and topics. In ROS, a server lives as long as its node."""
+    """Close a server's service and topics. In ROS, they stay open until the node shuts down."""
     server.set_service.shutdown()
     server.descr_topic.unregister()
     server.update_topic.unregister()

@@ -15,14 +15,14 @@ __all__ = ["CommandTopic", "claim_group", "claim_joint"]
 
 
 def claim_joint(hardware: Resources, context: ControllerContext, interface: Interface) -> Joint:
-    """Return the joint named by the parameter ``joint``. Raise ControllerError or HardwareError if there is none."""
+    """Return the joint named by the parameter ``joint``. Raise ControllerError or HardwareError if there is no such joint."""
     if not (name := context.parameters.text("joint", "")):
         raise ControllerError(f"No joint given (namespace: {context.namespace})")
     return hardware.joint(name, interface)
 
 
 def claim_group(hardware: Resources, context: ControllerContext, interface: Interface) -> list[Joint]:
-    """Return the joints named by the parameter ``joints``. Raise ControllerError if it is empty or has duplicates."""
+    """Return the joints listed in the parameter ``joints``. Raise ControllerError if the list is empty or has duplicates."""
     names = context.parameters.names("joints")
     if names is None:
         raise ControllerError(f"Failed to getParam 'joints' (namespace: {context.namespace}).")
@@ -37,7 +37,7 @@ def claim_group(hardware: Resources, context: ControllerContext, interface: Inte
 
 
 class CommandTopic:
-    """The topic ``command`` of a controller.
+    """A controller's topic ``command``.
 
     ``values``: the last command for each joint. Messages and the controller's ``starting`` replace the list as a whole.
     """

@@ -21,7 +21,7 @@ from minirospy.ros.realtime_tools.realtime_tools import RealtimePublisher
 
 __all__ = ["PidJointGroupPositionController", "PidJointPositionController", "PidJointVelocityController"]
 
-_STATE_CYCLES = 10  # the state is published in every tenth cycle, as in ROS
+_STATE_CYCLES = 10  # cycles per published state, as in ROS
 
 
 class _PidController(Controller):
@@ -38,7 +38,7 @@ class _PidController(Controller):
         return interface
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joints, read the gains, open the topics."""
+        """Claim the joints, read the gains and open the topics."""
         self._field = COMMAND_FIELDS[self._interface]
 
     def _open_command(self, context: ControllerContext, joints: int, *, is_group: bool = False) -> None:
@@ -52,7 +52,7 @@ class _PidController(Controller):
     def _publish_state(
         self, message: JointControllerState, time: Time, period: Duration, gains: PidGains
     ) -> None:
-        """Publish the state of a cycle, after setting the fields common to all controllers."""
+        """Publish a cycle's state, after setting the fields common to all controllers."""
         message.header.stamp = time
         message.time_step = period.to_sec()
         message.p, message.i, message.d, message.i_clamp, _, message.antiwindup = gains
@@ -64,10 +64,10 @@ class _PidController(Controller):
 
 
 class PidJointPositionController(_PidController):
-    """Drives the joint in the parameter ``joint`` to positions from the topic ``command``; at first it holds its own position."""
+    """Moves the joint in the parameter ``joint`` to positions from the topic ``command``, initially its current position."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joint, read the gains in ``pid`` and the joint's limits, open the topics."""
+        """Claim the joint, read the gains in ``pid`` and the joint's limits, and open the topics."""
         super().init(hardware, context)
         joint = claim_joint(hardware, context, self._interface)
         pid = Pid.open(context.parameters.below("pid"), self.opened)
@@ -76,12 +76,12 @@ class PidJointPositionController(_PidController):
         self._open_command(context, 1)
 
     def starting(self, time: Time) -> None:
-        """Hold the position."""
+        """Hold the current position."""
         self._command.values = [self._loop.clamp(self._loop.joint.position)]
         self._loop.pid.reset()
 
     def update(self, time: Time, period: Duration) -> None:
-        """Command the joint; publish the state."""
+        """Set the joint's command and publish the state."""
         loop = self._loop
         target = loop.clamp(self._command.values[0])
         error = loop.error(target)
@@ -99,10 +99,10 @@ class PidJointPositionController(_PidController):
 
 
 class PidJointVelocityController(_PidController):
-    """Drives the joint in the parameter ``joint`` at velocities from the topic ``command``, at first at 0."""
+    """Moves the joint in the parameter ``joint`` at velocities from the topic ``command``, initially 0."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joint, read the gains in ``pid``, open the topics."""
+        """Claim the joint, read the gains in ``pid`` and open the topics."""
         super().init(hardware, context)
         self._joint = claim_joint(hardware, context, self._interface)
         self._pid = Pid.open(context.parameters.below("pid"), self.opened)
@@ -115,7 +115,7 @@ class PidJointVelocityController(_PidController):
         self._pid.reset()
 
     def update(self, time: Time, period: Duration) -> None:
-        """Command the joint; publish the state."""
+        """Set the joint's command and publish the state."""
         target, actual = self._command.values[0], self._joint.velocity
         error = target - actual
         command = self._pid.compute(error, None, period.to_sec())
@@ -126,10 +126,10 @@ class PidJointVelocityController(_PidController):
 
 
 class PidJointGroupPositionController(_PidController):
-    """Drives the joints in the parameter ``joints`` to positions from the topic ``command``. The gains are in ``JOINT/pid``."""
+    """Moves the joints in the parameter ``joints`` to positions from the topic ``command``. The gains are in ``JOINT/pid``."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joints, read their gains and limits, open the topic."""
+        """Claim the joints, read their gains and limits, and open the topic."""
         super().init(hardware, context)
         joints = claim_group(hardware, context, self._interface)
         robot = _read_robot(context)
@@ -145,13 +145,13 @@ class PidJointGroupPositionController(_PidController):
         self._open_command(context, len(joints), is_group=True)
 
     def starting(self, time: Time) -> None:
-        """Hold the positions."""
+        """Hold the current positions."""
         self._command.values = [loop.clamp(loop.joint.position) for loop in self._loops]
         for loop in self._loops:
             loop.pid.reset()
 
     def update(self, time: Time, period: Duration) -> None:
-        """Command the joints."""
+        """Set the joints' commands."""
         dt = period.to_sec()
         for loop, target in zip(self._loops, self._command.values, strict=True):
             error = loop.error(loop.clamp(target))

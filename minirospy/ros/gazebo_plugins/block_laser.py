@@ -12,15 +12,15 @@ __all__ = ["BlockLaser"]
 
 
 class BlockLaser(RayPlugin):
-    """The plugin. Parameters: topicName, frameName, gaussianNoise (applied to coordinates and intensity)."""
+    """libgazebo_ros_block_laser.so. Parameters: topicName, frameName, gaussianNoise (applied to coordinates and intensity)."""
 
     def load(self) -> None:
-        """Read the sensor's rays."""
+        """Read the sensor's ray configuration."""
         self.load_rays("/world", PointCloud)
         self._noise = self.number("gaussianNoise", 0.0)
 
     def sense(self) -> None:
-        """Publish the points in the sensor's frame. If a ray hits nothing, its point is at the maximum range."""
+        """Publish the points in the sensor's frame. A ray that hits nothing gives a point at the maximum range."""
         rays, random = self.rays, self.simulation.random
         measured = rays.noisy(self.simulation, rays.cast(self.simulation, self.sensor_pose))
         ranges = np.minimum(measured, rays.max_range)

@@ -12,23 +12,23 @@ __all__ = ["Bumper"]
 
 
 class Bumper(SensorPlugin):
-    """The plugin. Parameters: bumperTopicName, frameName. All vectors are in world axes."""
+    """libgazebo_ros_bumper.so. Parameters: bumperTopicName, frameName. All vectors are in the world frame."""
 
     def load(self) -> None:
-        """Find the collisions; ``<contact>`` may name several."""
+        """Find the collisions; ``<contact>`` may list several."""
         self.simulation.records_details = True
         contact = self.sensor.element.first("contact")
         names = [each.text.strip() for each in contact.all("collision")] if contact is not None else []
         link = self.sensor_link
         known = {each.name for each in link.record.collisions}
-        # The name is unknown if sdformat changed it when it merged links. In that case, use all collisions of the link.
+        # sdformat renames collisions when it merges links. If no name is known, use all collisions of the link.
         chosen = known.intersection(names) or known
         self._collisions = {f"{link.scoped_name}::{name}" for name in chosen}
         self._frame = self.frame("frameName", "world")
         self._publisher = self.output_to(self.text("bumperTopicName", "bumper_states"), ContactsState)
 
     def sense(self) -> None:
-        """Publish the contacts, also if there are none."""
+        """Publish the contacts, even if there are none."""
         message = ContactsState(header=self.header(self._frame))
         for contact in self.simulation.contacts():
             if not self._collisions.intersection((contact.collision1, contact.collision2)):

@@ -46,7 +46,7 @@ class CameraPlugin(SensorPlugin):
     info_topic = "camera_info"
 
     def load(self) -> None:
-        """Read the parameters that all cameras have."""
+        """Read the parameters common to all cameras."""
         if self.element.first("robotNamespace") is not None:
             self.default_namespace = self.model.name
         self.camera_name = self.text("cameraName").strip("/")
@@ -65,7 +65,7 @@ class CameraPlugin(SensorPlugin):
         self._offer_rate()
 
     def add_lens(self, optics: Optics, suffix: str = "", baseline: float | None = None) -> Lens:
-        """Add a camera whose topics are below the camera's name and a suffix. Raise PluginError if its size is invalid."""
+        """Add a camera with topics below its name and a suffix. Raise PluginError if its size is invalid."""
         sizes = (optics.width, optics.height)
         if not (min(sizes) >= 1 and max(sizes) <= MAX_PIXELS and 0 < optics.horizontal_fov < math.pi):
             raise PluginError(
@@ -76,7 +76,7 @@ class CameraPlugin(SensorPlugin):
         return lens
 
     def is_due(self) -> bool:
-        """Return whether a picture is due according to ``updateRate``."""
+        """Return whether ``updateRate`` requires a picture now."""
         now_ns = self.simulation.time_ns
         if self._last_ns is not None and 0 <= now_ns - self._last_ns < self.period_ns:
             return False
@@ -84,24 +84,24 @@ class CameraPlugin(SensorPlugin):
         return True
 
     def sense(self) -> None:
-        """Publish a picture of each camera."""
+        """Publish a picture from each camera."""
         if self.is_due():
             for lens in self.lenses:
                 lens.sense()
 
     def reset(self) -> None:
-        """Restart the periods."""
+        """Restart the update periods."""
         super().reset()
         self._last_ns = None
 
     def close(self) -> None:
-        """Free OpenGL, and unregister the topics."""
+        """Release OpenGL and unregister the topics."""
         for lens in self.lenses:
             lens.photographer.close()
         super().close()
 
     def _offer_rate(self) -> None:
-        """Offer the rate in dynamic reconfigure. The sensor's rate applies until the value is changed."""
+        """Make the rate configurable with dynamic_reconfigure. The sensor's rate applies until a client changes the rate."""
         from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.server import Server
 
         definition = Definition()
@@ -137,7 +137,7 @@ class CameraPlugin(SensorPlugin):
 
 
 class Lens:
-    """One camera of a sensor: its topics, and the thread that draws its pictures."""
+    """One camera of a sensor: its topics and the thread that renders its pictures."""
 
     def __init__(self, plugin: CameraPlugin, optics: Optics, suffix: str, baseline: float) -> None:
         self.plugin = plugin
@@ -151,7 +151,7 @@ class Lens:
         )
         self.info.header.frame_id = plugin.frame_id
         self._check_focal_length()
-        # The picture is drawn in another thread, which must not use the simulation's random generator.
+        # The rendering thread must not use the simulation's random generator.
         self._random = np.random.default_rng(int(plugin.simulation.random.integers(1 << 32)))
         self.photographer = Photographer(plugin.simulation, optics.width, optics.height)
         self.images = self.publish_to("imageTopicName", plugin.image_topic, Image, latch=True)
@@ -162,13 +162,13 @@ class Lens:
     def publish_to(
         self, tag: str, topic: str, kind: type[rospy.Message], *, latch: bool = False
     ) -> rospy.Publisher[Any]:
-        """Return a publisher below the camera's name. A parameter may change the topic's name."""
+        """Return a publisher below the camera's name. A parameter may override the topic's name."""
         name = self.plugin.text(tag, topic)
         full = name if name.startswith("/") or not self.folder else f"{self.folder}/{name}"
         return self.plugin.output_to(full, kind, latch=latch)
 
     def sense(self) -> None:
-        """Publish a picture and its camera_info. If only camera_info has subscribers, draw no picture."""
+        """Publish a picture and its camera_info. If only camera_info has subscribers, do not render a picture."""
         now = self.plugin.now
         if not self.images.get_num_connections() or self.photographer.is_broken:
             self.publish_info(now, self.infos)
@@ -176,7 +176,7 @@ class Lens:
         self.take(lambda renderer: self._publish(renderer, now))
 
     def take(self, draw: Callable[[Renderer], None]) -> None:
-        """Copy the scene now, to draw it later."""
+        """Copy the scene now, and call ``draw`` later in the rendering thread."""
         optics = self.optics
         pose = compose(self.plugin.sensor_pose, optics.pose)
         self.photographer.take(pose, optics.horizontal_fov, (optics.near, optics.far), draw)
@@ -190,7 +190,7 @@ class Lens:
             publisher.publish(info)
 
     def to_image(self, renderer: Renderer, stamp: Time) -> Image:
-        """Draw the picture, and return it in the sensor's format."""
+        """Render the picture and return it in the sensor's format."""
         picture = add_noise(renderer.color(), self.optics, self._random)
         image = Image(height=self.optics.height, width=self.optics.width, encoding=self.encoding)
         image.header.stamp, image.header.frame_id = stamp, self.plugin.frame_id
@@ -221,7 +221,7 @@ class Lens:
 
 
 class Camera(CameraPlugin):
-    """libgazebo_ros_camera.so."""
+    """libgazebo_ros_camera.so: a single camera."""
 
     def load(self) -> None:
         """Start the topics."""
@@ -230,7 +230,7 @@ class Camera(CameraPlugin):
 
 
 class MultiCamera(CameraPlugin):
-    """libgazebo_ros_multicamera.so: cameras whose names contain ``left`` or ``right``. Their pictures have the same stamp."""
+    """libgazebo_ros_multicamera.so: cameras with ``left`` or ``right`` in their names; their pictures have the same timestamp."""
 
     def load(self) -> None:
         """Start the topics."""

@@ -24,7 +24,7 @@ _FIELDS = (("x", 0), ("y", 4), ("z", 8), ("rgb", 16))
 
 
 class DepthCamera(CameraPlugin):
-    """libgazebo_ros_depth_camera.so.
+    """libgazebo_ros_depth_camera.so: a camera that also publishes depths and a point cloud.
 
     Parameters, in addition to a camera's: pointCloudTopicName, depthImageTopicName, depthImageCameraInfoTopicName,
     pointCloudCutoff, useDepth16UC1Format.
@@ -32,7 +32,7 @@ class DepthCamera(CameraPlugin):
 
     image_topic = "ir/image_raw"
     info_topic = "ir/camera_info"
-    is_organized = False  # whether the cloud has the same rows as the picture
+    is_organized = False  # whether the point cloud has as many rows as the picture
 
     def load(self) -> None:
         """Start the topics."""
@@ -42,7 +42,7 @@ class DepthCamera(CameraPlugin):
         self._depths = lens.publish_to("depthImageTopicName", "depth/image_raw", Image)
         tag = "depthImageCameraInfoTopicName"
         if self.element.first(tag) is None:
-            tag = "depthImageInfoTopicName"  # in many models, which copied it from another plugin
+            tag = "depthImageInfoTopicName"  # many models use this tag, copied from another plugin
         self._infos = lens.publish_to(tag, "depth/camera_info", CameraInfo)
         self._nearest, self._farthest = self.number("pointCloudCutoff", 0.4), self.read_farthest()
         self._is_16_bit = self.flag("useDepth16UC1Format", False)
@@ -53,11 +53,11 @@ class DepthCamera(CameraPlugin):
         )
 
     def read_farthest(self) -> float:
-        """Return the distance beyond which no points are published."""
+        """Return the distance beyond which the plugin publishes no points."""
         return np.inf
 
     def sense(self) -> None:
-        """Publish the subscribed topics; ``updateRate`` applies only to camera_info."""
+        """Publish the topics with subscribers; ``updateRate`` applies only to camera_info."""
         now, lens = self.now, self._lens
         if self.is_due():
             lens.publish_info(now, lens.infos)
@@ -100,7 +100,7 @@ class DepthCamera(CameraPlugin):
         rows = np.zeros((height, width, POINT_STEP), np.uint8)
         values = rows.view("<f4")
         values[:, :, 0], values[:, :, 1], values[:, :, 2] = z * right, z * down, z
-        # Real Gazebo copies the picture's first channel into the blue byte, so R8G8B8 swaps red and blue.
+        # Real Gazebo copies the picture's first channel to blue, so R8G8B8 swaps red and blue.
         pixels = np.frombuffer(image.data, np.uint8)
         if len(pixels) in (height * width, 3 * height * width):
             rows[:, :, 16:19] = pixels.reshape(height, width, -1)
@@ -117,12 +117,12 @@ class DepthCamera(CameraPlugin):
 
 
 class OpenniKinect(DepthCamera):
-    """libgazebo_ros_openni_kinect.so, which adds pointCloudCutoffMax."""
+    """libgazebo_ros_openni_kinect.so: a depth camera with the additional parameter pointCloudCutoffMax."""
 
     is_organized = True
 
     def read_farthest(self) -> float:
-        """Return the distance beyond which no points are published."""
+        """Return the distance beyond which the plugin publishes no points."""
         return self.number("pointCloudCutoffMax", 5.0)
 
 

@@ -10,11 +10,11 @@ from minirospy.ros.gazebo_ros.physics import SimJoint
 
 __all__ = ["DiffDrive"]
 
-_NEAR_SPEED = 0.01  # m/s: a wheel this near to its target is not accelerated any more
+_NEAR_SPEED = 0.01  # m/s: a wheel within this difference of its target speed is not accelerated
 
 
 class DiffDrive(DrivePlugin):
-    """The plugin."""
+    """libgazebo_ros_diff_drive.so: a differential drive."""
 
     def load(self) -> None:
         """Start the wheel motors."""
@@ -38,7 +38,7 @@ class DiffDrive(DrivePlugin):
         self.load_drive(has_odometry=self.flag("publishTf", True))
 
     def reset(self) -> None:
-        """Stop, and begin the odometry again."""
+        """Stop and restart the odometry."""
         super().reset()
         self._encoders = PlanarOdometry()
         self._encoder_speed = (0.0, 0.0, 0.0)
@@ -48,7 +48,7 @@ class DiffDrive(DrivePlugin):
             joint.set_velocity(0.0, self._torque)
 
     def update(self) -> None:
-        """Publish the odometry, and set the motors."""
+        """Publish the odometry and set the motors' speeds."""
         now_ns = self.simulation.time_ns
         if self._uses_encoders:
             self._read_encoders(now_ns)

@@ -11,7 +11,7 @@ __all__ = ["F3D"]
 
 
 class F3D(PeriodicPlugin):
-    """The plugin. Parameters: bodyName, topicName, frameName. The vectors are in world axes, and do not contain contacts."""
+    """libgazebo_ros_f3d.so. Parameters: bodyName, topicName, frameName. Vectors are in the world frame and exclude contacts."""
 
     def load(self) -> None:
         """Find the link."""
@@ -21,7 +21,7 @@ class F3D(PeriodicPlugin):
         self._publisher = self.output_to(topic, WrenchStamped)
 
     def sense(self) -> None:
-        """Publish the sum of what is applied."""
+        """Publish the sum of the forces and torques applied to the link."""
         now = self.simulation.time
         active = [each for each in self._link.wrenches if each.start <= now]
         message = WrenchStamped(header=self.header(self._frame))

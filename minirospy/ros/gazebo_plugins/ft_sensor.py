@@ -10,7 +10,7 @@ __all__ = ["ForceTorque"]
 
 
 class ForceTorque(PeriodicPlugin):
-    """The plugin. Parameters: jointName, topicName, gaussianNoise, updateRate."""
+    """libgazebo_ros_ft_sensor.so. Parameters: jointName, topicName, gaussianNoise, updateRate."""
 
     def load(self) -> None:
         """Find the joint."""

@@ -27,11 +27,11 @@ Values = NDArray[np.float64]
 
 EQUATORIAL_RADIUS = 6378137.0  # m; WGS 84
 FLATTENING = 1.0 / 298.257223563
-DRIFT_FREQUENCY = 1.0 / 3600.0  # Hz; a drift lasts one hour
+DRIFT_FREQUENCY = 1.0 / 3600.0  # default drift frequency in Hz: one drift lasts an hour
 
 
 class ErrorModel:
-    """Offset, drift, noise and scale error of a measurement with one or three axes.
+    """Offset, drift, noise and scale error of a one- or three-axis measurement.
 
     Parameters, with a prefix such as ``accel``: Offset, Drift, DriftFrequency, GaussianNoise, ScaleError.
     """
@@ -52,7 +52,7 @@ class ErrorModel:
 
     @property
     def bias(self) -> Values:
-        """Return the current error, without noise."""
+        """Return the current offset and drift."""
         return self.current + self.offset
 
     def reset(self) -> None:
@@ -60,7 +60,7 @@ class ErrorModel:
         self.current: Values = self._normal(self.drift)
 
     def measured(self, value: Vector | Values, seconds: float) -> Values:
-        """Return a value with errors, after advancing them by a time."""
+        """Return a measured value: advance the drift by ``seconds``, then add all errors."""
         change = seconds * self._normal(np.sqrt(2 * self.frequency) * self.drift)
         self.current = np.exp(-seconds * self.frequency) * self.current + change
         return np.asarray(value) * self.scale + self.bias + self._normal(self.noise)
@@ -70,7 +70,7 @@ class ErrorModel:
 
 
 class _HectorPlugin(PeriodicPlugin):
-    """A plugin of a link that publishes at ``updateRate``."""
+    """Base class of link plugins that publish at ``updateRate``."""
 
     default_rate = 0.0
 
@@ -82,22 +82,22 @@ class _HectorPlugin(PeriodicPlugin):
         self._last_ns = self.simulation.time_ns
 
     def reset(self) -> None:
-        """Begin the period again."""
+        """Restart the update period."""
         super().reset()
         self._last_ns = self.simulation.time_ns
 
     def sense(self) -> None:
-        """Measure."""
+        """Measure if the update period has elapsed."""
         now_ns = self.simulation.time_ns
         self.measure((now_ns - self._last_ns) / 1e9)
         self._last_ns = now_ns
 
     def measure(self, seconds: float) -> None:
-        """Publish; ``seconds`` is the time since the last measurement."""
+        """Publish a measurement; ``seconds`` is the time since the last one."""
 
 
 class HectorGps(_HectorPlugin):
-    """The plugin. Parameters: topicName, velocityTopicName, frameId, referenceLatitude, Longitude, Heading and Altitude, status.
+    """A GPS. Parameters: topicName, velocityTopicName, frameId, status, reference{Latitude,Longitude,Heading,Altitude}.
 
     The error parameters of the position have no prefix, those of the velocity have the prefix ``velocity``.
     """
@@ -151,7 +151,7 @@ class HectorGps(_HectorPlugin):
 
 
 class HectorImu(_HectorPlugin):
-    """The plugin. Parameters: topicName, biasTopicName, serviceName, frameId, rpyOffset; errors: accel, rate, yaw."""
+    """An IMU. Parameters: topicName, biasTopicName, serviceName, frameId, rpyOffset; errors: accel, rate, yaw."""
 
     def load(self) -> None:
         """Start the topics."""
@@ -177,7 +177,7 @@ class HectorImu(_HectorPlugin):
             model.reset()
 
     def measure(self, seconds: float) -> None:
-        """Publish the orientation, the angular velocity and the acceleration, which includes gravity."""
+        """Publish the orientation, angular velocity and acceleration (including gravity)."""
         state = self.body.state
         last, self._velocity = self._velocity, state.linear
         if last is None or seconds <= 0:
@@ -226,10 +226,10 @@ class HectorImu(_HectorPlugin):
 
 
 class HectorSonar(RayPlugin):
-    """The plugin. Parameters: topicName, frameId, updateRate; errors without a prefix."""
+    """A range sensor. Parameters: topicName, frameId, updateRate; error parameters without a prefix."""
 
     def load(self) -> None:
-        """Read the sensor's rays."""
+        """Read the sensor's ray configuration."""
         self.rays = read_rays(self.sensor)
         self._frame = self.frame("frameId", "/sonar_link")
         self._errors = ErrorModel(self, "", 1)

@@ -19,7 +19,7 @@ __all__ = ["Imu", "ImuSensor", "offset_of"]
 
 
 class _Accelerometer:
-    """Measures the motion of a point on a link. The acceleration is the change in velocity since the last measurement."""
+    """Measures the motion of a point on a link. The acceleration is the velocity change since the last measurement."""
 
     def __init__(self, link: SimLink, place: Pose) -> None:
         self._link = link
@@ -27,7 +27,7 @@ class _Accelerometer:
         self._last: tuple[int, Vector] | None = None
 
     def measure(self, time_ns: int) -> tuple[Pose, Vector, Vector]:
-        """Return the pose in the world, and the angular velocity and acceleration in the sensor's axes."""
+        """Return the pose in the world frame, and the angular velocity and acceleration in the sensor's frame."""
         state = self._link.state
         pose = compose(state.pose, self._place)
         arm = difference(pose.position, state.pose.position)
@@ -57,7 +57,7 @@ def _message(plugin: PluginBase, frame: str, noise: float, values: tuple[Pose, V
 
 
 class Imu(PeriodicPlugin):
-    """gazebo_ros_imu: reports accelerations without gravity.
+    """gazebo_ros_imu: reports acceleration without gravity.
 
     Parameters: bodyName (required), topicName, serviceName, frameName, updateRate, gaussianNoise, xyzOffset, rpyOffset.
     """
@@ -75,7 +75,7 @@ class Imu(PeriodicPlugin):
         self.serve(self.text("serviceName", "/default_imu"), Empty, lambda _: EmptyResponse())
 
     def reset(self) -> None:
-        """Begin the period again."""
+        """Restart the update period."""
         super().reset()
         self._meter = _Accelerometer(self._link, self._place)
 
@@ -86,7 +86,7 @@ class Imu(PeriodicPlugin):
 
 
 class ImuSensor(SensorPlugin):
-    """gazebo_ros_imu_sensor: reports accelerations like a real accelerometer, +9.8 upwards at rest.
+    """gazebo_ros_imu_sensor: reports acceleration like a real accelerometer, with +9.8 upwards at rest.
 
     Parameters: frameName (required), topicName, updateRateHZ, gaussianNoise, rpyOffset, initialOrientationAsReference.
     """
@@ -105,7 +105,7 @@ class ImuSensor(SensorPlugin):
         self.rate = self.number("updateRateHZ", 1.0)
 
     def reset(self) -> None:
-        """Restart the period."""
+        """Restart the update period."""
         super().reset()
         self._meter = _Accelerometer(self.sensor_link, self.sensor.pose)
 

@@ -22,7 +22,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 class JointPoseTrajectory(ModelPlugin):
-    """The plugin. Parameters: topicName, serviceName.
+    """Moves a model's joints along a trajectory. Parameters: topicName, serviceName.
 
     As in Gazebo's plugin, each point is held for its ``time_from_start`` before the next one. While a trajectory runs, the link
     in ``header.frame_id``, or the whole model, keeps its pose. Gazebo's plugin stops the physics of the whole world for that
@@ -47,7 +47,7 @@ class JointPoseTrajectory(ModelPlugin):
         self._held: Pose | None = None
 
     def update(self) -> None:
-        """Set the positions of the point that is due, and hold them until the next point."""
+        """Move the joints to the current trajectory point, and hold them until the next one."""
         message = self._message
         if message is None:
             return

@@ -12,7 +12,7 @@ __all__ = ["JointStatePublisher"]
 
 
 class JointStatePublisher(PeriodicPlugin):
-    """The plugin. Parameters: jointName (names with commas; default: all joints), updateRate."""
+    """Publishes joint states. Parameters: jointName (comma-separated; default: all joints), updateRate."""
 
     def load(self) -> None:
         """Find the joints."""

@@ -11,16 +11,16 @@ __all__ = ["Laser"]
 
 
 class Laser(RayPlugin):
-    """The plugin. Parameters: topicName, frameName."""
+    """Publishes a planar laser scan. Parameters: topicName, frameName."""
 
     def load(self) -> None:
-        """Read the sensor's rays."""
+        """Read the sensor's ray configuration."""
         self.load_rays("/world", LaserScan)
 
     def sense(self) -> None:
         """Publish a scan."""
         rays = self.rays
-        first = len(rays.directions) // rays.count // 2 * rays.count  # the middle row, if there are several
+        first = len(rays.directions) // rays.count // 2 * rays.count  # the middle row of a multi-row scanner
         directions = rays.directions[first : first + rays.count]
         hits = self.simulation.cast_rays(
             self.sensor_pose, directions, rays.max_range, min_range=rays.min_range

@@ -10,7 +10,7 @@ __all__ = ["MimicJoint"]
 
 
 class MimicJoint(ModelPlugin):
-    """The plugin. Parameters: joint, mimicJoint, multiplier, offset, maxEffort. A motor replaces its PID controller."""
+    """Makes one joint follow another. Parameters: joint, mimicJoint, multiplier, offset, maxEffort (of the motor; no PID)."""
 
     def load(self) -> None:
         """Find the joints."""
@@ -22,6 +22,6 @@ class MimicJoint(ModelPlugin):
         self._max_effort = limit if limit > 0 and self.element.first("hasPID") is not None else math.inf
 
     def update(self) -> None:
-        """Update the motor's target."""
+        """Update the follower joint's motor target."""
         target = self._multiplier * self._leader.position + self._offset
         self._follower.set_position(target, self._max_effort)

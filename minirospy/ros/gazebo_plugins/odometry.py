@@ -19,7 +19,7 @@ __all__ = ["DrivePlugin", "PlanarOdometry", "body_velocity"]
 
 
 class DrivePlugin(PeriodicPlugin):
-    """A plugin that moves a robot by Twist messages, and publishes odometry.
+    """Base class for plugins that drive a robot with Twist commands and publish its odometry.
 
     Parameters: commandTopic, odometryTopic, odometryFrame, robotBaseFrame. command: the velocity forwards and to the left (m/s),
     and the turn rate (rad/s), of the last message. commanded_ns: its time. variances: the diagonal of the pose's covariance.
@@ -41,7 +41,7 @@ class DrivePlugin(PeriodicPlugin):
         self.subscribe_to(self.text("commandTopic", "cmd_vel"), Twist, self._on_command)
 
     def reset(self) -> None:
-        """Forget the command."""
+        """Discard the last command."""
         super().reset()
         self.command = (0.0, 0.0, 0.0)
         self.commanded_ns = self.simulation.time_ns
@@ -56,14 +56,14 @@ class DrivePlugin(PeriodicPlugin):
                 angular.z,
             )
             return
-        # One assignment: the simulation's thread reads it between two steps.
+        # Assign once: the simulation's thread reads the command between two steps.
         self.command = (linear.x, linear.y, angular.z)
         self.commanded_ns = self.simulation.time_ns
 
     def publish_odometry(
         self, pose: Pose, velocity: tuple[float, float, float], *, shown: Pose | None
     ) -> None:
-        """Publish the odometry, and the transform of the pose ``shown`` before it, if they are wanted."""
+        """Publish the odometry, if enabled; first publish ``shown`` as a transform unless it is None."""
         if self._odometry is None:
             return
         parent, child = self._frames
@@ -79,7 +79,7 @@ class DrivePlugin(PeriodicPlugin):
         self._odometry.publish(message)
 
     def send_transform(self, parent: str, child: str, pose: Pose) -> None:
-        """Publish the pose of a frame in its parent's on /tf, if transforms are wanted."""
+        """Publish a frame's pose relative to its parent on /tf, if transforms are enabled."""
         if self._transforms is not None:
             transform = Transform(Vector3(*pose.position), Quaternion(*pose.orientation))
             self._transforms.publish(TFMessage([TransformStamped(self.header(parent), child, transform)]))
@@ -104,7 +104,7 @@ class PlanarOdometry:
 
 
 def body_velocity(state: State) -> tuple[float, float, float]:
-    """Return the velocity forwards and to the left (m/s), and the turn rate (rad/s); as in Gazebo, only the yaw counts."""
+    """Return the forward and left velocities (m/s) and the turn rate (rad/s). As in Gazebo, ignore roll and pitch."""
     yaw = yaw_of(state.pose.orientation)
     vx, vy, _ = state.linear
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -40,7 +40,7 @@ _UNKNOWN_ENCODING = "bgr8"
 
 @dataclass(frozen=True)
 class Optics:
-    """A camera that looks along the x axis of its pose in the sensor. near, far: range of the drawn distances, in m."""
+    """A camera that looks along its x axis. ``pose`` is in the sensor's frame; near and far limit the rendered depths, in m."""
 
     name: str = ""
     pose: Pose = IDENTITY
@@ -86,7 +86,7 @@ def read_optics(camera: XmlElement | None) -> Optics:
 def to_camera_info(
     optics: Optics, number: Callable[[str, float], float], *, automatic: bool, baseline: float
 ) -> CameraInfo:
-    """Return camera_info without its header.
+    """Return a CameraInfo without a header.
 
     number: returns a plugin's parameter or a default. automatic: whether to use the sensor's distortion. baseline: the distance
     from the left camera in m.
@@ -104,12 +104,12 @@ def to_camera_info(
 
 
 def encoding_of(image_format: str) -> tuple[str, bool]:
-    """Return the sensor_msgs name of an SDF image format, and whether the format is known."""
+    """Return the sensor_msgs encoding for an SDF image format, and whether the format is known."""
     return ENCODINGS.get(image_format, _UNKNOWN_ENCODING), image_format in ENCODINGS
 
 
 def encode(picture: Picture, encoding: str) -> tuple[bytes, int]:
-    """Return the data of a picture (red, green, blue) in an encoding, and the number of bytes per row."""
+    """Encode an RGB picture; return the data and the number of bytes per row."""
     pixels: NDArray[np.uint8] | NDArray[np.uint16] = picture
     if encoding.startswith("mono"):
         pixels = (picture @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)
@@ -126,7 +126,7 @@ def encode(picture: Picture, encoding: str) -> tuple[bytes, int]:
 
 
 def add_noise(picture: Picture, optics: Optics, random: np.random.Generator) -> Picture:
-    """Return a picture with the camera's noise."""
+    """Return a picture with camera noise added."""
     if optics.noise_deviation <= 0 and optics.noise_mean == 0:
         return picture
     size = picture.shape[:2]

@@ -19,7 +19,7 @@ _WORLD_FRAMES = ("world", "/world", "map", "/map")
 
 
 class P3D(PeriodicPlugin):
-    """The plugin. Parameters: bodyName, topicName, frameName, xyzOffset, rpyOffset, gaussianNoise, updateRate."""
+    """A link's odometry. Parameters: bodyName, topicName, frameName, xyzOffset, rpyOffset, gaussianNoise, updateRate."""
 
     def load(self) -> None:
         """Find the links."""

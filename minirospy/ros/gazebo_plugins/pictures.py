@@ -25,11 +25,11 @@ __all__ = ["Photographer", "to_depths"]
 
 Draw = Callable[["Renderer"], None]
 
-MAX_CLOSING_SECONDS = 5.0  # maximum wait for pictures that are being drawn
+MAX_CLOSING_SECONDS = 5.0  # maximum wait for unfinished pictures
 
 
 class _DrawingThread:
-    """Runs jobs in one thread, which owns the OpenGL contexts and ends with its last user."""
+    """Runs jobs in a thread that owns the OpenGL contexts. The thread ends when its last user leaves."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -39,7 +39,7 @@ class _DrawingThread:
         self._is_warned = False
 
     def join(self) -> None:
-        """Add a user."""
+        """Add a user; the first one starts the thread."""
         with self._lock:
             self._users += 1
             if self._thread is None:
@@ -47,7 +47,7 @@ class _DrawingThread:
                 self._thread.start()
 
     def leave(self) -> None:
-        """Remove a user. After removing the last one, wait until the thread has ended."""
+        """Remove a user. If it was the last one, wait until the thread has ended."""
         with self._lock:
             self._users -= 1
             thread, is_last = self._thread, not self._users
@@ -62,7 +62,7 @@ class _DrawingThread:
         self._jobs.put(job)
 
     def warn_once(self, error: Exception) -> None:
-        """Log, once for all cameras, why there are no pictures."""
+        """Log once, for all cameras, why they publish no pictures."""
         if not self._is_warned:
             self._is_warned = True
             rospy.logwarn("cameras publish no pictures: %s", error)
@@ -79,7 +79,7 @@ _thread = _DrawingThread()
 
 
 class Photographer:
-    """Takes one camera's pictures.
+    """Renders one camera's pictures in the drawing thread.
 
     simulation: used only in its own thread. width, height: the size of the pictures.
     """
@@ -95,7 +95,7 @@ class Photographer:
         _thread.join()
 
     def take(self, pose: Pose, horizontal_fov: float, clip: tuple[float, float], draw: Draw) -> bool:
-        """Copy the scene now, and call ``draw`` later in the drawing thread. Return False if that is not possible.
+        """Copy the scene now and call ``draw`` later in the drawing thread; return False if that is impossible.
 
         It is not possible if OpenGL is missing or not open yet, or if the last picture is not finished. Call this in the
         simulation's thread.
@@ -115,7 +115,7 @@ class Photographer:
         return True
 
     def close(self) -> None:
-        """Free the OpenGL context."""
+        """Release the OpenGL context."""
         if not self._is_closed:
             self._is_closed = True
             _thread.run(self._free)
@@ -143,6 +143,6 @@ class Photographer:
 
 
 def to_depths(renderer: Renderer, far: float) -> NDArray[np.float32]:
-    """Return the captured depths in m, with the far limit for pixels that show nothing."""
+    """Return the captured depths in m; pixels without an object have the far limit."""
     depths: NDArray[np.float32] = np.minimum(renderer.depth(), np.float32(far))
     return depths

@@ -13,7 +13,7 @@ __all__ = ["PlanarMove"]
 
 
 class PlanarMove(DrivePlugin):
-    """The plugin. Parameters: a drive's, odometryRate, cmdTimeout."""
+    """Moves the model as commanded on cmd_vel. Parameters: those of DrivePlugin, odometryRate, cmdTimeout."""
 
     def load(self) -> None:
         """Read the parameters."""
@@ -22,13 +22,13 @@ class PlanarMove(DrivePlugin):
         self.load_drive()
 
     def reset(self) -> None:
-        """Stop the model and discard the odometry's state."""
+        """Stop the model and reset the odometry."""
         super().reset()
         self._odometry_timer = Timer(self.rate)
-        self._last: tuple[int, Pose, float] | None = None  # time in ns, pose and yaw of the last message
+        self._last: tuple[int, Pose, float] | None = None  # the last message's time (ns), pose and yaw
 
     def update(self) -> None:
-        """Set the model's velocity, and publish odometry."""
+        """Set the model's velocity and publish the odometry."""
         now_ns = self.simulation.time_ns
         if 0 <= self._timeout < (now_ns - self.commanded_ns) / 1e9:
             self.command = (0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ class PlanarMove(DrivePlugin):
             self.publish_odometry(pose._replace(position=(px, py, 0.0)), velocity, shown=pose)
 
     def _mean_velocity(self, now_ns: int, pose: Pose, yaw: float) -> tuple[float, float, float]:
-        """Return the mean velocity forwards and to the left, and the mean turn rate, since the last message, as in Gazebo."""
+        """Return the mean forward and left velocities and turn rate since the last message, as in Gazebo."""
         last, self._last = self._last, (now_ns, pose, yaw)
         if last is None or now_ns <= last[0]:
             return 0.0, 0.0, 0.0

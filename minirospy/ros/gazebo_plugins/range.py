@@ -10,10 +10,10 @@ __all__ = ["Range"]
 
 
 class Range(RayPlugin):
-    """The plugin. Parameters: topicName, frameName, radiation, fov, gaussianNoise, updateRate."""
+    """Measures the shortest distance. Parameters: topicName, frameName, radiation, fov, gaussianNoise, updateRate."""
 
     def load(self) -> None:
-        """Read the sensor's rays."""
+        """Read the sensor's ray configuration."""
         self.load_rays("/range", RangeMsg)
         self._noise = self.number("gaussianNoise", 0.0)
         self._fov = self.number("fov", 0.05)

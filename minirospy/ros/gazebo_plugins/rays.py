@@ -16,12 +16,12 @@ from minirospy.ros.gazebo_ros.plugins import RayFan, SensorPlugin
 
 __all__ = ["RayPlugin", "Rays", "read_rays"]
 
-MAX_RAYS = 1_000_000  # per sensor; more would fill the memory
+MAX_RAYS = 1_000_000  # maximum per sensor; more would exhaust the memory
 
 
 @dataclass(frozen=True)
 class Rays(RayFan):
-    """The rays of a sensor; the rows of angles follow each other.
+    """A sensor's rays, row after row.
 
     min_angle, max_angle: of a row, in rad. count: of a row. noise_mean, noise_deviation: of distances, in m.
     """
@@ -33,11 +33,11 @@ class Rays(RayFan):
     noise_deviation: float = 0.0
 
     def cast(self, simulation: Simulation, pose: Pose) -> NDArray[np.float64]:
-        """Return the distances that the rays measure from a pose; infinite for rays that hit nothing."""
+        """Return each ray's measured distance from a pose, or infinity if it hits nothing."""
         return simulation.cast_rays(pose, self.directions, self.max_range, min_range=self.min_range).distances
 
     def noisy(self, simulation: Simulation, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the distances with noise, within the range limits. Infinite distances stay unchanged."""
+        """Return the distances with noise added, within the range limits. Infinite distances stay unchanged."""
         if self.noise_deviation <= 0 and self.noise_mean == 0:
             return ranges
         noise = simulation.random.normal(self.noise_mean, self.noise_deviation, len(ranges))
@@ -45,16 +45,16 @@ class Rays(RayFan):
 
 
 class RayPlugin(SensorPlugin):
-    """A plugin with rays and one topic. Parameters: topicName, frameName."""
+    """Base class for plugins of ray sensors with one topic. Parameters: topicName, frameName."""
 
     def load_rays(self, topic: str, kind: type[rospy.Message]) -> None:
-        """Read the sensor's rays, and open the topic; ``topic`` is its default name."""
+        """Read the sensor's rays and open the topic, by default ``topic``."""
         self.shown_rays = self.rays = read_rays(self.sensor)
         self.frame_id = self.frame("frameName", "/world")
         self.publisher = self.output_to(self.text("topicName", topic), kind)
 
     def nearest(self) -> float:
-        """Return the shortest distance of all rays, at most the maximum range."""
+        """Return the shortest distance that any ray measures, at most the maximum range."""
         return float(min(np.min(self.rays.cast(self.simulation, self.sensor_pose)), self.rays.max_range))
 
 

@@ -15,7 +15,7 @@ _WHEELS = (
 
 
 class SkidSteerDrive(DrivePlugin):
-    """The plugin."""
+    """libgazebo_ros_skid_steer_drive.so: drives four wheels by skid steering."""
 
     def load(self) -> None:
         """Start the wheel motors."""
@@ -29,13 +29,13 @@ class SkidSteerDrive(DrivePlugin):
         self.load_drive(has_transforms=self.flag("broadcastTF", False))
 
     def reset(self) -> None:
-        """Stop."""
+        """Stop the robot."""
         super().reset()
         for joint, _ in self._joints:
             joint.set_velocity(0.0, self._torque)
 
     def sense(self) -> None:
-        """Publish, and set the motors."""
+        """Publish the odometry and set the motors."""
         state = self.model.state
         self.publish_odometry(state.pose, body_velocity(state), shown=state.pose)
         speed, _, turn = self.command

@@ -15,12 +15,12 @@ from minirospy.ros.gazebo_ros.plugins import ModelPlugin
 __all__ = ["VacuumGripper"]
 
 REACH = 0.05  # m; maximum distance between the links' origins
-SNAP = 0.01  # m; a link closer than this moves to the gripper's origin
+SNAP = 0.01  # m; links within this distance move to the gripper's origin
 MAX_FORCE = 20.0  # N
 
 
 class VacuumGripper(ModelPlugin):
-    """The plugin. Parameters: bodyName, topicName. Services: on and off, in the plugin's namespace."""
+    """Pulls links to the gripper. Parameters: bodyName, topicName. Services in the plugin's namespace: on, off."""
 
     def load(self) -> None:
         """Find the link."""
@@ -32,7 +32,7 @@ class VacuumGripper(ModelPlugin):
         self.serve("off", Empty, lambda request: self._switch(request, is_on=False))
 
     def update(self) -> None:
-        """Move the links within reach, and publish whether there are any."""
+        """Pull the links within reach, and publish whether there are any."""
         is_holding = self._is_on and self._attract()
         if self._publisher.get_num_connections():
             self._publisher.publish(Bool(is_holding))

@@ -21,13 +21,13 @@ _POINT = np.dtype(list(_FIELDS.items()))
 
 
 class Velodyne(RayPlugin):
-    """The plugin.
+    """Publishes a multi-row scanner's point cloud.
 
     Parameters: topicName, frameName, organize_cloud, min_range, max_range, min_intensity, gaussianNoise (of ranges, in m).
     """
 
     def load(self) -> None:
-        """Read the sensor's rays."""
+        """Read the sensor's ray configuration."""
         self.load_rays("/points", PointCloud2)
         rays = self.rays
         if self.namespace and not self.text("frameName", "/world").startswith("/"):
@@ -35,12 +35,12 @@ class Velodyne(RayPlugin):
         self._is_organized = self.flag("organize_cloud", False)
         self._nearest = max(self.number("min_range", 0.0), rays.min_range)
         self._farthest = min(self.number("max_range", math.inf), rays.max_range)
-        # All intensities are 0, so a higher minimum leaves no points.
+        # All intensities are 0, so a positive minimum removes all points.
         self._has_points = self._is_organized or self.number("min_intensity", 0.0) <= 0
         self._noise = self.number("gaussianNoise", 0.0)
 
     def sense(self) -> None:
-        """Publish the points in the sensor's frame: all rows of the first direction, then those of the next one."""
+        """Publish the points in the sensor's frame, column by column: all rows of one direction, then the next."""
         rays, random = self.rays, self.simulation.random
         ranges = rays.noisy(self.simulation, rays.cast(self.simulation, self.sensor_pose))
         is_valid = self._is_between(ranges)
@@ -48,7 +48,7 @@ class Velodyne(RayPlugin):
             ranges = ranges + random.normal(0.0, self._noise, len(ranges))
             is_valid = self._is_between(ranges) & (self._is_organized | is_valid)
         points = np.zeros(len(ranges), _POINT)
-        with np.errstate(invalid="ignore"):  # a ray along an axis that hits nothing: 0 * inf
+        with np.errstate(invalid="ignore"):  # 0 * inf is invalid: an axis-aligned ray that hits nothing
             for index, axis in enumerate("xyz"):
                 points[axis] = rays.directions[:, index] * ranges
         points["ring"] = np.arange(len(ranges)) // rays.count

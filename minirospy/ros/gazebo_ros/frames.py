@@ -22,7 +22,7 @@ WORLD_FRAMES = ("", "world", "map", "/map")
 
 
 def find_link(simulation: Simulation, name: str) -> SimLink | None:
-    """Return the link ``model::link`` or, as in Gazebo, the first link with an unscoped name; None if there is none."""
+    """Return the link ``model::link`` or, as in Gazebo, the first link with that unscoped name; None if there is none."""
     model, _, link = name.partition("::")
     if link:
         found = simulation.models.get(model)
@@ -40,7 +40,7 @@ def find_entity(simulation: Simulation, name: str) -> SimModel | SimLink | None:
 
 
 def find_joint(simulation: Simulation, name: str) -> SimJoint | None:
-    """Return a joint. Without a model name, search all models in order; ``model::joint`` is accepted, too."""
+    """Return the joint named ``model::joint``. Without a model name, search all models in order."""
     model, _, joint = name.rpartition("::")
     if model in simulation.models and joint in simulation.models[model].joints:
         return simulation.models[model].joints[joint]
@@ -48,7 +48,7 @@ def find_joint(simulation: Simulation, name: str) -> SimJoint | None:
 
 
 def relative_state(state: State, frame: State) -> State:
-    """Return a state relative to a frame: its pose, and the velocity difference in the frame's axes."""
+    """Return a state relative to a frame: the relative pose and velocity, in the frame's axes."""
     return State(
         relative(frame.pose, state.pose),
         rotate_back(frame.pose.orientation, difference(state.linear, frame.linear)),

@@ -33,7 +33,7 @@ DEFAULT_WORLD = "worlds/empty.world"
 
 
 def new_parser(program: str) -> argparse.ArgumentParser:
-    """Return gzserver's parser, with Gazebo's options. Options without effect say so in their help."""
+    """Return a parser with Gazebo's options; the help of unsupported options says that they have no effect."""
     parser = argparse.ArgumentParser(prog=program, description=ABOUT)
     parser.add_argument("world", nargs="?", default=DEFAULT_WORLD, help="file of the world")
     parser.add_argument("-v", "--version", action="version", version=ABOUT)
@@ -63,7 +63,7 @@ def read_world_file(name: str, resources: ResourcePaths) -> World:
 
 
 def world_warnings(world: World) -> list[str]:
-    """Return the warnings about a world and its models. A line common to several models is returned once, with their number."""
+    """Return the warnings about a world and its models. A warning common to several models appears once, with their number."""
     places: dict[str, list[str]] = {}
     for model in world.models:
         for line in model.warnings:
@@ -114,7 +114,7 @@ def main(program: str = "gzserver", argv: Sequence[str] | None = None) -> int:
 
 def _start_node() -> None:
     """Start the node /gazebo, and set /use_sim_time if it is not set."""
-    # This process sets its clock itself, without subscribing to its own topic.
+    # This process sets its own clock, so it does not subscribe to /clock.
     rospy.init_node("gazebo", disable_rostime=True)
     rospy.loginfo("%s", ABOUT)
     if not rospy.has_param("/use_sim_time"):

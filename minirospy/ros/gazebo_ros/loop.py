@@ -19,18 +19,18 @@ __all__ = ["LoopClosed", "SimulationLoop"]
 _T = TypeVar("_T")
 
 DEFAULT_TICK_HZ = 250.0  # rate of /clock and the models' states; a 1000 Hz clock keeps every Python node busy
-MAX_LAG_SECONDS = 0.1  # if the simulation is later than this, it does not try to catch up
-MAX_STEPPING_SECONDS = 0.1  # of wall time; then jobs run before the next tick, because a step may be 1 ns
+MAX_LAG_SECONDS = 0.1  # if the simulation lags by more than this, it does not catch up
+MAX_STEPPING_SECONDS = 0.1  # maximum wall time per tick, so that jobs can run; a step may be as short as 1 ns
 
-MAX_WAIT_SECONDS = 60.0  # maximum wait for the next steps; longer times overflow in wait()
+MAX_WAIT_SECONDS = 60.0  # maximum wait for the next steps; longer waits may overflow
 
 
 class LoopClosed(MinirospyError):
-    """Raised for a job if the simulation has ended."""
+    """Raised for a job if the simulation has already ended."""
 
 
 class SimulationLoop:
-    """Runs a simulation.
+    """Runs a simulation in a thread, in step with wall time.
 
     simulation: used only by this loop's thread; other threads use :meth:`call`. before_step: called before each step. on_tick:
     called at the tick rate of simulated time, and after each reset. on_lost: called for each model that the simulation has
@@ -44,7 +44,7 @@ class SimulationLoop:
         self.on_lost: Callable[[LostModel], None] = lambda lost: None
         self.on_failure: Callable[[Exception], object] = lambda error: None
         self.failure: Exception | None = None
-        self.real_time_factor = 0.0  # over the last second of wall time
+        self.real_time_factor = 0.0  # simulated seconds per wall second, over the last wall second
         self._paused = paused
         self._rate = simulation.physics.update_rate
         self._tick_rate = tick_rate or DEFAULT_TICK_HZ
@@ -62,7 +62,7 @@ class SimulationLoop:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop the thread, and wait for it. Jobs that have not run raise LoopClosed."""
+        """Stop the thread and wait for it. Pending jobs raise LoopClosed."""
         with self._wake:
             self._is_closed = True
             self._wake.notify_all()
@@ -70,7 +70,7 @@ class SimulationLoop:
             self._thread.join()
 
     def call(self, function: Callable[[], _T]) -> _T:
-        """Run a function between two steps, in the loop's thread; return its result. Raise LoopClosed if the loop has ended."""
+        """Run a function in the loop's thread between two steps; return its result. Raise LoopClosed if the loop has ended."""
         if threading.current_thread() is self._thread:
             return function()
         return self._submit(function).result()
@@ -90,7 +90,7 @@ class SimulationLoop:
         return self._paused
 
     def set_paused(self, paused: bool) -> None:
-        """Pause or continue; return after the steps in progress."""
+        """Pause or continue; return when the current steps are done."""
         self.call(lambda: setattr(self, "_paused", paused))
 
     @property
@@ -104,7 +104,7 @@ class SimulationLoop:
         self._deadline = wall.monotonic()
 
     def end_after(self, steps: int, function: Callable[[], object]) -> None:
-        """After this number of steps since the start, pause and call a function."""
+        """Pause and call a function after this total number of steps."""
         self.call(lambda: setattr(self, "_end", (steps, function)))
 
     def step(self, count: int) -> None:
@@ -114,7 +114,7 @@ class SimulationLoop:
         self.on_tick()
 
     def reset(self, *, with_time: bool) -> None:
-        """Reset the models, and the time if ``with_time``. Call this in the loop's thread."""
+        """Reset the models and, if ``with_time``, the time. Call this in the loop's thread."""
         if with_time:
             self.simulation.reset()
         else:
@@ -148,7 +148,7 @@ class SimulationLoop:
                 self._end = None
 
     def _advance(self, count: int) -> int:
-        """Advance by a number of steps, or fewer if they take too long; return the number."""
+        """Advance by up to a number of steps, fewer if they take too long; return the number of steps done."""
         end = wall.monotonic() + MAX_STEPPING_SECONDS
         done = 0
         while done < count and not self._is_closed:
@@ -174,7 +174,7 @@ class SimulationLoop:
                 future.set_exception(error)
 
     def _must_wait(self) -> bool:
-        """Wait while paused, or until the next steps are due. Return whether to check for jobs again."""
+        """Wait while paused or until the next steps are due. Return whether to check for jobs again."""
         with self._wake:
             if self._jobs or self._is_closed:
                 return True

@@ -42,15 +42,15 @@ if TYPE_CHECKING:
 __all__ = ["WorldMarkers", "has_moved", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
-RATE_HZ = 10.0  # of simulated time, for moving models
+RATE_HZ = 10.0  # simulated-time rate for publishing moving models
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
-MAX_PLANE = 100.0  # m; larger planes are drawn with this size
+MAX_PLANE = 100.0  # m; size at which larger planes are drawn
 PLANE_THICKNESS = 0.001  # m
-MIN_CHANGE = 1e-5  # m, and for quaternions; bodies at rest tremble by less
+MIN_CHANGE = 1e-5  # smallest visible change, in m or quaternion units; resting bodies tremble less
 
 
 class WorldMarkers:
-    """Publishes markers. All methods run in the simulation's thread."""
+    """Publishes the world's shapes as markers. All methods run in the simulation's thread."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -58,15 +58,15 @@ class WorldMarkers:
         self._published: NDArray[np.float64] = np.zeros((0, 7))  # the poses of all links
         self._known: dict[
             SimModel, tuple[NDArray[np.float64], list[Marker]]
-        ] = {}  # with the poses of their links
+        ] = {}  # each model's link poses and markers
         self._next_ns = 0
 
     def publish_all(self) -> None:
-        """Replace all markers."""
+        """Replace all published markers."""
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        """Return the markers of all models. Those of a model that has not moved are kept: each new one needs all others."""
+        """Return the markers of all models. Reuse those of models that have not moved."""
         self._published = poses = self._simulation.body_poses()
         known, self._known = self._known, {}
         for model in self._simulation.models.values():
@@ -78,13 +78,13 @@ class WorldMarkers:
         return [marker for _, markers in self._known.values() for marker in markers]
 
     def publish_moved(self) -> None:
-        """Publish the links that have moved, at a low rate, if there are subscribers."""
+        """Publish the links that have moved, at a low rate and only for subscribers."""
         now = self._simulation.time_ns
         if 0 <= self._next_ns - now <= 1e9 / RATE_HZ or not self._publisher.get_num_connections():
             return
         self._next_ns = now + round(1e9 / RATE_HZ)
         if has_moved(self._published, self._simulation.body_poses()):
-            # A latched topic keeps only its last message, so publish all markers together.
+            # A latched topic keeps only its last message, so publish all markers in one message.
             self._send(self._all())
 
     def _send(self, markers: list[Marker]) -> None:
@@ -96,12 +96,12 @@ class WorldMarkers:
 
 
 def has_moved(before: NDArray[np.float64], now: NDArray[np.float64]) -> bool:
-    """Return whether any of the (n, 7) poses has visibly changed, or their number has."""
+    """Return whether any of the (n, 7) poses has visibly changed, or their number has changed."""
     return before.shape != now.shape or bool((abs(now - before) > MIN_CHANGE).any())
 
 
 def model_markers(model: SimModel) -> list[Marker]:
-    """Return the shapes of a model at their current poses, in the frame ``world``."""
+    """Return the markers for a model's shapes at their current poses, in the frame ``world``."""
     found = []
     for link in model.links.values():
         pose = link.pose
@@ -115,7 +115,7 @@ def model_markers(model: SimModel) -> list[Marker]:
 
 @functools.cache
 def _uri(path: str) -> str:
-    """Return a file's URI. If the file is in a package, the URI is package://, which the dashboard can read."""
+    """Return a file's URI: package:// if it is in a package, because the dashboard can read that."""
     file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may contain relative folders
     for folder in file.parents:
         if name := package_name(folder):
@@ -124,7 +124,7 @@ def _uri(path: str) -> str:
 
 
 def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker | None:
-    """Return the marker for a visual at a pose, without a frame; None if its shape cannot be shown.
+    """Return a marker without a frame for a visual at a pose, or None if its shape cannot be shown.
 
     The marker's text is the URI of the picture, which rviz ignores.
     """
@@ -159,7 +159,7 @@ def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker
 def _add_triangles(
     marker: Marker, shape: MeshShape | Polyline | Heightmap, *, is_colored: bool
 ) -> Marker | None:
-    """Return the marker with a shape's triangles. If it has none, log a line once and return None."""
+    """Return the marker with a shape's triangles added. If it has none, log that once and return None."""
     try:
         points, colors = _triangle_points(shape)
     except MeshError as error:
@@ -174,13 +174,13 @@ def _add_triangles(
 
 @functools.lru_cache(maxsize=1000)
 def _warn_once(error: str) -> None:
-    """Log why a shape is missing, unless the same line was logged before."""
+    """Log why a shape is missing, unless that was already logged."""
     rospy.logwarn("a shape is missing in the window: %s", error)
 
 
 @functools.lru_cache(maxsize=64)
 def _triangle_points(shape: MeshShape | Polyline | Heightmap) -> tuple[list[Point], list[ColorRGBA]]:
-    """Return the corners and colours of a shape's triangles, if any. Each change of the world needs them again."""
+    """Return the corners and colours of a shape's triangles. Cached, because each change of the world needs them again."""
     found = read_triangles(shape)
     colors = [] if found.colors is None else [ColorRGBA(*color) for color in found.colors.tolist()]
     return [Point(x, y, z) for x, y, z in found.corners.tolist()], colors

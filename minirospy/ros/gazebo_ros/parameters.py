@@ -27,19 +27,19 @@ class PluginError(MinirospyError):
 
 
 def text_of(element: XmlElement | None, tag: str, default: str = "") -> str:
-    """Return the text of a child, or the default if it is missing or empty."""
+    """Return a child element's text, or the default if it is missing or empty."""
     child = element.first(tag) if element is not None else None
     return (child.text.strip() or default) if child is not None else default
 
 
 def number_of(element: XmlElement | None, tag: str, default: float) -> float:
-    """Return a child's number, or the default. Raise PluginError if it is not a number or out of the tag's range."""
+    """Return a child element's number, or the default. Raise PluginError if it is not a number or out of the tag's range."""
     text = text_of(element, tag)
     return _number(tag, text, text) if text else default
 
 
 def numbers_of(element: XmlElement | None, tag: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-    """Return a child's numbers, or an empty tuple. Raise PluginError as :func:`number_of` does, or if their count is wrong."""
+    """Return a child element's numbers, or an empty tuple. Raise PluginError if a number, or their count, is invalid."""
     text = text_of(element, tag)
     words = text.split()
     if words and len(words) not in counts:

@@ -31,14 +31,14 @@ FindPackage = Callable[[str], "Path | str"]
 
 @dataclass(frozen=True)
 class ResourcePaths:
-    """The folders searched for models, media and worlds, in order, and the function that finds packages."""
+    """The search folders for models, media and worlds, in order, and the function that finds packages."""
 
     models: tuple[str, ...]
     media: tuple[str, ...]
     find_package: FindPackage | None = None
 
     def resolve(self, uri: str) -> str | None:
-        """Return the path of the existing file or folder that a URI or path refers to, or None."""
+        """Return the path of the existing file or folder for a URI or path, or None."""
         scheme, separator, rest = uri.strip().partition("://")
         if not separator:
             return self._existing(uri.strip())
@@ -62,7 +62,7 @@ class ResourcePaths:
         return _first((os.curdir, *self.media, *self.models), path)
 
     def _model(self, name: str) -> str | None:
-        # Descriptions converted from URDF contain model:// in place of package://.
+        # Models converted from URDF contain model:// in place of package://.
         return _first(self.models, name) or self._package(name)
 
     def _package(self, name: str) -> str | None:
@@ -82,7 +82,7 @@ def resource_paths(
     find_package: FindPackage | None = None,
     separator: str = os.pathsep,
 ) -> ResourcePaths:
-    """Return an environment's search paths. ``package_folders``: packages whose package.xml may export folders.
+    """Return the search paths from the environment variables. ``package_folders``: packages that may export folders.
 
     ``~/.gazebo/models``, to which Gazebo downloads models, is searched if HOME is set.
     """
@@ -100,7 +100,7 @@ def resource_paths(
 
 
 def exported_paths(folders: Iterable[Path | str], attribute: str, separator: str = os.pathsep) -> list[str]:
-    """Return the folders that packages list in this attribute of their ``<gazebo_ros>`` exports. Skip unreadable packages."""
+    """Return the folders in this attribute of packages' ``<gazebo_ros>`` exports. Skip unreadable packages."""
     found: list[str] = []
     for folder in folders:
         for element in _exports(Path(folder)):
@@ -116,7 +116,7 @@ def _exports(folder: Path) -> list[dict[str, str]]:
         if path.stat().st_size > _MAX_MANIFEST_BYTES:
             return []
         text = path.read_bytes()
-        if b"<gazebo_ros" not in text:  # parsing hundreds of manifests would take a second
+        if b"<gazebo_ros" not in text:  # parsing hundreds of manifests would take a second, so check first
             return []
         root = parse_xml(text)
     except (OSError, XmlError):
@@ -129,7 +129,7 @@ def _split(text: str, separator: str) -> list[str]:
 
 
 def _first(folders: Iterable[str], name: str) -> str | None:
-    """Return the path in the first folder that contains a file or folder of this name."""
+    """Return the path in the first folder that contains this file or folder."""
     name = name.strip("/")
     paths = (os.path.normpath(os.path.join(folder, name)) for folder in folders)
     return next((path for path in paths if name and os.path.exists(path)), None)

@@ -23,7 +23,7 @@ __all__ = ["PhysicsServices"]
 
 
 class PhysicsServices:
-    """Offers the services for properties, forces and physics.
+    """Offers the services for physics, forces, and properties of links and joints.
 
     ode: the parameters of Gazebo's engine, which are kept and reported, and have no effect here.
     """
@@ -57,7 +57,7 @@ class PhysicsServices:
         offer(loop, "clear_body_wrenches", srv.BodyRequest, self._clear_body_wrenches)
         offer(loop, "reset_simulation", Empty, lambda _: server.reset(with_time=True))
         offer(loop, "reset_world", Empty, lambda _: server.reset(with_time=False))
-        # For use while paused. Gazebo has this in its window only.
+        # Advances a paused simulation; Gazebo offers this only in its window.
         offer(loop, "step_physics", Empty, lambda _: loop.step(1))
         offer_directly("pause_physics", Empty, lambda _: loop.set_paused(True))
         offer_directly("unpause_physics", Empty, lambda _: loop.set_paused(False))
@@ -91,7 +91,7 @@ class PhysicsServices:
     def _get_joint_properties(self, request: srv.GetJointPropertiesRequest) -> srv.GetJointPropertiesResponse:
         joint = require_joint(self._simulation, request.joint_name, "GetJointProperties")
         return srv.GetJointPropertiesResponse(
-            type=srv.GetJointPropertiesResponse.REVOLUTE,  # as in ROS, for all joints
+            type=srv.GetJointPropertiesResponse.REVOLUTE,  # ROS returns REVOLUTE for all joints
             position=[joint.position],
             rate=[joint.velocity],
             success=True,

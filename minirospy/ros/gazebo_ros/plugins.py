@@ -87,7 +87,7 @@ LIBRARIES = {
 
 
 class PluginBase:
-    """The base class of all plugins.
+    """Base class of all plugins.
 
     loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's. due_ns: the time of the
     simulation before which :meth:`update` has nothing to do.
@@ -105,16 +105,16 @@ class PluginBase:
         self._closing: list[Callable[[], object]] = []
 
     def load(self) -> None:
-        """Read the parameters, and create publishers and subscribers. Raise PluginError if that fails."""
+        """Read the parameters; create publishers and subscribers. Raise PluginError on failure."""
 
     def update(self) -> None:
-        """Do the plugin's work for a step; called before the step."""
+        """Do the plugin's work. Called before each step."""
 
     def reset(self) -> None:
-        """Return to the state after ``load``. Called by reset_simulation, after the time has been set to 0."""
+        """Restore the state after ``load``. Called by reset_simulation after it sets the time to 0."""
 
     def close(self) -> None:
-        """Unregister the publishers and subscribers that :meth:`publish_to` and :meth:`subscribe_to` have created."""
+        """Close the publishers and subscribers from :meth:`publish_to` and :meth:`subscribe_to`."""
         for function in self._closing:
             function()
         self._closing.clear()
@@ -126,7 +126,7 @@ class PluginBase:
 
     @property
     def namespace(self) -> str:
-        """Return ``<robotNamespace>``, resolved in the node's namespace, or the default; without a trailing slash."""
+        """Return ``<robotNamespace>`` (or the default), resolved in the node's namespace, without a trailing slash."""
         text = self.text("robotNamespace", self.default_namespace)
         return "" if text in ("", "/") else "/" + text.strip("/")
 
@@ -140,7 +140,7 @@ class PluginBase:
         return Header(0, self.now, frame_id)
 
     def call(self, function: Callable[[], _T]) -> _T:
-        """Run a function between two steps. For use in callbacks of subscribers and services."""
+        """Run a function between two steps. Use this in subscriber and service callbacks."""
         return self.loop.call(function)
 
     def text(self, tag: str, default: str = "") -> str:
@@ -148,7 +148,7 @@ class PluginBase:
         return text_of(self.element, tag, default)
 
     def required(self, tag: str, title: str) -> str:
-        """Return a parameter's text. Raise PluginError that begins with the title if it is missing or empty."""
+        """Return a parameter's text. If it is missing or empty, raise PluginError with a text that starts with the title."""
         if not (text := self.text(tag)):
             raise PluginError(f"{title} missing <{tag}>, cannot proceed".lstrip())
         return text
@@ -165,7 +165,7 @@ class PluginBase:
         return value
 
     def numbers(self, tag: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        """Return a parameter's numbers, as many as in the default. Raise PluginError as :meth:`number` does."""
+        """Return a parameter's numbers, as many as in the default. Raise PluginError like :meth:`number`."""
         return numbers_of(self.element, tag, (len(default),)) or default
 
     def flag(self, tag: str, default: bool) -> bool:
@@ -178,7 +178,7 @@ class PluginBase:
         return self.text(tag, default).lstrip("/")
 
     def noisy(self, values: Iterable[float], deviation: float) -> list[float]:
-        """Return values with independent noise of a standard deviation."""
+        """Return the values with independent Gaussian noise added."""
         exact = list(values)
         if deviation <= 0:
             return exact
@@ -186,7 +186,7 @@ class PluginBase:
         return [value + error for value, error in zip(exact, noise, strict=True)]
 
     def resolve(self, topic: str) -> str:
-        """Return a topic's name, resolved in the plugin's namespace."""
+        """Return a topic's name resolved in the plugin's namespace."""
         return topic if topic.startswith("/") else f"{self.namespace}/{topic}"
 
     def publish_to(
@@ -206,7 +206,7 @@ class PluginBase:
         return subscriber
 
     def serve(self, name: str, kind: type, handler: Callable[..., object]) -> None:
-        """Offer a service in the plugin's namespace. As in ROS, log an error if this node already offers it."""
+        """Offer a service in the plugin's namespace. As in ROS, log an error if this node already offers that service."""
         try:
             service: rospy.Service[Any] = rospy.Service(self.resolve(name), kind, handler)
         except rospy.ServiceException:  # the same robot was already spawned in this namespace
@@ -231,7 +231,7 @@ class ModelPlugin(PluginBase):
 
     @property
     def title(self) -> str:
-        """Return the plugin's name and library, and the model, for log messages."""
+        """Return the plugin's name, library and model, for log messages."""
         return _title(self.plugin, f"model '{self.model.name}'")
 
     def joint(self, name: str) -> SimJoint:
@@ -242,7 +242,7 @@ class ModelPlugin(PluginBase):
         return joint
 
     def link(self, name: str) -> tuple[SimLink, Pose]:
-        """Return a link, and the named link's pose in it: a fixed joint may have merged the named link into another one.
+        """Return a link and the named link's pose in it, because a fixed joint may have merged the named link into another.
 
         Raise PluginError if the link does not exist.
         """
@@ -256,15 +256,15 @@ class ModelPlugin(PluginBase):
 
 
 class Timer:
-    """Reports when a period of simulated time has passed. A rate of 0 means every step."""
+    """Reports when a period of simulated time has elapsed. Rate 0 means every step."""
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate > 0 else 0
         self.next_ns = 0
 
     def is_due(self, now_ns: int) -> bool:
-        """Return whether the next period begins."""
-        if now_ns < self.next_ns - self._period:  # the time was reset
+        """Return whether the next period has started."""
+        if now_ns < self.next_ns - self._period:  # the simulated time was reset
             self.next_ns = now_ns
         if now_ns < self.next_ns:
             return False
@@ -274,7 +274,7 @@ class Timer:
 
 @dataclass(frozen=True)
 class RayFan:
-    """The rays of a sensor: (n, 3) unit vectors in the sensor's frame, and the distances in m at which they begin and end."""
+    """A sensor's rays: (n, 3) unit vectors in the sensor's frame, and the minimum and maximum range in m."""
 
     directions: NDArray[np.float64]
     min_range: float
@@ -282,7 +282,7 @@ class RayFan:
 
 
 class PeriodicPlugin(ModelPlugin):
-    """A plugin of a model whose :meth:`sense` is called ``rate`` times a second of simulated time, or before each step for 0."""
+    """A model plugin. Calls :meth:`sense` ``rate`` times per simulated second, or before each step if ``rate`` is 0."""
 
     rate = 0.0
 
@@ -295,17 +295,17 @@ class PeriodicPlugin(ModelPlugin):
     def output_to(
         self, topic: str, kind: type[rospy.Message], *, latch: bool = False
     ) -> rospy.Publisher[Any]:
-        """Return a publisher in the plugin's namespace. While none of these has a subscriber, the plugin is not needed."""
+        """Return a publisher in the plugin's namespace. The plugin does not run while no output has a subscriber."""
         publisher = self.publish_to(topic, kind, latch=latch)
         self._outputs.append(publisher)
         return publisher
 
     def is_needed(self) -> bool:
-        """Return whether an output has a subscriber. Return True without outputs, because another plugin uses the data."""
+        """Return whether any output has a subscriber. Return True without outputs, because another plugin may use the data."""
         return not self._outputs or any(each.get_num_connections() for each in self._outputs)
 
     def sense(self) -> None:
-        """Measure and publish."""
+        """Measure and publish; subclasses override this method."""
 
     def update(self) -> None:
         """Call :meth:`sense` if it is due."""
@@ -318,13 +318,13 @@ class PeriodicPlugin(ModelPlugin):
                 self.sense()
 
     def reset(self) -> None:
-        """Begin the period again."""
+        """Restart the update period."""
         self._timer = None
         self.due_ns = 0
 
 
 class SensorPlugin(PeriodicPlugin):
-    """A plugin of a sensor. Its rate is the sensor's unless ``load`` sets ``self.rate``.
+    """A sensor plugin. It runs at the sensor's rate unless ``load`` sets ``self.rate``.
 
     If ``load`` sets ``self.shown_rays``, the simulation's window can show them.
     """
@@ -345,23 +345,23 @@ class SensorPlugin(PeriodicPlugin):
 
 
 class PluginHost:
-    """Loads and runs the plugins of the world and its models."""
+    """Loads and runs the plugins of a world and its models."""
 
     def __init__(self, loop: SimulationLoop) -> None:
         self._loop = loop
-        self._plugins: dict[str, list[PluginBase]] = {}  # by model name; "" is the world
+        self._plugins: dict[str, list[PluginBase]] = {}  # plugins by model name; "" is the world
         self._running: list[PluginBase] = []
-        self._named: set[str] = set()  # missing libraries that have already been logged
+        self._named: set[str] = set()  # missing libraries already logged
         self._exported: dict[str, tuple[str, Path]] | None = None
 
     def add_world(self, plugins: tuple[Plugin, ...]) -> None:
-        """Load the plugins of the world."""
+        """Load the world's plugins."""
         for plugin in plugins:
             if (kind := self._find(plugin, "the world")) is not None:
                 self._load("", kind, WorldPlugin, plugin)
 
     def add_model(self, model: SimModel) -> None:
-        """Load the plugins of a model and of its sensors."""
+        """Load the plugins of a model and its sensors."""
         record = model.record
         for plugin in record.plugins:
             if (kind := self._find(plugin, f"model '{model.name}'")) is not None:
@@ -379,13 +379,13 @@ class PluginHost:
                         self._load(model.name, kind, ModelPlugin, plugin, model)
 
     def remove_model(self, name: str) -> None:
-        """Close the plugins of a model."""
+        """Close a model's plugins."""
         for plugin in self._plugins.pop(name, ()):
             self._close(plugin)
         self._list()
 
     def update(self) -> None:
-        """Run all plugins before a step, unless they are not due. A plugin that fails is closed and named."""
+        """Run all plugins that are due before a step. Close a plugin that fails, and log its name."""
         now_ns = self._loop.simulation.time_ns
         for plugin in self._running:
             if now_ns < plugin.due_ns:
@@ -398,7 +398,7 @@ class PluginHost:
     def reset(self) -> None:
         """Reset all plugins."""
         for plugin in self._running:
-            plugin.due_ns = 0  # also if the user's plugin does not call reset() of its base class
+            plugin.due_ns = 0  # a user's plugin may override reset() without calling the base class
             try:
                 plugin.reset()
             except Exception as error:  # noqa: BLE001 - a plugin's code, which may be the user's
@@ -457,7 +457,7 @@ class PluginHost:
             rospy.logerr("%s failed at its end: %s", plugin.title, error)
 
     def _find(self, plugin: Plugin, owner: str) -> type[PluginBase] | None:
-        """Return the class for a plugin's library. If it is missing, log a line once and return None."""
+        """Return a plugin library's class. If it is missing, log that once and return None."""
         library = plugin.library
         try:
             if target := LIBRARIES.get(library):

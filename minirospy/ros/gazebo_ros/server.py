@@ -18,11 +18,11 @@ from minirospy.ros.gazebo_ros.window import Window
 
 __all__ = ["Server"]
 
-METRICS_SECONDS = 1.0  # of simulated time, between messages on /gazebo/performance_metrics
+METRICS_SECONDS = 1.0  # simulated seconds between messages on /gazebo/performance_metrics
 
 
 class Server:
-    """The running world.
+    """Runs the world: its loop, plugins and topics.
 
     lights: by name; they do not affect the physics. clock: this process's own clock, or None if it uses wall time.
     """
@@ -43,7 +43,7 @@ class Server:
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
         self._published_ns = -1
-        self._told = len(loop.simulation.warnings)  # gzserver itself logs these
+        self._told = len(loop.simulation.warnings)  # gzserver itself logs the initial warnings
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         self._window: Window | None = None
@@ -64,7 +64,7 @@ class Server:
         self._changed()
 
     def add_model(self, model: Model, pose: Pose, name: str) -> None:
-        """Add a model and load its plugins. Raise SimulationError if that fails. Call this in the loop's thread."""
+        """Add a model and load its plugins. Raise SimulationError on failure. Call this in the loop's thread."""
         added: SimModel = self.loop.simulation.add_model(model, pose, name)
         self.plugins.add_model(added)
         self._changed()
@@ -76,7 +76,7 @@ class Server:
         self._changed()
 
     def moved(self, name: str, before: Pose) -> None:
-        """If the simulation is paused, publish the states now. Call this in the loop's thread.
+        """Publish the states now if the simulation is paused. Call this in the loop's thread.
 
         A static model's shapes are published if its pose has changed.
         """
@@ -94,7 +94,7 @@ class Server:
         self.loop.set_update_rate(update_rate)
 
     def reset(self, *, with_time: bool) -> None:
-        """Reset the models; with the time, also reset the plugins. Call this in the loop's thread."""
+        """Reset the models; if ``with_time``, also reset the time and the plugins. Call this in the loop's thread."""
         self.loop.reset(with_time=with_time)
         if self._window is not None:
             self._window.changed()  # static models may have been moved
@@ -133,7 +133,7 @@ class Server:
         now = self.loop.simulation.time_ns
         if self._clock is not None:
             self._clock.set(now)
-        # While paused, nothing is published except the new time after a reset or a single step.
+        # While paused, publish only the new time after a reset or a single step.
         if now != self._published_ns:
             self._published_ns = now
             self._clock_publisher.publish(Clock(time_of(now)))
@@ -150,7 +150,7 @@ class Server:
 
 
 class _StatePublishers:
-    """Publishes states while they have subscribers."""
+    """Publishes states if they have subscribers."""
 
     def __init__(self, loop: SimulationLoop) -> None:
         self._loop = loop

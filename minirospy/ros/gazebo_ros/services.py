@@ -20,7 +20,7 @@ Handler = Callable[[Any], object]
 
 
 class Refused(Exception):
-    """Raised by a handler if a request cannot be served; ``str()`` is the status message."""
+    """Raised by a handler to refuse a request; ``str()`` is the status message."""
 
 
 def offer(loop: SimulationLoop, name: str, kind: Any, handler: Handler) -> None:
@@ -42,7 +42,7 @@ def offer(loop: SimulationLoop, name: str, kind: Any, handler: Handler) -> None:
 
 
 def offer_directly(name: str, kind: Any, handler: Handler) -> None:
-    """Offer the service ``~name``; the handler runs in the service's own thread, and calls the simulation's itself."""
+    """Offer the service ``~name``. The handler runs in the service's thread and calls the simulation's thread itself."""
 
     def run(request: object) -> object:
         is_served = True
@@ -50,7 +50,7 @@ def offer_directly(name: str, kind: Any, handler: Handler) -> None:
             answer = handler(request)
         except Refused as refusal:
             is_served, answer = False, str(refusal)
-        except LoopClosed as error:  # the simulation has ended meanwhile
+        except LoopClosed as error:  # the simulation has ended in the meantime
             raise rospy.ServiceException(str(error)) from None
         if answer is None:
             return kind._response_class()
@@ -62,7 +62,7 @@ def offer_directly(name: str, kind: Any, handler: Handler) -> None:
 
 
 def apply(loop: SimulationLoop, handler: Handler, request: object) -> None:
-    """Do in the simulation's thread what a message asks for."""
+    """Run a message's handler in the simulation's thread; log a SimulationError."""
     try:
         loop.call(lambda: handler(request))
     except (LoopClosed, Refused):
@@ -72,14 +72,14 @@ def apply(loop: SimulationLoop, handler: Handler, request: object) -> None:
 
 
 def require_link(simulation: Simulation, name: str, service: str) -> SimLink:
-    """Return a link. Raise Refused with the service's text if it does not exist."""
+    """Return a link. If it does not exist, raise Refused with the service's text."""
     if (link := find_link(simulation, name)) is None:
         raise Refused(f"{service}: link not found, did you forget to scope the link by model name?")
     return link
 
 
 def require_joint(simulation: Simulation, name: str, service: str) -> SimJoint:
-    """Return a joint. Raise Refused with the service's text if it does not exist."""
+    """Return a joint. If it does not exist, raise Refused with the service's text."""
     if (joint := find_joint(simulation, name)) is None:
         raise Refused(f"{service}: joint not found")
     return joint

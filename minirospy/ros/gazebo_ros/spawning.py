@@ -17,7 +17,7 @@ _PACKAGE = re.compile(r"package://([^/\"'<]+)/")
 
 
 class WrongFormat(Exception):
-    """Raised if the text's format is not the one that the service expects."""
+    """Raised if the text is not in the format that the service expects."""
 
 
 class UnknownPackage(Exception):
@@ -25,7 +25,7 @@ class UnknownPackage(Exception):
 
 
 def read_urdf_request(text: str, name: str, namespace: str, resources: ResourcePaths) -> Model:
-    """Return the model in a URDF. Raise WrongFormat if it has no ``<robot>``, UnknownPackage, or SdfError."""
+    """Return the model in a URDF text. Raise WrongFormat if it has no ``<robot>``, UnknownPackage, or SdfError."""
     if _root(text).tag != "robot":
         raise WrongFormat
     for package in dict.fromkeys(_PACKAGE.findall(text)):
@@ -38,7 +38,7 @@ def read_urdf_request(text: str, name: str, namespace: str, resources: ResourceP
 
 
 def read_sdf_request(text: str, name: str, namespace: str, resources: ResourcePaths) -> Model:
-    """Return the model in SDF or URDF text. Raise WrongFormat if it is neither, SdfError if it is unusable."""
+    """Return the model in an SDF or URDF text. Raise WrongFormat if it is neither, SdfError if it is unusable."""
     if _root(text).tag not in ("sdf", "gazebo", "robot"):
         raise WrongFormat
     return with_namespace(parse_model(text, resources.resolve, file=name, name=name), namespace)
@@ -52,7 +52,7 @@ def _root(text: str) -> Element:
 
 
 def with_namespace(model: Model, namespace: str) -> Model:
-    """Return the model with ``<robotNamespace>`` added to each plugin that lacks it, as Gazebo's services do."""
+    """Return the model with ``<robotNamespace>`` added to each plugin without one, as Gazebo's services do."""
     if not namespace:
         return model
     links = {}

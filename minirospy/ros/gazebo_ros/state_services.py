@@ -41,7 +41,7 @@ class StateServices:
         self._server = server
         self._loop = loop = server.loop
         self._simulation = loop.simulation
-        self._queries: dict[str, int] = {}  # number of get_model_state calls by model
+        self._queries: dict[str, int] = {}  # get_model_state calls per model
         offer(loop, "delete_model", srv.DeleteModel, self._delete_model)
         offer(loop, "get_model_properties", srv.GetModelProperties, self._get_model_properties)
         offer(loop, "get_model_state", srv.GetModelState, self._get_model_state)
@@ -104,7 +104,7 @@ class StateServices:
     # ---- models
 
     def _require_model(self, name: str, service: str, title: str = "") -> SimModel:
-        """Return a model. Log an error that begins with the title, and raise Refused, if it does not exist."""
+        """Return a model. If it does not exist, log an error that starts with ``title`` and raise Refused."""
         if (model := self._simulation.models.get(name)) is None:
             rospy.logerr("%s: model [%s] does not exist", title or service, name)
             raise Refused(f"{service}: model does not exist")

@@ -15,12 +15,12 @@ from minirospy.core.sdf.model import Color, Heightmap, MeshShape, Polyline
 
 __all__ = ["MAX_TRIANGLES", "Triangles", "read_triangles"]
 
-MAX_TRIANGLES = 20_000  # per shape; each takes 36 to 84 bytes in every message with the world's shapes
-MAX_CELLS = 80  # per side of a terrain
+MAX_TRIANGLES = 20_000  # maximum per shape; each takes 36 to 84 bytes in each message with shapes
+MAX_CELLS = 80  # maximum per side of a heightmap
 
 
 class Triangles(NamedTuple):
-    """The corners (3 n, 3) in m, and their colours (3 n, 4), or None if the file has no colours."""
+    """Triangle corners (3 n, 3) in m and their colours (3 n, 4), or None if the file has no colours."""
 
     corners: NDArray[np.float64]
     colors: NDArray[np.float64] | None

@@ -51,14 +51,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Window", "model_names", "ray_lengths"]
 
-PERIOD_SECONDS = 1 / 30  # between messages with poses
-SLOW_SECONDS = 0.1  # between messages with joints, contacts or rays
-STATE_SECONDS = 0.2  # between messages with the state
+PERIOD_SECONDS = 1 / 30  # seconds between pose messages
+SLOW_SECONDS = 0.1  # seconds between messages with joints, contacts or rays
+STATE_SECONDS = 0.2  # seconds between state messages
 MAX_STEPS = 1_000_000  # per message
-STEPS_AT_ONCE = 50  # steps after which other requests are handled
-MAX_CONTACTS = 2000  # number of contacts shown
-MAX_RAYS = 360  # number of rays shown per sensor
-ENDLESS_RAY = 100.0  # m; drawn length of a ray that hits nothing if its maximum range is infinite
+STEPS_AT_ONCE = 50  # steps between checks for other requests
+MAX_CONTACTS = 2000  # maximum number of contacts to publish
+MAX_RAYS = 360  # maximum number of rays to publish per sensor
+ENDLESS_RAY = 100.0  # m; drawn length of a ray that hits nothing if the sensor's range is infinite
 NORMAL_LENGTH = 0.12  # m
 POINT_SIZE = 0.022  # m
 RAY_WIDTH = 0.01  # m
@@ -68,7 +68,7 @@ RAY_COLOR = ColorRGBA(0.1, 0.45, 1.0, 0.45)
 
 
 class Window:
-    """Publishes in a separate thread, which requests its data from the simulation's thread between two steps."""
+    """Publishes the simulation for the dashboard in a separate thread, which gets its data between two steps."""
 
     def __init__(
         self, loop: SimulationLoop, plugins: PluginHost, world: World, model_folders: Iterable[str]
@@ -84,10 +84,10 @@ class Window:
         self._contacts = _publisher("contacts", MarkerArray)
         self._rays = _publisher("rays", MarkerArray)
         self._is_stale = True  # whether models were added, removed or, if static, moved since the last shapes
-        self._known: dict[SimModel, list[Marker]] = {}  # the markers in the last message with shapes
-        self._moving: list[tuple[str, int]] = []  # scoped names of the moving links, and their rows
-        self._generation = -1  # the engine's generation for which the rows are valid
-        self._last: NDArray[np.float64] = np.zeros((0, 7))  # the poses in the last message
+        self._known: dict[SimModel, list[Marker]] = {}  # markers in the last message with shapes
+        self._moving: list[tuple[str, int]] = []  # the moving links' scoped names and pose rows
+        self._generation = -1  # engine generation for which the pose rows are valid
+        self._last: NDArray[np.float64] = np.zeros((0, 7))  # poses in the last message
         self._is_closed = threading.Event()
         folders = tuple(model_folders)
         rospy.Subscriber("~window/step", UInt32, self._on_step, queue_size=10)
@@ -117,7 +117,7 @@ class Window:
                     self._publish_slow()
             except LoopClosed:
                 return
-            except SimulationError as error:  # for example rays from a NaN pose
+            except SimulationError as error:  # such as an error from a ray with a NaN pose
                 rospy.logerr_throttle(10, "the window: %s", error)
             if now >= next_state and _has_subscribers(self._state):
                 next_state = now + STATE_SECONDS
@@ -125,7 +125,7 @@ class Window:
 
     def _publish_shapes_and_poses(self) -> None:
         if self._is_stale and _has_subscribers(self._shapes):
-            # Clear the flag before reading the shapes, so that later changes are not lost.
+            # Clear the flag before reading the shapes, so that no later change is lost.
             self._is_stale = False
             self._shapes.publish(MarkerArray(self._loop.call(self._read_shapes)))
         if _has_subscribers(self._poses):
@@ -143,7 +143,7 @@ class Window:
             if _has_subscribers(publisher):
                 publisher.publish(self._loop.call(read))
 
-    # ---- in the simulation's thread
+    # ---- called in the simulation's thread
 
     def _read_shapes(self) -> list[Marker]:
         markers = [Marker(action=Marker.DELETEALL)]
@@ -157,7 +157,7 @@ class Window:
         return markers
 
     def _read_poses(self) -> tuple[list[str], NDArray[np.float64], int] | None:
-        """Return names, poses and time, or None if no link has moved."""
+        """Return the links' names, poses and time, or None if no link has moved."""
         simulation = self._simulation
         if self._generation != simulation.engine.generation:
             self._generation = simulation.engine.generation
@@ -246,7 +246,7 @@ class Window:
     # ---- requests
 
     def _on_step(self, message: UInt32) -> None:
-        """Advance a paused simulation. Other requests are handled in between, and unpausing ends the steps."""
+        """Advance a paused simulation. Handle other requests between steps, and stop if it is unpaused."""
         remaining = min(message.data, MAX_STEPS)
         try:
             while remaining > 0 and self._loop.is_paused and not self._is_closed.is_set():
@@ -258,18 +258,18 @@ class Window:
 
 
 def ray_lengths(distances: NDArray[np.float64], max_range: float) -> NDArray[np.float64]:
-    """Return the drawn lengths of rays. Rays that hit nothing end at the maximum range, if that is finite."""
+    """Return the lengths at which to draw rays. A ray that hits nothing ends at the maximum range, if that is finite."""
     end = max_range if np.isfinite(max_range) else ENDLESS_RAY
     return np.where(np.isfinite(distances), distances, end).clip(max=max_range)
 
 
 def model_names(folders: Iterable[str]) -> list[str]:
-    """Return the names of the models in some folders, which contain a model.config or model.sdf."""
+    """Return the names of the models in these folders: subfolders with a model.config or model.sdf."""
     found = set()
     for folder in folders:
         try:
             found |= {each.name for each in Path(folder).iterdir() if _is_model(each)}
-        except OSError:  # a folder on a search path need not exist
+        except OSError:  # a folder in the search path may be missing
             continue
     return sorted(found)
 
@@ -294,7 +294,7 @@ def _has_subscribers(publisher: rospy.Publisher[Any]) -> bool:
 
 
 def _shapes(model: SimModel) -> list[Marker]:
-    """Return a model's shapes: for a static model at their poses in the world, otherwise in the frames of its links."""
+    """Return markers for a model's shapes: a static model's in the world frame, otherwise in each link's frame."""
     if model.is_static:
         return model_markers(model)
     found = []

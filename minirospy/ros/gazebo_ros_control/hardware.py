@@ -24,7 +24,7 @@ FindPid = Callable[[str], "Pid | None"]
 
 
 class SimulatedHardware(RobotHardware):
-    """Reads and moves the joints that have a transmission, like gazebo_ros_control's DefaultRobotHWSim.
+    """Reads and commands all joints that have a transmission, like gazebo_ros_control's DefaultRobotHWSim.
 
     A motor moves a joint without a PID controller to a position, or holds its velocity. ``is_stopped``: the emergency stop, which
     holds positions and sets velocities and efforts to 0.
@@ -57,14 +57,14 @@ class SimulatedHardware(RobotHardware):
             drive.read()
 
     def write(self, _time: Time, period: Duration) -> None:
-        """Send the commands."""
+        """Write the commands to the joints."""
         seconds = period.to_sec()
         for drive in self._drives:
             drive.write(seconds, self.is_stopped)
 
 
 class _Drive:
-    """A joint, and the method that moves it."""
+    """A joint and the method that commands it."""
 
     def __init__(
         self,
@@ -82,20 +82,20 @@ class _Drive:
         self._turns = turns
         self._pid = pid
         self._loop = loop
-        self._held: float | None = None  # the position at the time of the emergency stop
-        self._target = joint.position  # the last finite position command
+        self._held: float | None = None  # position at the time of the emergency stop
+        self._target = joint.position  # last finite position command
 
     def read(self) -> None:
         position = self._simulated.position
         joint = self.joint
-        # The position of a rotating joint is continuous over any number of turns, even after a jump.
+        # Keep a rotating joint's position continuous over any number of turns, even after a jump.
         way = position - joint.position
         joint.position += math.remainder(way, math.tau) if self._turns else way
         joint.velocity = self._simulated.velocity
         joint.effort = self._simulated.effort
 
     def write(self, seconds: float, is_stopped: bool) -> None:
-        """Send the command, unless it is not finite: a controller may write such a command after the limits were enforced."""
+        """Write the command unless it is not finite: controllers may write such a command after the limits were enforced."""
         joint, simulated = self.joint, self._simulated
         kind = joint.active or self._first
         if kind is Interface.EFFORT:
@@ -117,7 +117,7 @@ class _Drive:
             self._target = joint.position_command
         position = self._target if self._held is None else self._held
         if self._pid is None:
-            # As in Gazebo, the position is reached regardless of the effort.
+            # As in Gazebo, the joint reaches the position regardless of the effort.
             simulated.set_position(position + simulated.position - joint.position)
         else:
             error = self._loop.error(position) if self._loop is not None else position - joint.position

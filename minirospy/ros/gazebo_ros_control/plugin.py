@@ -29,12 +29,12 @@ from minirospy.ros.gazebo_ros_control.hardware import SimulatedHardware
 __all__ = ["GazeboRosControl"]
 
 _DEFAULT_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
-_WARN_SECONDS = 10.0  # between warnings about commands that are not finite
-_POLL_SECONDS = 0.1  # between checks for the robot description
+_WARN_SECONDS = 10.0  # seconds between warnings about non-finite commands
+_POLL_SECONDS = 0.1  # seconds between checks for the robot description
 
 
 class GazeboRosControl(ModelPlugin):
-    """Reads the joints, updates the controllers and writes the joints in each control period."""
+    """Runs a control cycle in each control period: reads the joints, updates the controllers and writes the joints."""
 
     def load(self) -> None:
         """Start once the parameter with the robot description exists."""
@@ -107,7 +107,7 @@ class GazeboRosControl(ModelPlugin):
         rospy.loginfo("Loaded gazebo_ros_control.")
 
     def _usable(self, transmissions: list[Transmission]) -> list[Transmission]:
-        """Return one transmission for each joint in the model."""
+        """Return one transmission per joint in the model."""
         found: dict[str, Transmission] = {}
         for each in transmissions:
             joint = self.model.joints.get(each.joint)
@@ -141,7 +141,7 @@ class GazeboRosControl(ModelPlugin):
         self.call(stop)
 
     def update(self) -> None:
-        """Run a control cycle if the period has passed, and write the commands."""
+        """Run a control cycle if the period has elapsed, and write the commands."""
         manager, hardware = self._manager, self._hardware
         if manager is None or hardware is None:
             return
@@ -168,7 +168,7 @@ class GazeboRosControl(ModelPlugin):
         self._is_reset = True
 
     def close(self) -> None:
-        """Stop the controllers, and shut down the controller manager's services."""
+        """Stop the controllers and shut down the controller manager's services."""
         self._is_closed.set()
         if self._manager is not None:
             self._manager.close(self.now)

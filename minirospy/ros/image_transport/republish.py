@@ -101,7 +101,7 @@ def list_main() -> int:
 
 
 class Republisher:
-    """Republishes images with one or more transports, and encodes them only for transports that have subscribers."""
+    """Republishes images with one or more transports; encodes them only for transports with subscribers."""
 
     def __init__(self, source: str, source_kind: str, target: str, kinds: Sequence[str]) -> None:
         self._kind = source_kind
@@ -142,7 +142,7 @@ class Republisher:
         made: Image | CompressedImage = image
         if kind != "raw":
             made = _ENCODERS[kind](image, self._settings(kind))
-        # Publish the serialized bytes, to keep the received image's sequence number.
+        # Publish the serialized bytes, to keep the received sequence number.
         buffer = BytesIO()
         made.serialize(buffer)
         passed = AnyMsg()
@@ -159,7 +159,7 @@ class Republisher:
 
 
 def settings_of(values: Mapping[str, object]) -> Settings:
-    """Read the settings from parameters, and clamp them to their limits.
+    """Read the settings from the parameters and clamp them to their limits.
 
     Raise CodecError if a parameter has the wrong type.
     """
@@ -187,7 +187,7 @@ def _class_of(kind: str) -> type[Image] | type[CompressedImage]:
 
 
 def _bytes_of(cls: type[Image] | type[CompressedImage]) -> type[AnyMsg]:
-    """Return a message class of the same type as ``cls`` whose messages stay serialized."""
+    """Return a message class like ``cls`` whose messages stay serialized."""
     fields = {"_type": cls._type, "_md5sum": cls._md5sum, "_full_text": cls._full_text, "__slots__": []}
     return type("PassedImage", (AnyMsg,), fields)
 

@@ -41,7 +41,7 @@ _POLL_SECONDS = 0.002
 
 
 class DeviceError(MinirospyError):
-    """Raised if the joystick cannot be opened, or was disconnected. The message is one line with the reason."""
+    """Raised if the joystick cannot be opened or was disconnected. The message is one line with the reason."""
 
 
 class Device(Protocol):
@@ -50,17 +50,17 @@ class Device(Protocol):
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event, or None after ``seconds`` without one. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None after ``seconds`` without an event. Raise DeviceError if the device is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
+        """Run both motors for one second at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
 
     def close(self) -> None:
         """Close the device."""
 
 
 def open_device(path: str, feedback_path: str = "") -> Device:
-    """Open a joystick by its path. On systems other than Linux, only the number in the path is used.
+    """Open a joystick by its path. Outside Linux, use only the number in the path.
 
     ``feedback_path``: on Linux, the event device that controls the motors, if it differs from the joystick's own. Raise
     DeviceError if the joystick cannot be opened.
@@ -78,8 +78,7 @@ class LinuxDevice:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # The first events report the current state, but after the first open() they may report that at the last close().
-            # So open the device twice.
+            # Open the device twice: after the first open(), the initial events may report the state at the last close().
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
@@ -88,7 +87,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event, or None after ``seconds`` without one. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None after ``seconds`` without an event. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -108,7 +107,7 @@ class LinuxDevice:
         return Event(kind, number, value)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
+        """Run both motors for one second at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
         if self._motors is None:
             if not self._feedback_path:
                 raise RumbleError(
@@ -126,7 +125,7 @@ class LinuxDevice:
 
 
 def _name_of(file: int) -> str:
-    """Return a joystick's name as the kernel reports it (JSIOCGNAME)."""
+    """Return the joystick's name from the kernel (JSIOCGNAME)."""
     if sys.platform == "win32":
         return _UNKNOWN
     import fcntl
@@ -155,7 +154,7 @@ def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
 
 
 class PygameDevice:
-    """A joystick read through SDL. As on Linux, its hats are additional axes that follow the other axes.
+    """A joystick read through SDL. As on Linux, its hats are reported as additional axes after the other axes.
 
     Raise DeviceError if the joystick cannot be opened.
     """
@@ -172,7 +171,7 @@ class PygameDevice:
             ) from None
         self._pygame: Any = pygame
         pygame.init()
-        # Initialize again, to find a joystick that was plugged in since the last initialization.
+        # Reinitialize, to find a joystick plugged in since the last initialization.
         pygame.joystick.quit()
         pygame.joystick.init()
         count = pygame.joystick.get_count()
@@ -184,7 +183,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event, or None after ``seconds`` without one. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None after ``seconds`` without an event. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()
@@ -201,7 +200,7 @@ class PygameDevice:
         return self._events.pop(0)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
+        """Run both motors for one second at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
         if not self._joystick.rumble(min(max(strong, 0.0), 1.0), min(max(weak, 0.0), 1.0), 1000):
             raise RumbleError("the joystick has no motors that SDL knows")
 
@@ -230,7 +229,7 @@ class PygameDevice:
 def state_events(
     before: Sequence[tuple[int, int, int]], after: Sequence[tuple[int, int, int]]
 ) -> list[Event]:
-    """Return the events that lead from state ``before`` to ``after``, or the initial events if ``before`` is empty."""
+    """Return the events that change state ``before`` to ``after``, or the initial events if ``before`` is empty."""
     if not before:
         return [Event(kind | EVENT_INIT, number, value) for kind, number, value in after]
     return [Event(*each) for old, each in zip(before, after, strict=True) if old != each]

@@ -24,11 +24,11 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2  # maximum seconds until the node notices a shutdown
+_LOOK_SECONDS = 0.2  # maximum delay before the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-# seconds after which to restart the motors: half the time for which the device runs them per command
+# Seconds between motor commands: half the time for which the device runs the motors per command.
 _RUMBLE_SECONDS = 0.5
 
 
@@ -109,7 +109,7 @@ class JoyNode:
                 device.close()
 
     def _open(self) -> Device | None:
-        """Wait until the device can be opened, and return it; return None at shutdown."""
+        """Wait until the device can be opened and return it; return None at shutdown."""
         is_first = True
         while not rospy.is_shutdown():
             try:
@@ -195,7 +195,7 @@ class JoyNode:
 
 
 class Motors:
-    """The motors, in the state requested on `joy/set_feedback`.
+    """The joystick's motors, in the state requested on `joy/set_feedback`.
 
     As in the real node, they run until a message changes that state.
     """
@@ -206,7 +206,7 @@ class Motors:
         self._again = 0.0
 
     def set(self, message: JoyFeedbackArray) -> None:
-        """Process a message: use the last intensity (0 to 1) for each motor, and ignore other feedback."""
+        """Process a message: use each motor's last intensity (0 to 1) and ignore other feedback."""
         strong, weak = self._wanted
         for each in message.array:
             if each.type == JoyFeedback.TYPE_RUMBLE and not math.isnan(each.intensity):
@@ -214,7 +214,7 @@ class Motors:
         self._wanted = strong, weak
 
     def run(self, device: Device, now: float) -> None:
-        """Apply the requested state to the device; restart the motors before the device stops them. ``now`` is in seconds."""
+        """Apply the requested state; restart the motors before the device stops them. ``now`` is in seconds."""
         wanted = self._wanted
         if wanted == self._running and (wanted == (0.0, 0.0) or now < self._again):
             return

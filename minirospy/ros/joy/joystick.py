@@ -12,14 +12,14 @@ from typing import NamedTuple
 __all__ = ["EVENT_AXIS", "EVENT_BUTTON", "EVENT_INIT", "Event", "Joystick", "JoystickOptions"]
 
 EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
-"""Event types from Linux's struct js_event, also used by the other backends."""
+"""Event types from Linux's struct js_event, which the other backends also use."""
 
 MAX_VALUE = 32767.0
-_FIRST_SECONDS = 1.0  # seconds between opening the device and the first repetition, as in the real node
+_FIRST_SECONDS = 1.0  # seconds from opening the device to the first repetition, as in the real node
 
 
 class Event(NamedTuple):
-    """A change: ``type`` is one of EVENT_*, ``number`` the index of the button or axis, ``value`` 0 or 1, or -32767 to 32767."""
+    """A change of a button or axis. ``type``: EVENT_*; ``number``: its index; ``value``: 0 or 1, or -32767 to 32767."""
 
     type: int
     number: int
@@ -28,7 +28,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class JoystickOptions:
-    """The node's parameters: ``deadzone`` is a fraction of an axis's range, rates are in Hz (0: none), intervals in seconds."""
+    """The node's parameters. ``deadzone`` is a fraction of an axis's range, rates are in Hz (0: none), intervals in seconds."""
 
     deadzone: float = 0.05
     autorepeat_rate: float = 0.0
@@ -37,7 +37,7 @@ class JoystickOptions:
     sticky_buttons: bool = False
 
     def checked(self) -> tuple[JoystickOptions, list[str]]:
-        """Return the options clamped to their limits, and the real node's warning for each clamped option."""
+        """Return the options clamped to their limits, and the real node's warnings about clamped options."""
         warnings = []
         deadzone, rate, interval = self.deadzone, self.autorepeat_rate, self.coalesce_interval
         if interval and rate > 1 / interval:
@@ -70,7 +70,7 @@ class JoystickOptions:
 
 
 class Joystick:
-    """A device's state since it was opened."""
+    """Tracks a device's state from its events."""
 
     def __init__(self, options: JoystickOptions, now: float) -> None:
         self._options = options
@@ -125,7 +125,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # A trigger reports 0 until it is moved, although its rest position is 1.
+        # A trigger reports 0 until it is moved, although its value at rest is 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = MAX_VALUE * self._options.deadzone

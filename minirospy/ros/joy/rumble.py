@@ -19,9 +19,9 @@ _EV_FF = 0x15
 _FF_RUMBLE = 0x50
 _FF_GAIN = 0x60
 _MAX_MAGNITUDE = 0xFFFF
-_MILLISECONDS = 1000  # duration of an effect; joy_node restarts the effect before it ends
+_MILLISECONDS = 1000  # effect duration; joy_node restarts the effect before it ends
 
-# Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16, the union with the two magnitudes.
+# struct ff_effect: type, ID, direction, trigger (2), replay (length, delay); both magnitudes at byte 16.
 _EFFECT = struct.Struct("=HhHHHHHxxHH")
 _EFFECT_SIZE = 48 if struct.calcsize("P") == 8 else 44
 _EVIOCSFF = 0x40004580 | _EFFECT_SIZE << 16
@@ -48,7 +48,7 @@ def pack_effect(number: int, strong: float, weak: float) -> bytes:
 
 
 def pack_event(code: int, value: int) -> bytes:
-    """Return a struct input_event that plays the effect ``code``, or sets the gain."""
+    """Return a struct input_event that plays the effect ``code`` or sets the gain."""
     return struct.pack("@llHHi", 0, 0, _EV_FF, code, value)
 
 
@@ -69,7 +69,7 @@ class Rumble:
             raise self._error(error) from error
 
     def play(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power."""
+        """Run both motors for one second at 0 to 1 of full power."""
         try:
             self._upload(self._number, (strong, weak))
             os.write(self._file, pack_event(self._number, 1))
@@ -77,7 +77,7 @@ class Rumble:
             raise self._error(error) from error
 
     def close(self) -> None:
-        """Close the device; closing it stops its motors."""
+        """Close the device, which also stops its motors."""
         os.close(self._file)
 
     def _upload(self, number: int, magnitudes: Sequence[float]) -> int:

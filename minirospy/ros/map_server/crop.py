@@ -25,7 +25,7 @@ __all__ = ["crop", "main"]
 def crop(
     image: NDArray[np.uint8], resolution: float, origin: tuple[float, float, float]
 ) -> tuple[NDArray[np.uint8], tuple[float, float, float]]:
-    """Return the smallest part of an image (rows from the top) that contains all known cells, and the origin of that part.
+    """Crop an image (rows from the top) to the smallest part with all known cells; return that part and its origin.
 
     Raise MapError if there are no known cells.
     """

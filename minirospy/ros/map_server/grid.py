@@ -44,7 +44,7 @@ class MapError(MinirospyError):
 
 
 class Mode(Enum):
-    """The conversion of gray levels to occupancies."""
+    """How to convert gray levels to occupancy."""
 
     TRINARY = "trinary"
     SCALE = "scale"
@@ -52,7 +52,7 @@ class Mode(Enum):
 
 
 class MapSettings(NamedTuple):
-    """The fields in a map's YAML file: metres per pixel; the lower left corner's x, y (metres) and yaw (radians)."""
+    """A map's YAML fields: resolution in m/pixel; origin: x, y (m) and yaw (rad) of the lower left corner; thresholds."""
 
     image: str
     resolution: float
@@ -64,10 +64,9 @@ class MapSettings(NamedTuple):
 
 
 def read_settings(text: str) -> MapSettings:
-    """Return the settings in a map's YAML file. If they are invalid, raise MapError with the real program's message."""
+    """Return the settings in a map's YAML file. If they are invalid, raise MapError with the message that ROS prints."""
     try:
-        # Load all scalars as strings.
-        # yaml-cpp differs from YAML 1.1: it accepts `1e-3` as a number and rejects `false`.
+        # Load all scalars as strings: yaml-cpp, unlike YAML 1.1, reads `1e-3` as a number and rejects `false`.
         found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -126,13 +125,13 @@ def _finite(text: str) -> float:
 
 
 def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
-    """Convert an image to occupancies from 0 to 100 (-1: unknown), row by row from the bottom.
+    """Convert an image to occupancy values from 0 to 100 (-1: unknown), row by row from the bottom.
 
     In mode raw, return the grey levels.
     """
     values, has_alpha = pixels
     channels = values.shape[2]
-    # In trinary mode the alpha channel counts as another color, as in the real program.
+    # In trinary mode, the alpha channel counts as another color, as in ROS.
     averaged = channels - 1 if has_alpha and settings.mode is not Mode.TRINARY else channels
     grey = values[..., :averaged].sum(axis=2, dtype=np.float64) / averaged
     if settings.negate:
@@ -155,13 +154,13 @@ def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
 
 
 def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
-    """Return z and w of the quaternion for a rotation about z, in 32-bit floats as in the real program's library."""
+    """Return z and w of the quaternion for a rotation about z, in 32-bit floats as in ROS."""
     half = np.float32(yaw) * np.float32(0.5)
     return float(np.sin(half)), float(np.cos(half))
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians. Like tf2's getEulerYPR, return 0 if the pitch is +/-90 degrees.
+    """Return a quaternion's yaw in radians. Like tf2's getEulerYPR, return 0 if the pitch is +/-90 degrees.
 
     Also return 0 for the unset quaternion 0, 0, 0, 0. The real program writes `-nan`, which no map_server can read.
     """
@@ -178,7 +177,7 @@ def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
 def pgm_of_grid(
     data: Sequence[int], width: int, height: int, resolution: float, occupied: int, free: int
 ) -> bytes:
-    """Convert a grid to a PGM image. Cells up to ``free`` are free, cells from ``occupied`` are occupied.
+    """Convert a grid to a PGM image. Cells up to ``free`` count as free, cells from ``occupied`` as occupied.
 
     Raise MapError if the grid is invalid.
     """
@@ -194,7 +193,7 @@ def pgm_of_grid(
 
 
 def yaml_of_map(image: str, resolution: float, origin: tuple[float, float, float]) -> str:
-    """Return the text of the YAML file for a map saved by map_saver."""
+    """Return the text of the YAML file for a map that map_saver saves."""
     x, y, yaw = origin
     return (
         f"image: {image}\nresolution: {resolution:f}\norigin: [{x:f}, {y:f}, {yaw:f}]\nnegate: 0\n"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CELLS", "ImageError", "Pixels", "read_image"]
 
-# maximum number of cells in a map: a message has at most 4 GiB, the size of 2**30 pixels with 4 channels
+# Maximum cells in a map: a message has at most 4 GiB, the size of 2**30 pixels with 4 channels.
 MAX_CELLS = 2**30
 
 _HEADER_NUMBER = re.compile(rb"(?:\s|#[^\n]*\n)*(\d+)")
@@ -34,7 +34,7 @@ class ImageError(MinirospyError):
 
 
 class Pixels(NamedTuple):
-    """An image's bytes with shape (rows from the top, columns, channels), and whether the last channel is alpha."""
+    """An image's bytes, with shape (rows from the top, columns, channels), and whether the last channel is alpha."""
 
     values: NDArray[np.uint8]
     has_alpha: bool
@@ -89,7 +89,7 @@ def _exactly(data: bytes, count: int) -> NDArray[np.uint8]:
 
 
 def _plain_values(data: bytes, count: int, *, is_bits: bool) -> NDArray[np.uint8]:
-    """Parse numbers in plain text. Missing numbers at the end are 0, as in the real program."""
+    """Parse numbers in plain text. Missing trailing numbers become 0, as in ROS."""
     text = _COMMENT.sub(b"", data)
     words = [each for each in text if each in b"01"] if is_bits else text.split()
     try:
@@ -134,7 +134,7 @@ def _pixels_of(image: Image.Image) -> Pixels:
     if image.mode == "1":
         return Pixels(_array(image.convert("L"))[..., None], has_alpha=False)
     colours = _array(image.convert("RGB"))
-    # Mode `scale` uses the last channel as alpha, even if it is a color.
+    # Mode `scale` uses the last channel as alpha, even if it contains a color.
     return Pixels(colours[..., ::-1] if image.format in _REVERSED_FORMATS else colours, has_alpha=False)
 
 
@@ -142,7 +142,7 @@ def _has_alpha(image: Image.Image) -> bool:
     if image.mode in ("LA", "RGBA", "PA", "La", "RGBa"):
         return True
     transparency = image.info.get("transparency")
-    # SDL_image keeps the palette indices if exactly one color is transparent.
+    # SDL_image keeps palette indices if exactly one color is transparent.
     return isinstance(transparency, bytes) and not (
         set(transparency) <= {0, 255} and transparency.count(0) < 2
     )

@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The file name without suffix, and the thresholds: minimum occupancy of occupied cells, maximum of free cells."""
+    """The file name without suffix, the minimum occupancy of occupied cells, and the maximum of free cells."""
 
     name: str = "map"
     occupied: int = 65
@@ -35,7 +35,7 @@ class SaverOptions(NamedTuple):
 
 
 def parse_options(words: Sequence[str]) -> SaverOptions | None:
-    """Return the options, or None for ``-h``. Raise UsageError if the options are invalid, with a message if ROS has one."""
+    """Return the options, or None for ``-h``. Raise UsageError (with ROS's message, if any) if they are invalid."""
     options = SaverOptions()
     rest = iter(words)
     for word in rest:
@@ -56,7 +56,7 @@ def parse_options(words: Sequence[str]) -> SaverOptions | None:
 
 
 def _threshold(text: str, name: str, least: int) -> int:
-    # As in C's atoi, ignore characters after the digits; without digits the value is 0.
+    # Like C's atoi, ignore characters after the digits; without digits, the value is 0.
     match = re.match(r"\s*[+-]?\d+", text)
     value = int(match[0]) if match else 0
     if not least <= value <= 100:
@@ -72,7 +72,7 @@ def main() -> int:
         if not str(error):
             print(_USAGE)
             return 1
-        # Print to stderr instead of logging: no node is running yet, and a master must not be needed to report this error.
+        # Print to stderr instead of logging: no node is running yet, and reporting this error must not require a master.
         print(f"map_saver: ERROR: {error}", file=sys.stderr)
         return 1
     if options is None:

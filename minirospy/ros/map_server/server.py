@@ -104,7 +104,7 @@ def settings_of_file(name: str) -> MapSettings:
 
 
 def load_map(settings: MapSettings) -> OccupancyGrid:
-    """Return a map whose frame and times are not set. Raise MapError if the map cannot be loaded."""
+    """Return a map without frame and times. Raise MapError if the map cannot be loaded."""
     rospy.loginfo('Loading map from image "%s"', settings.image)
     try:
         pixels = read_image(Path(settings.image).read_bytes())
@@ -142,7 +142,7 @@ class MapServer:
 
     def _show(self, settings: MapSettings) -> None:
         grid = load_map(settings)
-        # In simulated time, wait for the first clock message; otherwise the map's time stamp would be zero.
+        # In simulated time, wait for the first clock message; otherwise, the map's timestamp would be zero.
         while not rospy.Time.now() and not rospy.is_shutdown():
             time.sleep(_CLOCK_SECONDS)
         grid.info.map_load_time = rospy.Time.now()

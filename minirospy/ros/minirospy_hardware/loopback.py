@@ -21,7 +21,7 @@ __all__ = ["main"]
 
 
 def main() -> int:
-    """Run the node until it shuts down; return the exit status: 1 if a parameter is invalid."""
+    """Run the node until it shuts down; return 1 if a parameter is invalid, else 0."""
     rospy.init_node("loopback")
     try:
         rate = rospy.get_param("~rate", 100.0)
@@ -55,7 +55,7 @@ def _hardware() -> LoopbackHardware:
 
 
 def _mapping(name: str, kinds: tuple[type, ...], meaning: str) -> dict[str, Any]:
-    """Return a private parameter that must be a dictionary. Raise HardwareError if it has another type."""
+    """Return a private parameter that must be a dictionary. Raise HardwareError if it is not."""
     value = rospy.get_param(f"~{name}", {})
     if not isinstance(value, dict) or not all(isinstance(each, kinds) for each in value.values()):
         raise HardwareError(f"parameter ~{name} must be a map {meaning}, not {value!r}")

@@ -13,7 +13,7 @@ NAME = "robot_description"
 
 
 class DescriptionError(MinirospyError):
-    """Raised if the parameter contains no valid robot. ``lines`` are the messages that ROS's parser prints."""
+    """Raised if the parameter does not contain a valid robot. ``lines`` are the messages that ROS's parser prints."""
 
     def __init__(self, *lines: str) -> None:
         super().__init__(*lines)
@@ -24,7 +24,7 @@ class DescriptionError(MinirospyError):
 
 
 def robot_of_parameter(name: str = NAME) -> Robot:
-    """Build the robot from the description in a parameter, searching from the node's namespace upwards.
+    """Build the robot from a parameter's description, searching from the node's namespace upwards.
 
     Raise DescriptionError if the parameter is not set, or the description is invalid.
     """

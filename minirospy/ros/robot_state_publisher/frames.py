@@ -16,7 +16,7 @@ __all__ = ["LinkPose", "RobotFrames", "prefixed"]
 
 
 class LinkPose(NamedTuple):
-    """The pose of frame ``child`` in frame ``parent``."""
+    """The pose of frame ``child`` relative to frame ``parent``."""
 
     parent: str
     child: str
@@ -24,7 +24,7 @@ class LinkPose(NamedTuple):
 
 
 class RobotFrames:
-    """A robot's moving and fixed frames, each ordered by joint name.
+    """A robot's moving and fixed frames, both ordered by joint name.
 
     Planar joints are treated as fixed, as in KDL. Floating joints have no frame, because a JointState cannot contain
     their pose.
@@ -47,11 +47,11 @@ class RobotFrames:
         return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
 
     def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
-        """Yield the poses of links whose joints have a position in the message, or mimic a joint that has one."""
+        """Yield the poses of links whose joints have a position in the message or mimic such a joint."""
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }
-        # Repeat, because a joint may mimic a joint that mimics another one.
+        # Repeat, because a joint may mimic another mimic joint.
         waiting = {name: mimic for name, mimic in self._mimics.items() if name not in known}
         while found := [name for name, mimic in waiting.items() if mimic.joint in known]:
             for name in found:
@@ -62,12 +62,12 @@ class RobotFrames:
             yield LinkPose(segment.joint.parent, segment.joint.child, segment.pose(known[name]))
 
     def unknown(self, names: Mapping[str, float]) -> list[str]:
-        """Return the names that are not joints in the robot, sorted."""
+        """Return the names that are not joints of the robot, sorted."""
         return sorted(names.keys() - self._names)
 
 
 def prefixed(prefix: str, frame: str) -> str:
-    """Add the tf_prefix to a frame's name. If the name starts with a slash, only remove the slash."""
+    """Add the tf_prefix to a frame's name; if the name starts with a slash, only remove the slash."""
     if frame.startswith("/"):
         return frame[1:]
     return f"{prefix.removeprefix('/')}/{frame}" if prefix else frame

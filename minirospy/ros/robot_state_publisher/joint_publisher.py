@@ -23,12 +23,12 @@ _CONNECT_SECONDS = 0.5
 
 
 def main() -> int:
-    """Run the node until it shuts down; return the exit status, 1 if there are no joints to publish."""
+    """Run the node until it shuts down; return 1 if there are no joints to publish, else 0."""
     return run_node("joint_state_publisher", lambda: JointPublisher().loop())
 
 
 def run_node(name: str, body: Callable[[], object]) -> int:
-    """Initialize a node and run ``body``; return the exit status. After a JointError, log the error and return 1."""
+    """Initialize a node and run ``body``; return the exit status. On a JointError, log the error and return 1."""
     try:
         rospy.init_node(name)
         body()
@@ -41,7 +41,7 @@ def run_node(name: str, body: Callable[[], object]) -> int:
 
 
 def param(name: str, default: object = None) -> object:
-    """Return a private parameter, else the one in the node's namespace, else the default."""
+    """Return a parameter's private value, else its value in the node's namespace, else the default."""
     for key in (f"~{name}", name):
         if rospy.has_param(key):
             return rospy.get_param(key)
@@ -49,13 +49,13 @@ def param(name: str, default: object = None) -> object:
 
 
 class JointPublisher:
-    """Publishes the joint states, and subscribes to the topics in source_list. Raise JointError if the parameters are invalid.
+    """Publishes the joint states and subscribes to the topics in source_list. Raise JointError if a parameter is invalid.
 
     ``on_update`` is called after each message from a source.
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        # Read both trees, because a joint missing from the private tree may be in the other.
+        # Read both trees: a joint missing from the private tree may be in the other one.
         zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
         found = read_parameters(param, zeros)
         self.lock = threading.Lock()
@@ -77,7 +77,7 @@ class JointPublisher:
                 pass
 
     def publish(self) -> None:
-        """Publish the state of all joints; do nothing if there are no joints."""
+        """Publish the state of all joints, if there are any."""
         with self.lock:
             if self._delta > 0:
                 self.joints.advance(self._delta)

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 _QUIT = ("q", "\x04")
-_OTHER_LINES = 6  # number of screen lines without sliders: the frame, the hint and the shell prompt
+_OTHER_LINES = 6  # number of screen lines besides the sliders: the frame, the hint and the shell prompt
 
 
 def main() -> int:
-    """Run the node until it shuts down or `q` is pressed; return the exit status, 1 if there are no joints."""
+    """Run the node until it shuts down or `q` is pressed; return 1 if there are no joints, else 0."""
     return run_node("joint_state_publisher_gui", _run)
 
 

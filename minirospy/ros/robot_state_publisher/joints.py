@@ -28,12 +28,12 @@ _SETTLED = ("fixed", "floating", "planar")
 
 
 class JointError(MinirospyError):
-    """Raised if the joints cannot be determined. The message is one line that names the joint and the reason."""
+    """Raised if the joints cannot be determined. The message is one line with the joint and the reason."""
 
 
 @dataclass
 class FreeJoint:
-    """An adjustable joint, in radians or metres. Values that are None are not published."""
+    """An adjustable joint; positions are in radians or metres. None values are not published."""
 
     lower: float
     upper: float
@@ -45,7 +45,7 @@ class FreeJoint:
     is_rising: bool = True
 
     def advance(self, step: float) -> None:
-        """Move by ``step``, reversing at the limits; a continuous joint wraps around instead."""
+        """Move by ``step``, reversing at the limits. A continuous joint wraps around instead."""
         position = self.zero if self.position is None else self.position
         if self.is_rising:
             position += step
@@ -61,7 +61,7 @@ class FreeJoint:
 
 @dataclass(frozen=True)
 class Dependent:
-    """A joint whose position is ``factor * position of parent + offset``."""
+    """A mimic joint: its position is ``factor * position of parent + offset``."""
 
     parent: str
     factor: float = 1.0
@@ -70,7 +70,7 @@ class Dependent:
 
 @dataclass(frozen=True)
 class JointOptions:
-    """joint_state_publisher's parameters that determine the joints. The fields have the parameters' names."""
+    """joint_state_publisher's parameters that select and configure joints. The fields have the parameters' names."""
 
     dependent_joints: Mapping[str, Dependent] = field(default_factory=dict)
     use_mimic_tags: bool = True
@@ -83,7 +83,7 @@ class JointOptions:
 
 @dataclass
 class StateValues:
-    """The lists in a JointState: position, velocity and effort."""
+    """The lists in a JointState message: position, velocity and effort."""
 
     name: list[str]
     position: list[float]
@@ -92,7 +92,7 @@ class StateValues:
 
 
 class JointStates:
-    """The joints, in the order of the robot description.
+    """The robot's joints, in the order of its description.
 
     ``free``: the joints that the user can move; all others mimic another joint.
     """
@@ -106,9 +106,9 @@ class JointStates:
         self._has_dependent = bool(dependent)
 
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
-        """Return a joint's dependency on an adjustable joint. Raise JointError if the dependencies form a cycle."""
+        """Return the adjustable joint that a joint mimics, with factor and offset. Raise JointError if joints form a cycle."""
         if name not in dependent:
-            # The joint has no limits and was omitted with a warning. Its parent is "", which does not exist.
+            # The joint has no limits and was omitted with a warning. The parent "" does not exist.
             return Dependent("")
 
         rule = dependent[name]
@@ -134,7 +134,7 @@ class JointStates:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> None:
-        """Set joints from another node's JointState. If one of its lists is shorter, the remaining values stay unchanged."""
+        """Set joints from another node's JointState. Values missing at the end of a list stay unchanged."""
         for number, name in enumerate(names):
             joint = self.free.get(name)
             if joint is None:
@@ -152,7 +152,7 @@ class JointStates:
             joint.advance(step)
 
     def values(self) -> StateValues:
-        """Return the lists to publish; a list is empty if no joint has a value for it."""
+        """Return the lists to publish. A list is empty if no joint has a value for it."""
         joints = self.free.values()
         has_position = self._has_dependent or any(joint.position is not None for joint in joints)
         has_velocity = any(joint.velocity is not None for joint in joints)
@@ -173,7 +173,7 @@ class JointStates:
 
 
 def read_joints(text: str, options: JointOptions, warn: Callable[[str], object]) -> JointStates:
-    """Return a description's joints; call ``warn`` with a line for each omitted joint and each fault in the XML.
+    """Return a description's joints; call ``warn`` with a line for each omitted joint and each XML fault.
 
     Raise JointError if the description is invalid.
     """
@@ -260,14 +260,14 @@ def _number(element: Element, name: str, default: float) -> float:
 
 
 def _below(element: Element) -> Iterator[Element]:
-    """Yield an element and all its descendants in document order."""
+    """Yield an element and all its descendants, in document order."""
     yield element
     for child in element.children:
         yield from _below(child)
 
 
 def _collada_joints(root: Element, warn: Callable[[str], object]) -> dict[str, FreeJoint]:
-    """Return the revolute joints in a COLLADA description. COLLADA's limits are in degrees."""
+    """Return the revolute joints in a COLLADA description, whose limits are in degrees."""
     models = [each for each in _below(root) if each.tag == "kinematics_model"]
     techniques = [each for model in models[:1] for each in _below(model) if each.tag == "technique_common"]
     found = {}

@@ -19,7 +19,7 @@ _MOVES = {"up": -1, "down": 1, "k": -1, "j": 1}
 
 
 class Row(NamedTuple):
-    """A joint's line: the name, the bar, the position with the limits, and whether the joint is selected."""
+    """A joint's screen line: its name, bar, position and limits, and whether it is selected."""
 
     name: str
     bar: str
@@ -28,7 +28,7 @@ class Row(NamedTuple):
 
 
 class Sliders:
-    """The adjustable joints. One of them is selected. ``random_`` generates random positions."""
+    """Sliders for the adjustable joints, one of them selected. ``random_`` generates random positions."""
 
     def __init__(self, joints: Mapping[str, FreeJoint], random_: random.Random | None = None) -> None:
         self._joints = joints
@@ -64,7 +64,7 @@ class Sliders:
         joint.position = min(max(position, joint.lower), joint.upper)
 
     def rows(self, most: int, width: int = 24) -> list[Row]:
-        """Return up to ``most`` joints around the selected one; a bar is ``width`` characters wide."""
+        """Return the lines for up to ``most`` joints around the selected one; a bar has ``width`` characters."""
         first = min(max(self._selected - most // 2, 0), max(len(self._names) - most, 0))
         return [
             self._row(name, width, number == self._selected)

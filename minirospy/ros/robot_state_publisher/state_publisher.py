@@ -24,16 +24,16 @@ from minirospy.ros.robot_state_publisher.frames import LinkPose, RobotFrames, pr
 __all__ = ["StatePublisher", "main"]
 
 _AHEAD = rospy.Duration(0, 500_000_000)
-"""Fixed frames on /tf are stamped this far in the future, so that they stay valid until the next message."""
+"""How far in the future to stamp fixed frames on /tf, so that they stay valid until the next message."""
 
 _OLD = rospy.Duration(30)
 _CONNECT_SECONDS = 0.5
-# seconds to cache tf_prefix; ROS instead queries the master for each message
+# Seconds to cache tf_prefix. ROS instead queries the master for each message.
 _PREFIX_SECONDS = 1.0
 
 
 def main(name: str = "robot_state_publisher") -> int:
-    """Run the node until it shuts down; return the exit status, 1 if there is no robot."""
+    """Run the node until it shuts down; return 1 if there is no robot, else 0."""
     try:
         rospy.init_node(name)
         robot = robot_of_parameter()
@@ -50,7 +50,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Warn, in ROS's words, about features of a robot that frames cannot express."""
+    """Warn, with ROS's texts, about features of a robot that frames cannot express."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -97,7 +97,7 @@ class StatePublisher:
         )
 
     def publish(self, state: JointState) -> None:
-        """Publish the frames for a joint state, unless they were published less than a period ago."""
+        """Publish a joint state's frames, unless the last ones were published less than a period ago."""
         if not self._is_valid(state):
             return
         now = rospy.Time.now()
@@ -114,7 +114,7 @@ class StatePublisher:
         last = min((self._published.get(name, rospy.Time()) for name in state.name), default=now)
         if not self._ignores_stamps and stamp < min(last, now) + self._period:
             return
-        # As in ROS, use the first position if a joint is named twice.
+        # As in ROS, use the first position of a joint that is listed twice.
         positions = dict(zip(reversed(state.name), reversed(state.position), strict=True))
         for name in self._frames.unknown(positions):
             rospy.logwarn_throttle(10, f'Joint state with name: "{name}" was received but not found in URDF')

@@ -26,13 +26,13 @@ def migration_verbs() -> tuple[Verb, ...]:
 
 
 def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
-    """Return a dict of the programs that migrate messages, keyed by name."""
+    """Map the names of the migration programs to the programs."""
     module = _module("scripts")
     return module.SCRIPTS if module else {}
 
 
 def _module(name: str) -> ModuleType | None:
-    """Return a module of the migration, or None if it has been deleted."""
+    """Return a migration module, or None if it has been deleted."""
     try:
         return importlib.import_module(f"{_MIGRATION}.{name}")
     except ModuleNotFoundError as error:

@@ -16,18 +16,18 @@ from minirospy.ros.roslaunch.roslaunch.core import RLException
 __all__ = ["DeadProcess", "OwnProcesses", "Process", "ProcessListener"]
 
 _BAR = "=" * 80
-_POLL_SECONDS = 0.1  # between checks of the processes
+_POLL_SECONDS = 0.1  # seconds between checks of the processes
 
 
 class ProcessListener:
-    """The base class for objects that are notified when processes exit."""
+    """Base class for objects to notify when processes exit."""
 
     def process_died(self, process_name: str, exit_code: int) -> None:
-        """Handle the exit of a process; called in one of roslaunch's threads."""
+        """Handle a process's exit. Called in one of roslaunch's threads."""
 
 
 class Process:
-    """A process that a ProcessMonitor watches. Programs override start(), stop() and is_alive()."""
+    """A process watched by a ProcessMonitor. Programs override start(), stop() and is_alive()."""
 
     def __init__(
         self,
@@ -49,14 +49,14 @@ class Process:
 
         self.lock = threading.Lock()
         self.exit_code: int | None = None
-        self.spawn_count = 0  # number of times the process was started
+        self.spawn_count = 0  # number of starts
         self.time_of_death: float | None = None  # time.time() when the process exited
 
     def __str__(self) -> str:
         return f"Process<{self.name}>"
 
     def get_info(self) -> dict[str, object]:
-        """Return the process's details."""
+        """Return a dict of the process's details."""
         keys = (
             "spawn_count",
             "args",
@@ -85,16 +85,16 @@ class Process:
         return False
 
     def should_respawn(self) -> float | bool:
-        """Return the seconds until the process may be restarted, or False if it must not be restarted."""
+        """Return the seconds until the process may restart, or False if it must not restart."""
         if not self.respawn:
             return False
         return (self.time_of_death or time.time()) + self.respawn_delay - time.time()
 
     def stop(self, errors: list[str] | None = None) -> None:
-        """Terminate the process; append descriptions of errors to ``errors``."""
+        """Terminate the process; append error descriptions to ``errors``."""
 
     def get_exit_description(self) -> str:
-        """Return a description of how the process exited."""
+        """Describe how the process exited."""
         if self.exit_code is None:
             return "process has died"
         return (
@@ -105,7 +105,7 @@ class Process:
 
 
 class DeadProcess(Process):
-    """A process that has exited, in a monitor's ``dead_list``."""
+    """An exited process in a monitor's ``dead_list``."""
 
     def __init__(self, p: Process) -> None:
         super().__init__(p.package, p.name, p.args, p.env, p.respawn, p.respawn_delay, p.required)
@@ -113,7 +113,7 @@ class DeadProcess(Process):
         self.lock = p.lock
 
     def start(self) -> bool:
-        """Raise RLException: a process that has exited cannot be started."""
+        """Raise RLException: an exited process cannot be started."""
         raise RLException("call to start on dead process!")
 
     def is_alive(self) -> bool:
@@ -122,7 +122,7 @@ class DeadProcess(Process):
 
 
 class OwnProcesses:
-    """The processes that a program has added to a ProcessMonitor. A thread polls them, and restarts those that respawn."""
+    """The processes that a program added to a ProcessMonitor. A thread polls them and restarts those that respawn."""
 
     def __init__(
         self,
@@ -132,35 +132,35 @@ class OwnProcesses:
         on_last_exit: Callable[[], None],
     ) -> None:
         self.watched: list[Process] = []
-        self.dead: list[Process] = []  # a DeadProcess for each process that has exited
+        self.dead: list[Process] = []  # a DeadProcess for each exited process
         self.lock = threading.RLock()  # guards the lists, the flags and the thread
-        self.is_stopping = False  # set when a shutdown is requested: start no more processes
+        self.is_stopping = False  # set at shutdown: start no more processes
         self.is_complete = False  # set if no more processes will be registered
-        self.thread: threading.Thread | None = None  # polls the processes; set by start()
+        self.thread: threading.Thread | None = None  # the polling thread, set by start()
         self._closing = threading.Event()
-        self._on_exit = on_exit  # called with a process's name and exit status
+        self._on_exit = on_exit  # called with an exited process's name and exit status
         self._on_required_exit = on_required_exit
-        self._on_last_exit = on_last_exit  # called at each poll when none is left and none will come
+        self._on_last_exit = on_last_exit  # called at each poll if no process is left or will come
 
     def start(self, name: str) -> None:
-        """Start the thread, with this name, if it is not running and there is a process to poll."""
+        """Start the polling thread with this name, unless it is running or there is no process."""
         with self.lock:
             if self.watched and self.thread is None:
                 self.thread = threading.Thread(target=self._run, name=name, daemon=True)
                 self.thread.start()
 
     def close(self, core: Sequence[Process]) -> None:
-        """Terminate the processes, those of ``core`` last, after the thread that restarts them has stopped."""
+        """Wait for the thread that restarts processes, then terminate all processes, those in ``core`` last."""
         with self.lock:
             self.is_stopping = True
             polling = self.thread
         self._closing.set()
-        # Wait without holding the lock: the thread calls methods of the program, which may use the monitor.
+        # Wait without holding the lock: the thread calls the program's methods, which may use the monitor.
         if polling and polling is not threading.current_thread():
             polling.join()
 
         errors: list[str] = []
-        # Terminate the core processes last, and the others in the reverse order of their registration.
+        # Terminate the core processes last, the others in reverse order of registration.
         others = [each for each in reversed(self.watched) if each not in core]
         for process in (*others, *(each for each in core if each in self.watched)):
             Output(title=False).print(f"[{process.name}] killing on exit")
@@ -203,7 +203,7 @@ class OwnProcesses:
             respawning.discard(process)
             Output(title=False).print(f"[{process.name}] restarting process")
             process.stop([])
-            # If the shutdown starts after this check, close() waits for start() and then terminates the process.
+            # If shutdown starts after this check, close() waits for start() and then terminates the process.
             if not self.is_stopping:
                 process.start()
         else:

@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 MAX_DEFAULT_NON_FLOW_ITEMS = (
-    4  # maximum number of entries in a dictionary or list; above it, flat values are printed in braces
+    4  # maximum entries in a dictionary or list; longer flat values are printed in braces
 )
 _USAGE_ERROR = getattr(os, "EX_USAGE", 1)
 _NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte", "char"}
@@ -54,9 +54,9 @@ class RosMsgProtoArgsException(Exception):
 
 
 class _Dumper(yaml.SafeDumper):
-    """Dumps objects that have `__slots__`, such as messages, as dictionaries."""
+    """Dumps objects with `__slots__`, such as messages, as dictionaries."""
 
-    keeps_order: ClassVar[bool] = False  # if False, the fields are sorted by name
+    keeps_order: ClassVar[bool] = False  # if False, fields are sorted by name
 
     def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> yaml.MappingNode:
         if self.keeps_order:
@@ -88,14 +88,14 @@ def dump(
                 field = _filled(value, name)
             if not inspect.ismethod(field) and not inspect.isfunction(field):
                 entries[name] = field
-        # PyYAML reads this attribute for each node that follows.
+        # PyYAML reads this attribute for each following node.
         if len(entries) > MAX_DEFAULT_NON_FLOW_ITEMS:
             dumper.default_flow_style = flow_style
         node: yaml.Node = dumper.represent_dict(entries)
         return node
 
     class Dumper(_Dumper):
-        """Writes messages, formatted according to one call's arguments."""
+        """Writes messages in the format that one call's arguments specify."""
 
     Dumper.add_representer(OrderedDict, yaml.SafeDumper.represent_dict)
     Dumper.add_representer(None, represent)  # type: ignore[arg-type]
@@ -106,14 +106,14 @@ def dump(
 
 
 def _filled(message: Any, name: str) -> list[object]:
-    """Return the value of an empty array with one default element added, or [] if the element's class is unknown."""
+    """Return an empty array's value with one default element, or [] if the element's class is unknown."""
     type_ = message._slot_types[message.__slots__.index(name)]
     element = get_array_type_instance(type_, default_package=message._type.partition("/")[0])
     return [] if element is None else [element]
 
 
 def get_array_type_instance(field_type: str, default_package: str | None = None) -> object:
-    """Return the default value of a type or of an array's elements, or None if the type's class does not exist."""
+    """Return the default value of a type or an array's elements, or None if the type's class does not exist."""
     from minirospy.ros.roslib.roslib.message import get_message_class
 
     base = field_type.strip().rstrip("[]")
@@ -129,12 +129,12 @@ def get_array_type_instance(field_type: str, default_package: str | None = None)
 
 
 def create_names_filter(names: Sequence[str]) -> Callable[[Any], list[str]]:
-    """Return a function that returns the names of a message's fields except ``names``."""
+    """Return a function that returns a message's field names except ``names``."""
     return lambda message: [each for each in message.__slots__ if each not in names]
 
 
 def init_rosmsg_proto() -> None:
-    """Make `get_yaml_for_msg` preserve the fields' order, like `rosmsg-proto`.
+    """Make `get_yaml_for_msg` preserve the field order, like `rosmsg-proto`.
 
     ROS's function also changes PyYAML for the whole process; with Python 3.10 or later, loading YAML then fails.
     """
@@ -142,7 +142,7 @@ def init_rosmsg_proto() -> None:
 
 
 def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> OrderedDict[Any, Any]:
-    """Convert a YAML node to an OrderedDict, for use as `construct_mapping` of a PyYAML loader."""
+    """Convert a YAML node to an OrderedDict; use as a PyYAML loader's `construct_mapping`."""
     if not isinstance(node, yaml.MappingNode):
         error = f"expected a mapping node, but found {node.id}"
         raise yaml.constructor.ConstructorError(None, None, error, node.start_mark)
@@ -160,7 +160,7 @@ def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> Order
 
 
 def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator[OrderedDict[Any, Any]]:
-    """Yield an OrderedDict, then fill it, for use as a PyYAML constructor."""
+    """Yield an OrderedDict, then fill it; use as a PyYAML constructor."""
     data: OrderedDict[Any, Any] = OrderedDict()
     yield data
     data.update(self.construct_mapping(node))
@@ -169,7 +169,7 @@ def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator
 def represent_ordered_mapping(
     self: Any, tag: str, mapping: Any, flow_style: bool | None = None
 ) -> yaml.MappingNode:
-    """Return the YAML node for a dictionary, in its order; for use as a PyYAML dumper's `represent_mapping`."""
+    """Return a dictionary's YAML node, in its order; use as a PyYAML dumper's `represent_mapping`."""
     pairs: list[tuple[yaml.Node, yaml.Node]] = []
     node = yaml.MappingNode(tag, pairs, flow_style=flow_style)
     if self.alias_key is not None:
@@ -184,7 +184,7 @@ def represent_ordered_mapping(
 
 
 def prototype(args: list[str] | None) -> str | None:
-    """Return the output of `rosmsg-proto` for these arguments, by default those of this process.
+    """Return the output of `rosmsg-proto` for these arguments (default: this process's).
 
     On an error, print it to stderr and exit; with ``-s``, return None.
     """
@@ -221,7 +221,7 @@ def prototype(args: list[str] | None) -> str | None:
 
 
 def _instance(mode: str, name: str) -> object:
-    """Return a message, or a service's request, with default values."""
+    """Return a message, or a service request, with default values."""
     from minirospy.ros.roslib.roslib.message import get_message_class, get_service_class
 
     if "/" not in name:
@@ -240,7 +240,7 @@ def _instance(mode: str, name: str) -> object:
 
 
 def _only_type(mode: str, name: str) -> str:
-    """Return the full name of the only type called ``name``."""
+    """Return the full name of the only type named ``name``."""
     from minirospy.base.errors import NotFoundError
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages

@@ -52,16 +52,16 @@ _LARGE, _MAX_LARGE = 16 * 1024, 100
 messages.
 """
 
-STEP_LETTERS = 1024  # characters of text to process per step; escaping one may take a microsecond
+STEP_LETTERS = 1024  # characters to process per step; escaping one may take a microsecond
 
 
 class RosoutNode:
-    """Republishes log messages with unchanged bytes. Runs on the event loop that starts the node."""
+    """Republishes log messages byte for byte, on the event loop that starts the node."""
 
     def __init__(
         self, environment: Environment, log_file: Path | None, omits_topics: Callable[[], bool]
     ) -> None:
-        """Create the node; ``omits_topics`` returns whether lines in the file omit the topics that the node publishes."""
+        """Create the node. ``omits_topics`` returns whether log file lines omit the node's published topics."""
         self.node = Node("/rosout", environment)
         self._log_file = log_file
         self._omits_topics = omits_topics
@@ -103,7 +103,7 @@ class RosoutNode:
     async def close(self) -> None:
         """Unregister from the master. Idempotent."""
         await self.node.close()
-        # Once its connection is closed, a pending read completes.
+        # A pending read completes once its connection is closed.
         while self._turns:
             await asyncio.sleep(0)
         self._limited_log.close()
@@ -153,7 +153,7 @@ class RosoutNode:
         for link in self._aggregated.links:
             if len(whole) <= _LARGE or link.waiting < _MAX_LARGE:
                 link.send(whole)
-            # Yield to the event loop: there may be many messages, and a large one takes time.
+            # Yield to the event loop, because there may be many or large messages.
             yield None
         if self._file:
             yield from self._write(self._file, body)
@@ -180,7 +180,7 @@ class RosoutNode:
         )
 
         parts: list[str] = []
-        # As in the real log file, keep line breaks in the message, but not in other fields.
+        # As in the real log file, keep line breaks only in the message.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
             for at in range(0, len(text), STEP_LETTERS):
                 parts.append(escaped(text[at : at + STEP_LETTERS], keep))
@@ -196,7 +196,7 @@ def _bytes_of(message: Message) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """Convert a Python logger's name to ROS's style (``ros`` and its children), as in roscpp nodes."""
+    """Convert a Python logger's name to roscpp's style: ``ros`` and its children."""
     return "ros" + name.removeprefix("minirospy")
 
 

@@ -27,12 +27,12 @@ _PLAIN = (bool, int, float)
 
 
 def plot_fields(val: object, f: str, field_filter: FieldFilter | None) -> str:
-    """Return the header line for a value's cells: `time,`, then each path below ``f``."""
+    """Return the header line for a value: `time,`, then each path below ``f``."""
     return f"time,{plot_field_cells(val, f, field_filter) or ''}"
 
 
 def plot_field_cells(val: object, f: str, field_filter: FieldFilter | None) -> str | None:
-    """Return the names of a value's cells, or None if the value has no cells."""
+    """Return the names of a value's CSV columns, or None if it has none."""
     return _joined(name for name, _ in _cells(val, f, None, field_filter))
 
 
@@ -45,7 +45,7 @@ def plot(
     fixed_numeric_width: int | None = None,
     value_transform: object = None,
 ) -> str:
-    """Return a value's line: the time in nanoseconds, then its cells.
+    """Return a value's CSV line: the time in nanoseconds, then its cells.
 
     The time is ``current_time``, else that of the message's header, else ROS's current time, minus ``time_offset``.
     ``type_information``, ``fixed_numeric_width`` and ``value_transform`` have no effect, as in ROS.
@@ -64,7 +64,7 @@ def plot(
 
 
 def plot_cells(val: object, time_offset: Time | None, field_filter: FieldFilter | None) -> str | None:
-    """Return the CSV cells of a value, or None if the value cannot be printed as CSV."""
+    """Return a value's CSV cells, or None if it cannot be printed as CSV."""
     return _joined(text for _, text in _cells(val, "", time_offset, field_filter))
 
 
@@ -76,7 +76,7 @@ def _joined(texts: Iterator[str]) -> str | None:
 def _cells(
     value: Any, path: str, time_offset: Time | None, field_filter: FieldFilter | None
 ) -> Iterator[tuple[str, str]]:
-    """Yield (path, text) for each cell."""
+    """Yield (path, text) for each CSV cell."""
     if type(value) in (*_PLAIN, str) or isinstance(value, TVal):
         yield path, _text(value, time_offset)
     elif hasattr(value, "_slot_types"):
@@ -86,7 +86,7 @@ def _cells(
                 field = convert_getattr(value, name, type_)
                 yield from _cells(field, f"{path}.{name}", time_offset, field_filter)
     elif type(value) in (list, tuple) and len(value):
-        # As in ROS, the type of the first element decides, so a list of lists has no cells.
+        # As in ROS, the first element's type decides: a list of lists has no cells.
         first = value[0]
         if type(first) in (*_PLAIN, str) or isinstance(first, TVal):
             for index, each in enumerate(value):
@@ -103,7 +103,7 @@ def _text(value: Any, time_offset: Time | None) -> str:
 
 
 def convert_getattr(val: object, f: str, t: str) -> Any:
-    """Return a field's value. Convert a string in a uint8[] field to a list of numbers."""
+    """Return a field's value; convert a string in a uint8[] field to a list of numbers."""
     value = getattr(val, f)
     return [ord(each) for each in value] if isinstance(value, str) and "uint8[" in t else value
 
@@ -114,7 +114,7 @@ def is_string_type(t: object) -> bool:
 
 
 def nested_attribute(msg: object, nested_attributes: str) -> Any:
-    """Return the attribute at a path such as `header/stamp`. Raise AttributeError if there is no such attribute."""
+    """Return the attribute at a path such as `header/stamp`. Raise AttributeError if it does not exist."""
     value: Any = msg
     for name in nested_attributes.split("/"):
         value = getattr(value, name)
@@ -122,7 +122,7 @@ def nested_attribute(msg: object, nested_attributes: str) -> Any:
 
 
 def array_index_or_slice(index_string: str) -> int | slice:
-    """Return the index or slice in a path's brackets, such as `1:3`. Raise AssertionError if the brackets are invalid."""
+    """Return the index or slice in a path's brackets, such as `1:3`. Raise AssertionError if they are invalid."""
     if not index_string:
         raise AssertionError("empty array index")
     words = index_string.split(":")
@@ -143,7 +143,7 @@ def array_index_or_slice(index_string: str) -> int | slice:
 
 
 def ascii_table(header: Sequence[str], cols: Mapping[str, list[Any]]) -> str:
-    """Return a table with a rule below the header row. As in ROS, pad the columns in ``cols`` in place."""
+    """Return a table with a line below the header row. As in ROS, pad the columns in ``cols`` in place."""
     widths = {name: max(len(name), *(len(each) for each in cols[name])) for name in header}
     for name in header:
         cols[name][:] = [str(each).ljust(widths[name]) for each in cols[name]]

@@ -35,9 +35,9 @@ __all__ = [
     "wait_for_subscriber",
 ]
 
-SUBSCRIBER_TIMEOUT = 5.0  # seconds after which stdin_publish publishes even without a subscriber
-_LATCH_SECONDS = 3.0  # seconds to keep running after publishing a single message, as in ROS
-_POLL_SECONDS = 0.05  # seconds between checks of a parameter's cached value
+SUBSCRIBER_TIMEOUT = 5.0  # seconds until stdin_publish publishes even without a subscriber
+_LATCH_SECONDS = 3.0  # seconds to run after publishing a single message, as in ROS
+_POLL_SECONDS = 0.05  # seconds between checks of a cached parameter value
 
 
 def publish_message(
@@ -49,7 +49,7 @@ def publish_message(
     verbose: bool = False,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish a message built from YAML values: ``rate`` times a second until shutdown, or once if there is no rate.
+    """Publish a message built from YAML values, ``rate`` times a second until shutdown, or once without a rate.
 
     Without a rate, return immediately if ``once``, else wait for shutdown. ``substitute_keywords``: replace `now` and
     `auto` in each message. Raise ROSTopicException if the values do not match the message's fields.
@@ -87,7 +87,7 @@ def publish_at_rate(
     substitute_keywords: bool = False,
     pub_args: Sequence[object] | None = None,
 ) -> None:
-    """Publish a message ``rate`` times a second until shutdown. Raise ROSTopicException if the rate is not a number."""
+    """Publish a message ``rate`` times a second until shutdown. Raise ROSTopicException if ``rate`` is not a number."""
     import rospy
 
     try:
@@ -104,7 +104,7 @@ def publish_at_rate(
 
 
 def publish_latched(pub: Publisher[Message], msg: Message, once: bool = False, verbose: bool = False) -> None:
-    """Publish a message; unless ``once``, wait for shutdown. Raise ROSTopicException if ``msg`` is not a message."""
+    """Publish a message and, unless ``once``, wait for shutdown. Raise ROSTopicException if ``msg`` is not a message."""
     import rospy
 
     try:
@@ -116,7 +116,7 @@ def publish_latched(pub: Publisher[Message], msg: Message, once: bool = False, v
 
 
 def fill_message(msg: Message, pub_args: Sequence[object] | None) -> None:
-    """Set a message's fields from YAML values. Raise ROSTopicException if the values do not match the fields."""
+    """Fill a message from YAML values. Raise ROSTopicException if they do not match the fields."""
     import rospy
     from std_msgs.msg import Header
 
@@ -140,7 +140,7 @@ def argv_publish(
     verbose: bool,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish values like those on the command line of `rostopic pub`. If ``once``, wait 3 seconds afterwards."""
+    """Publish values in the form of `rostopic pub`'s command line. If ``once``, wait 3 seconds afterwards."""
     import rospy
 
     publish_message(pub, msg_class, pub_args, rate, once, verbose, substitute_keywords)
@@ -150,7 +150,7 @@ def argv_publish(
 
 
 def wait_for_subscriber(pub: Publisher[Message], timeout: float) -> None:
-    """Wait until a publisher has a subscriber, for at most ``timeout`` seconds."""
+    """Wait up to ``timeout`` seconds for a publisher to have a subscriber."""
     import rospy
 
     end = time.monotonic() + timeout
@@ -166,7 +166,7 @@ def stdin_publish(
     filename: str | None,
     verbose: bool,
 ) -> None:
-    """Publish the YAML documents in a file, or on stdin if ``filename`` is empty.
+    """Publish the YAML documents from a file, or from stdin if ``filename`` is empty.
 
     If there is a ``rate`` and the file has only one document, publish that document repeatedly. Raise ROSTopicException if the
     file does not exist or is not valid YAML.
@@ -217,9 +217,9 @@ def file_yaml_arg(filename: str) -> Callable[[], Iterator[list[Any]]]:
 
 
 def stdin_yaml_arg() -> Iterator[Any]:
-    """Yield each YAML document on stdin; a line with three hyphens ends a document. Stop at the end of stdin or at shutdown."""
+    """Yield each YAML document on stdin, ended by a line with three hyphens. Stop at the end of stdin or at shutdown."""
     lines: list[str] = []
-    # Ignore a document without an end, which may be incomplete.
+    # Ignore a document without an end: it may be incomplete.
     for line in _lines_of_stdin():
         if line.strip() != "---":
             lines.append(line)
@@ -239,17 +239,17 @@ def _lines_of_stdin() -> Iterator[str]:
     import rospy
 
     if os.name == "nt":
-        # select() supports only sockets on Windows.
+        # On Windows, select() supports only sockets.
         while not rospy.is_shutdown() and (line := sys.stdin.readline()):
             yield line
         return
 
     encoding, descriptor = sys.stdin.encoding, sys.stdin.fileno()
-    started: list[bytes] = []  # parts of a line whose end has not arrived
+    started: list[bytes] = []  # parts of an incomplete line
     while not rospy.is_shutdown():
         if not select.select([descriptor], [], [], 1.0)[0]:
             continue
-        # Do not use readline(): select() does not see the lines that it buffers.
+        # Do not use readline(): select() does not see lines that it buffers.
         data = os.read(descriptor, 1 << 16)
         if not data:
             return
@@ -280,7 +280,7 @@ def param_publish(
     rate: float | None,
     verbose: bool,
 ) -> None:
-    """Publish a parameter's value until shutdown: ``rate`` times a second or, if ``rate`` is None, whenever the value changes.
+    """Publish a parameter's value until shutdown, ``rate`` times a second or, if ``rate`` is None, on each change.
 
     Raise ROSTopicException if the parameter is not set, or is neither a dictionary nor a list.
     """
@@ -290,7 +290,7 @@ def param_publish(
     pauses = rospy.Rate(rate) if rate is not None else None
     published: object = None
     while not rospy.is_shutdown():
-        # From this call on, the master notifies the node of changes to the parameter, so the cached value is current.
+        # This call makes the master notify the node of changes, so that the cached value stays current.
         value = rospy.get_param_cached(param_name)
         if not isinstance(value, dict | list):
             raise ROSTopicException(f"Parameter [{param_name}] in not a valid type")

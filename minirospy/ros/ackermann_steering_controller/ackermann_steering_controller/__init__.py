@@ -23,12 +23,12 @@ __all__ = ["AckermannSteeringController"]
 
 
 class AckermannSteeringController(MobileBase):
-    """Drives ``rear_wheel`` and steers ``front_steer``. As in ROS, ``angular.z`` of ``cmd_vel`` is the steering angle."""
+    """Drives ``rear_wheel`` and steers ``front_steer``. As in ROS, the steering angle is ``angular.z`` of ``cmd_vel``."""
 
     interfaces = (Interface.POSITION, Interface.VELOCITY)
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the joints, open the topics."""
+        """Read the parameters, claim the joints and open the topics."""
         parameters = context.parameters
         rear = parameters.text("rear_wheel", "rear_wheel_joint")
         front = parameters.text("front_steer", "front_steer_joint")
@@ -62,7 +62,7 @@ class AckermannSteeringController(MobileBase):
         return AckermannOdometry(window)
 
     def measure(self, odometry: Odometry, time: int) -> bool:
-        """Add the rear wheel's motion."""
+        """Update the odometry from the rear wheel's motion; return False if a joint position is not finite."""
         assert isinstance(odometry, AckermannOdometry)
         wheel, steering = self._rear.position, self._front.position * self._steering_factor
         if not (math.isfinite(wheel) and math.isfinite(steering)):
@@ -71,7 +71,7 @@ class AckermannSteeringController(MobileBase):
         return True
 
     def drive(self, linear: float, angular: float) -> None:
-        """Command the wheel and the steering. As in ROS, the radius multiplier is not applied here."""
+        """Set the wheel's velocity and the steering angle. As in ROS, the radius multiplier does not affect the velocity."""
         velocity = linear / self._radius
         self._rear.velocity_command = velocity if math.isfinite(velocity) else 0.0
         self._front.position_command = angular
@@ -82,7 +82,7 @@ class AckermannSteeringController(MobileBase):
         wheelbase = parameters.finite("wheel_separation_h", 0.0)
         radius = parameters.finite("wheel_radius", 0.0)
         if not (parameters.has_number("wheel_separation_h") and parameters.has_number("wheel_radius")):
-            # "descripion" is ROS's spelling.
+            # The typo "descripion" is ROS's.
             robot = read_robot(context, "Robot descripion couldn't be retrieved from param server.")
             rear_joint = described_joint(robot, rear)
             if not parameters.has_number("wheel_separation_h"):

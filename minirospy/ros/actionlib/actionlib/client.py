@@ -85,7 +85,7 @@ class ActionClient:
 
     def stop(self) -> None:
         """Unregister from the action's topics."""
-        # Other clients in this process may keep the subscriptions, so remove this client's functions from them.
+        # Other clients in this process may share these subscriptions, so remove only this client's callbacks.
         for subscriber in (self.status_sub, self.result_sub, self.feedback_sub):
             impl = subscriber.impl
             if impl and (subscription := impl.subscription):
@@ -121,7 +121,7 @@ class ActionClient:
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Wait for the server. An old name of :meth:`wait_for_server`."""
+        """Wait for the server: the old name of :meth:`wait_for_server`."""
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
@@ -151,7 +151,7 @@ class ActionClient:
         )
 
     def _status_link_ended(self) -> None:
-        """Check after SERVER_SECONDS whether the server is gone. Called on the loop."""
+        """After SERVER_SECONDS, check whether the server is gone. Called on the loop."""
         if goals := self.manager.unfinished():
             self._check_later(goals)
 
@@ -162,8 +162,8 @@ class ActionClient:
         timer.start()
 
     def _check_server(self, goals: list[CommStateMachine], last: GoalStatusArray | None) -> None:
-        """Set ``goals`` to LOST, except those that a server lists in a status message newer than ``last``."""
-        impl = self.status_sub.impl  # read once, because stop() in another thread sets it to None
+        """Mark ``goals`` as LOST, except those listed in a status message newer than ``last``."""
+        impl = self.status_sub.impl  # read the attribute once: stop() in another thread may set it to None
         if rospy.is_down() or impl is None:
             return
         statuses = self.last_status_msg
@@ -212,7 +212,7 @@ def _remove(functions: list[Callable[[], object]], function: Callable[[], object
 
 
 def _lose(goal: CommStateMachine) -> bool:
-    """Set ``goal`` to LOST; return False if it had already ended. If its callback raises an error, log the error."""
+    """Mark ``goal`` as LOST and log any error from its callback; return False if the goal had already ended."""
     try:
         return goal.lose()
     except BaseException as error:  # noqa: BLE001 - user code failed, but the goal has ended

@@ -33,7 +33,7 @@ _WHERE_FROM = {
 
 
 class StatusTracker:
-    """Tracks a goal in the server's list, or the ID of a goal that was cancelled before it arrived."""
+    """Tracks a goal's status, even if the goal was cancelled before it arrived."""
 
     def __init__(
         self, goal_id: GoalID | None = None, status: int | None = None, goal: ActionGoal | None = None
@@ -82,7 +82,7 @@ class StatusTracker:
 
 
 class _Server(Protocol):
-    """The action server's methods that goal handles call."""
+    """The action server methods that goal handles call."""
 
     ActionResultType: type[Message]
 

@@ -29,11 +29,11 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which the server may not list a goal: it does not list the goal yet, or no longer."""
+"""States in which the server may not list the goal: not yet, or no longer."""
 
 
 class ClientGoalHandle:
-    """A goal that was sent. Its callbacks are called only while a handle for the goal exists."""
+    """A handle for a sent goal. The goal's callbacks are called only while a handle exists."""
 
     def __init__(self, comm_state_machine: CommStateMachine) -> None:
         self.comm_state_machine: CommStateMachine | None = comm_state_machine
@@ -56,7 +56,7 @@ class ClientGoalHandle:
             return
         with machine.mutex:
             machine.send_cancel_fn(GoalID(id=machine.action_goal.goal_id.id))
-            # A goal that has just ended has no acknowledgement to wait for.
+            # A goal that has ended gets no acknowledgement.
             if machine.state != _DONE:
                 machine.transition_to(CommState.WAITING_FOR_CANCEL_ACK)
 
@@ -108,7 +108,7 @@ class ClientGoalHandle:
 
 
 class CommStateMachine:
-    """A goal as seen by its client: processes the server's messages, and calls the callback on each state change.
+    """Tracks a goal for its client: processes the server's messages and calls the callback on each state change.
 
     ``mutex`` is held during callbacks, so the callbacks for one goal never run concurrently.
     """
@@ -184,7 +184,7 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The status list with this status may arrive later or never, so make its transitions now.
+                # The status list may arrive later or never, so make the transitions for this status now.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
@@ -197,7 +197,7 @@ class CommStateMachine:
                 self.feedback_cb(ClientGoalHandle(self), action_feedback.feedback)
 
     def lose(self) -> bool:
-        """Set the goal to LOST, because its server is gone; return False if the goal had already ended."""
+        """Mark the goal as LOST because its server is gone; return False if the goal had already ended."""
         with self.mutex:
             if self.state == _DONE:
                 return False
@@ -274,7 +274,7 @@ class GoalManager:
         return ClientGoalHandle(machine)
 
     def update_statuses(self, status_array: GoalStatusArray) -> None:
-        """Process a list of statuses, for all goals even if a goal's callback raises an error.
+        """Process a status list for all goals, even if a goal's callback raises an error.
 
         Raise the first of these errors at the end, and log the others.
         """
@@ -321,4 +321,4 @@ class GoalManager:
 
 
 def _no_cancel(goal_id: GoalID) -> None:
-    """Do nothing: a manager without a client cannot cancel."""
+    """Do nothing: without a client, the manager cannot send cancel requests."""

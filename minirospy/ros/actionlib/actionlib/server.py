@@ -42,9 +42,9 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # with at most this many statuses, publish them immediately after each change
+_FEW_STATUSES = 50  # maximum length of a status list that is published immediately after each change
 
-# For longer lists: seconds to pause per status, so that publishing does not use all CPU time.
+# Seconds to pause per status after publishing a longer list, so that publishing does not use all CPU time.
 _SECONDS_A_STATUS = 1e-4
 
 
@@ -200,7 +200,7 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish all goals' statuses. If there are many, wait for a pause first."""
+        """Publish all goals' statuses: immediately if the list is short, otherwise after a pause."""
         with self.lock:
             pause = len(self.status_list) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -220,7 +220,7 @@ class ActionServer:
             self._publish(self.status_pub, message)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
-        """Process a cancel request: for one goal ID, for all goals up to a time stamp, or for all goals."""
+        """Process a cancel request: for one goal ID, for all goals up to a timestamp, or for all goals."""
         time.sleep(CANCEL_SECONDS)
 
         with self.lock:
@@ -238,7 +238,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and self._find(goal_id.id) is None:
-                # If the goal arrives after this request, it will be recalled immediately.
+                # The goal is recalled immediately if it arrives after this request.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._add(tracker)
                 tracker.end()
@@ -269,7 +269,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """Process a goal whose ID is already known, because the goal was sent twice or cancelled before it arrived."""
+        """Process a goal with a known ID: it was sent twice, or cancelled before it arrived."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status
@@ -294,7 +294,7 @@ class ActionServer:
 
     def _find(self, id: str) -> StatusTracker | None:
         """Return the goal in the list with this ID, or None."""
-        # Comparing lists compares the identity of their items first, which is fast.
+        # List comparison first compares the items' identity, which is fast.
         if self._indexed != self.status_list:
             self._indexed = list(self.status_list)
             self._by_id = {tracker.status.goal_id.id: tracker for tracker in reversed(self._indexed)}
@@ -339,7 +339,7 @@ class _StatusThread:
             threading.Thread(target=self._run, name="minirospy-action-status", daemon=True).start()
 
     def hurry(self, seconds: float) -> None:
-        """Call ``publish`` in ``seconds``, unless a call is already due before that."""
+        """Call ``publish`` after ``seconds``, unless a call is due earlier."""
         due = time.monotonic() + seconds
         if due < self._due:
             self._due = due
@@ -361,7 +361,7 @@ class _StatusThread:
 
 
 def _status_frequency(name: str) -> float:
-    """Return the rate, in Hz, of publishing all statuses.
+    """Return how often to publish all statuses, in Hz.
 
     Raise ActionException if the parameter is not a number above 0.
     """

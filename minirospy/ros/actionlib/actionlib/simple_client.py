@@ -41,7 +41,7 @@ class SimpleActionClient:
         self.active_cb: Callable[[], object] | None = None
         self.feedback_cb: FeedbackCallback | None = None
         self._set_simple_state(SimpleGoalState.PENDING)
-        # Held while a goal is sent, because the server's response may arrive before the goal's handle is stored.
+        # Held while sending a goal: the server may respond before the goal's handle is stored.
         self._lock = threading.RLock()
         self._finished: ClientGoalHandle | None = None
         self._news = Waiting()
@@ -105,7 +105,7 @@ class SimpleActionClient:
             return False
 
         def is_over() -> bool:
-            # The goal is also over if the done callback has sent the next goal, or another thread has sent one.
+            # The wait is also over if the done callback or another thread has sent a new goal.
             return (
                 self.gh is None or self.simple_state == SimpleGoalState.DONE or self._finished is waited_for
             )

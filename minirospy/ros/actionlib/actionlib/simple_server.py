@@ -130,7 +130,7 @@ class SimpleActionServer:
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()`` to be called when a goal arrives. If the server has an execute callback, log a warning instead."""
+        """Set the callback ``cb()`` for new goals. If the server has an execute callback, log a warning instead."""
         if self.execute_callback:
             rospy.logwarn(
                 "Cannot call SimpleActionServer.register_goal_callback() because an executeCallback exists. "
@@ -140,7 +140,7 @@ class SimpleActionServer:
             self.goal_callback = cb
 
     def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()`` to be called when preemption of the active goal is requested."""
+        """Set the callback ``cb()`` for requests to preempt the active goal."""
         self.preempt_callback = cb
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
@@ -206,7 +206,7 @@ class SimpleActionServer:
             self.execute_callback(goal)
         except BaseException as error:  # noqa: BLE001 - user code failed; serve the next goals
             # Exceptions are expected during a shutdown.
-            # Ctrl-C interrupts sleeps, and a hook may have closed the callback's resources.
+            # Ctrl-C interrupts sleeps, and a shutdown hook may have closed resources that the callback uses.
             if not rospy.is_shutdown_requested():
                 rospy.logerr("Exception in your execute callback: %s\n%s", error, traceback.format_exc())
                 self.set_aborted(None, f"Exception in execute callback: {error}")
@@ -216,7 +216,7 @@ class SimpleActionServer:
                 self.set_aborted(None, "No terminal state was set.")
 
     def _wake_soon(self) -> None:
-        """Wake the execute loop from a new thread, because a callback that blocks may hold the lock."""
+        """Wake the execute loop from a new thread, because a blocking callback may hold the lock."""
         with naming_thread_limit():
             threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
 

@@ -25,10 +25,10 @@ TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 # Python's actionlib drops results that arrive before send_goal returns.
 SEND_SECONDS = 1e-3
 
-# Seconds for which cancel requests are delayed, because the goal, which was sent earlier on another connection, is delayed too.
+# Seconds to delay cancel requests, because their goals, sent earlier on another connection, are delayed too.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
-# Seconds for a server to reconnect after its connection has ended; after that, its goals are LOST.
+# Seconds for a server to reconnect after a lost connection; then its goals are LOST.
 SERVER_SECONDS = 5.0
 
 

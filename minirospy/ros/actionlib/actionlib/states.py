@@ -25,9 +25,9 @@ g_goal_id = 1  # unused; ROS's `from actionlib import *` exports it
 
 
 def get_name_of_constant(C: type, n: int) -> str:
-    """Return the name of the class constant with this value; if there is none, return a name such as ``NO_SUCH_STATE_77``."""
+    """Return the name of the class constant with this value, or a name such as ``NO_SUCH_STATE_77`` if there is none."""
     for name, value in vars(C).items():
-        # ``type(value) is int`` excludes bool constants, which message classes may also have.
+        # ``type(value) is int`` excludes bool constants, which some message classes have.
         if type(value) is int and value == n and not name.startswith("_"):
             return name
     return f"NO_SUCH_STATE_{n}"
@@ -81,5 +81,5 @@ class SimpleGoalState:
         return get_name_of_constant(cls, n)
 
 
-# ROS's actionlib also adds this method, so that `GoalStatus.to_string(client.get_state())` works.
+# As in ROS's actionlib, allow `GoalStatus.to_string(client.get_state())`.
 GoalStatus.to_string = classmethod(get_name_of_constant)  # type: ignore[attr-defined]

@@ -57,7 +57,7 @@ class StatusList(GoalStatusArray):
 
     @status_list.setter
     def status_list(self, statuses: list[GoalStatus]) -> None:
-        # The base class's constructor sets an empty list: keep None, so that the bytes are still parsed on access.
+        # The base class sets an empty list; None makes the next access parse the bytes.
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:

@@ -94,7 +94,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
 
 def action_class(type_: str) -> type[Action]:
-    """Return an action's class, given its type: ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
+    """Return the class of an action type: ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
     Raise NotFoundError if there is no such action.
     """
@@ -163,7 +163,7 @@ class _Progress:
         self._tell("Sent")
         try:
             client.send_goal(self._goal, self._on_done, self._on_active, self._on_feedback)
-            # Wait in slices: a Ctrl-C just before a long wait would only take effect when the wait ends.
+            # Wait in slices: a Ctrl-C that arrives just before a long wait would have no effect until the wait ends.
             while not self._done.wait(_SLICE_SECONDS):
                 pass
         except KeyboardInterrupt:

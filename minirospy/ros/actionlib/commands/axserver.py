@@ -54,7 +54,7 @@ def _axserver(action: str, type: str) -> None:
     print(f"Serving {rospy.resolve_name(action)} ({cls._type})", flush=True)
     while True:
         while not news.wait(_SLICE_SECONDS):
-            # Wait in slices: a Ctrl-C just before a long wait would only take effect when the wait ends.
+            # Wait in slices: a Ctrl-C that arrives just before a long wait would have no effect until the wait ends.
             pass
         news.clear()
         while server.is_new_goal_available():

@@ -50,7 +50,7 @@ def two_pi_complement(angle: float) -> float:
 def shortest_angular_distance_with_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return (success, rotation): the shortest rotation to ``to_angle`` within the limits, if there is one.
+    """Return (success, rotation): the shortest rotation to ``to_angle`` that stays within the limits.
 
     All angles are from -pi to pi. The limits run counter-clockwise from left to right: [0.25, -0.25] contains pi, but not 0.
     """
@@ -93,7 +93,7 @@ def shortest_angular_distance_with_large_limits(
 def _find_min_max_delta(
     from_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float, float]:
-    """Return whether an angle is within the limits, and how far it can rotate clockwise and counter-clockwise to a limit."""
+    """Return whether an angle is within the limits, and how far it can rotate in each direction before reaching a limit."""
     to_left = shortest_angular_distance(from_angle, left_limit)
     to_right = shortest_angular_distance(from_angle, right_limit)
     left_round, right_round = two_pi_complement(to_left), two_pi_complement(to_right)

@@ -37,7 +37,7 @@ def as_float_duration(d: Seconds) -> float:
 
 
 class Timeout:
-    """Calls a function ``duration`` after the last ``reset``, unless it is cancelled first."""
+    """Calls a function ``duration`` after the last ``reset``, unless cancelled earlier."""
 
     def __init__(self, duration: Seconds, on_timeout: Callback | None = None) -> None:
         self.duration = duration
@@ -67,12 +67,12 @@ class Timeout:
 
 
 class Bond:
-    """One endpoint of a bond. ``start`` waits for the peer: a Bond with the same topic and ID in another node."""
+    """One endpoint of a bond. ``start`` waits for the peer, a Bond in another node with the same topic and ID."""
 
     def __init__(
         self, topic: str, id: str, on_broken: Callback | None = None, on_formed: Callback | None = None
     ) -> None:
-        """Create an endpoint without starting it. Callbacks are called without a lock held."""
+        """Create an endpoint without starting it. Callbacks are called without holding a lock."""
         self.topic = topic
         self.id = id
         self.instance_id = str(uuid.uuid4())
@@ -92,7 +92,7 @@ class Bond:
             Event.HEARTBEAT_TIMEOUT: Constants.DEFAULT_HEARTBEAT_TIMEOUT,
             Event.DISCONNECT_TIMEOUT: Constants.DEFAULT_DISCONNECT_TIMEOUT,
         }
-        # The deadlines of the active timeouts, in monotonic time.
+        # The active timeouts' deadlines on the monotonic clock.
         self._deadlines: dict[Event, float] = {}
         self._heartbeat_period: float = Constants.DEFAULT_HEARTBEAT_PERIOD
         self.sub: rospy.Subscriber[Status] | None = None
@@ -108,14 +108,14 @@ class Bond:
         if hasattr(self, "pub"):
             self.shutdown()
 
-    # --- timeouts, which can be changed until the bond is started
+    # --- timeouts, which can be changed until start()
 
     def get_connect_timeout(self) -> Seconds:
-        """Return the maximum time that the bond may take to form."""
+        """Return the maximum time for the bond to form."""
         return self._seconds[Event.CONNECT_TIMEOUT]
 
     def set_connect_timeout(self, dur: Seconds) -> None:
-        """Set the maximum time that the bond may take to form."""
+        """Set the maximum time for the bond to form."""
         self._set(Event.CONNECT_TIMEOUT, dur)
 
     connect_timeout = property(get_connect_timeout, set_connect_timeout)
@@ -145,7 +145,7 @@ class Bond:
         return self._heartbeat_period
 
     def set_heartbeat_period(self, per: Seconds) -> None:
-        """Set the interval between heartbeats."""
+        """Set the interval between heartbeats in seconds."""
         assert not self._has_started, "the bond has started"
         self._heartbeat_period = as_float_duration(per)
 
@@ -158,7 +158,7 @@ class Bond:
     # --- public methods
 
     def start(self) -> None:
-        """Start sending heartbeats and wait for the peer in a thread."""
+        """Start a thread that sends heartbeats and waits for the peer."""
         with self.lock:
             self._run_timeout(Event.CONNECT_TIMEOUT)
             self.sub = rospy.Subscriber(self.topic, Status, self._on_bond_status)
@@ -181,7 +181,7 @@ class Bond:
         return self._wait(lambda: self._state is not State.WAITING, timeout)
 
     def wait_until_broken(self, timeout: Seconds | None = None) -> bool:
-        """Wait until the bond is broken, even if it never formed; return False after ``timeout`` (None: no timeout)."""
+        """Wait until the bond breaks, even if it never forms; return False after ``timeout`` (None: no timeout)."""
         return self._wait(lambda: self._state is State.DEAD, timeout)
 
     def is_broken(self) -> bool:

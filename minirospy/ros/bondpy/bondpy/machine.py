@@ -38,7 +38,7 @@ class Action(enum.Enum):
 
 
 _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
-    # The first message counts as a heartbeat, so that the bond detects a peer that exits right after its first message.
+    # The first message counts as a heartbeat, so that a peer that exits right after sending it is detected.
     (State.WAITING, Event.SISTER_ALIVE): (State.ALIVE, (Action.CONNECTED, Action.HEARTBEAT)),
     (State.WAITING, Event.SISTER_DEAD): (State.DEAD, (Action.CONNECTED, Action.SISTER_DIED, Action.DEATH)),
     (State.WAITING, Event.CONNECT_TIMEOUT): (State.DEAD, (Action.DEATH,)),

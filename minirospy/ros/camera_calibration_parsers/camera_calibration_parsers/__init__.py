@@ -45,7 +45,7 @@ def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
 
 
 def writeCalibration(file_name: str, camera_name: str, cinfo: CameraInfo) -> bool:
-    """Write a calibration as .yaml, .yml or .ini in ROS's format, creating its folders. ROS has this function only in C++.
+    """Write a calibration in ROS's .yaml, .yml or .ini format, creating missing folders. ROS has this function only in C++.
 
     If the file cannot be written, or the extension is unknown, log the reason and return False.
     """

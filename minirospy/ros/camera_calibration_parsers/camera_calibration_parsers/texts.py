@@ -30,7 +30,7 @@ _PLAIN = re.compile(r"[\w/][\w./-]*\Z", re.ASCII)
 
 
 class CalibrationError(ValueError):
-    """Raised if the text is not a calibration, or the format does not support the calibration."""
+    """Raised if the text is not a calibration, or the format cannot store the calibration."""
 
 
 def parse_yaml(text: str) -> tuple[str, CameraInfo]:
@@ -38,7 +38,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
     import yaml
 
     try:
-        # Load all scalars as strings: a name may look like a number, and in YAML 1.1 1e3 is not a number.
+        # Load all scalars as strings: a name may look like a number, and YAML 1.1 does not read 1e3 as a number.
         tree = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         raise CalibrationError(" ".join(str(error).split())) from error
@@ -56,7 +56,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
 
 
 def yaml_of(name: str, info: CameraInfo) -> str:
-    """Format a calibration as YAML, in the same way as ROS."""
+    """Format a calibration as YAML, exactly like ROS."""
     lines = [f"image_width: {info.width}", f"image_height: {info.height}", f"camera_name: {_quoted(name)}"]
 
     def matrix(key: str, values: Sequence[float], rows: int) -> None:
@@ -100,7 +100,7 @@ def parse_ini(text: str) -> tuple[str, CameraInfo]:
 
 
 def ini_of(name: str, info: CameraInfo) -> str:
-    """Format a calibration as an .ini file, in the same way as ROS.
+    """Format a calibration as an .ini file, exactly like ROS.
 
     Raise CalibrationError if the model is not plumb_bob.
     """
@@ -127,7 +127,7 @@ def _pixels(word: object) -> int:
 
 
 def _matrix(tree: dict[str, object], key: str, shape: tuple[int, int] | None) -> tuple[float, ...]:
-    """Return a matrix's numbers. If ``shape`` is None, accept any shape."""
+    """Return a matrix's numbers; ``shape`` None accepts any shape."""
     found = tree.get(key)
     if not isinstance(found, dict):
         raise CalibrationError(f"{key} is missing")

@@ -90,7 +90,7 @@ class CameraInfoManager:
         return self.cname
 
     def getURL(self) -> str:
-        """Return the calibration's URL, without substitutions."""
+        """Return the calibration's URL with its variables unresolved."""
         return self.url
 
     def isCalibrated(self) -> bool:
@@ -194,7 +194,7 @@ def saveCalibration(new_info: CameraInfo, url: str, cname: str) -> bool:
 
 
 def saveCalibrationFile(ci: CameraInfo, filename: str, cname: str) -> bool:
-    """Save a calibration to a file, creating its folders; on failure, log the reason and return False."""
+    """Save a calibration to a file, creating missing folders; on failure, log the reason and return False."""
     rospy.loginfo("writing calibration data to %s", filename)
     return writeCalibration(filename, cname, ci)
 

@@ -72,7 +72,7 @@ class ZoomCameraInfoManager(CameraInfoManager):
 
 
 class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
-    """Computes K from the fields of view at both ends of the zoom range.
+    """Computes K from the fields of view at the minimum and maximum zoom.
 
     All other values are from the calibration file, if any.
     """
@@ -89,7 +89,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """Set the fields of view at both ends of the zoom range.
+        """Set the fields of view at the minimum and maximum zoom.
 
         ``min_fov`` and ``max_fov`` are the horizontal fields of view in degrees, at the highest and at the lowest zoom level.
         """
@@ -126,7 +126,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         matrix[0] = width / (2 * tan(horizontal / 2))
         matrix[4] = height / (2 * tan(vertical / 2))
         matrix[8] = 1.0
-        # Scale a calibrated center with the image size; without a calibration, use the image center.
+        # Scale a calibrated center with the image size; otherwise use the image center.
         is_calibrated = matrix[2] != 0.0 and loaded.width and loaded.height
         matrix[2] = matrix[2] * width / loaded.width if is_calibrated else width / 2
         matrix[5] = matrix[5] * height / loaded.height if is_calibrated else height / 2
@@ -145,7 +145,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """Set the calibrated zoom levels. ``calibration_url_template`` is a URL with ``%d`` for the level."""
+        """Set the calibrated zoom levels. ``calibration_url_template`` is a URL with ``%d`` in place of the level."""
         super().__init__(min(zoom_levels), max(zoom_levels), cname, url, namespace)
         self._calibration_url_template = calibration_url_template
         self._zoom_levels = zoom_levels

@@ -27,7 +27,7 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """Return those of the folders ``search_dirs`` that exist for package ``project``, or the files ``path`` in them.
+    """Return the ``search_dirs`` folders that exist for package ``project``, or the files ``path`` in them.
 
     ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. The function
     appends all searched paths to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.

@@ -32,7 +32,7 @@ class ColorTemplate(string.Template):
 
 
 class _Colors:
-    """The ANSI codes in use: none on Windows, or after :func:`disable_ANSI_colors`."""
+    """The current ANSI codes: empty on Windows and after :func:`disable_ANSI_colors`."""
 
     def __init__(self) -> None:
         self.codes: Mapping[str, str] = {}

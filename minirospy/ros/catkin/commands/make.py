@@ -45,7 +45,7 @@ def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
 
 
 class _MakeParser(Parser):
-    """A parser that removes CMake arguments, and returns the variables that they set as the argument ``variables``."""
+    """A parser that removes CMake arguments and returns the variables they set as the argument ``variables``."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Parse the arguments to a dict keyed by name. Raise CommandLineError if an argument is invalid."""
@@ -151,7 +151,7 @@ def _catkin_make(
 
     tests = [target for target in targets if target.startswith("run_tests_")]
     others = {"all", "install", *TEST_TARGETS, *tests}
-    # Words with "=", such as VERBOSE=1, set make variables. A message generator's target selects its whole package.
+    # Words with "=", such as VERBOSE=1, set make variables. A message generation target selects its whole package.
     named = [_GENERATED.sub("", word) for word in targets if word not in others and "=" not in word]
     chosen = [*(pkg or []), *named]
     plans = build_packages(workspace, chosen, only_pkg_with_deps or (), variables)

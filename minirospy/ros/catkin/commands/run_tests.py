@@ -29,7 +29,7 @@ _END_SECONDS = 20.0
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests of the chosen packages, or of all; return 1 if a test failed.
+    """Run the tests of the chosen packages (default: all); return 1 if a test failed.
 
     Raise BuildError or NotFoundError if a test cannot be run, MinirospyError on Ctrl-C.
 
@@ -48,7 +48,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             continue
         results = workspace.build / "test_results" / plan.name
         if _flat(plan.name) in wanted:
-            # Remove old results, because the tests that wrote them may no longer exist.
+            # Remove old results: the tests that wrote them may no longer exist.
             for file in results.glob("*.xml"):
                 file.unlink()
         download(plan, plan.downloads)
@@ -75,7 +75,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
 
 def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path) -> int:
-    """Run a test; return its exit status. On Ctrl-C, wait until the test has stopped its nodes, then raise MinirospyError."""
+    """Run a test and return its exit status. On Ctrl-C, wait for the test to stop its nodes, then raise MinirospyError."""
     with (
         interrupt_noted() as interrupted,
         guard_children(),
@@ -84,7 +84,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
         if status is None:
-            # The terminal also sent the Ctrl-C to the test, so only wait for it to exit.
+            # The terminal also sent SIGINT to the test, so only wait for it to exit.
             try:
                 popen.wait(_END_SECONDS)
             except subprocess.TimeoutExpired:
@@ -136,7 +136,7 @@ def _pytest(plan: Plan, test: Test, results: Path) -> list[str]:
 
 
 def _rostest(plan: Plan, test: Test, results: Path) -> list[str]:
-    # Include the arguments in the name, because the same file may be run with different arguments.
+    # Include the arguments in the name: the same file may be run with different arguments.
     stem = "__".join([os.path.splitext(test.path)[0], *test.arguments])
     name = re.sub(r"[^\w.-]", "_", stem)
     options = ["--package", plan.name, "--pkgdir", str(plan.folder), "--results-filename", f"{name}.xml"]

@@ -39,7 +39,7 @@ class Counts(NamedTuple):
         return bool(self.errors or self.failures)
 
     def plus(self, other: Counts) -> Counts:
-        """Return the sum of both counts."""
+        """Add ``other`` to these counts and return the sum."""
         return Counts(*(mine + theirs for mine, theirs in zip(self, other, strict=True)))
 
 

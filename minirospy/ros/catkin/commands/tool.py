@@ -46,7 +46,7 @@ def catkin(argv: Sequence[str] | None = None) -> int:
 
 
 class _Settings(NamedTuple):
-    """The settings that `catkin config` saves for `catkin build`. A setting of None is not set."""
+    """The settings that `catkin config` saves for `catkin build`; None means not set."""
 
     install: bool | None = None
     blacklist: Sequence[str] | None = None

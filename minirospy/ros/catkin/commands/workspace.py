@@ -54,7 +54,7 @@ def build_packages(
     with_deps: Collection[str] = (),
     variables: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Plan]:
-    """Build the chosen packages, or all, and print a line for each. Return the plans for all packages."""
+    """Build the chosen packages (default: all) and print a line for each. Return the plans for all packages."""
     white = [name for name in variables.get("CATKIN_WHITELIST_PACKAGES", "").split(";") if name]
     plans = read_plans(workspace.source, {**_places(workspace), **variables})
     names = {plan.name for plan in plans}
@@ -81,7 +81,7 @@ def build_packages(
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    # Like catkin, write the setup files first, so that the workspace can be sourced even if building a package fails.
+    # Like catkin, write the setup files first, so that users can source the workspace even after a failed build.
     write_set_up(workspace.devel, (workspace.source,))
     build(workspace, plans, Packages(), only or None, show)
     if not plans:
@@ -90,7 +90,7 @@ def build_packages(
 
 
 def _places(workspace: Workspace) -> dict[str, str]:
-    """Return the CMake variables that name the workspace's folders."""
+    """Return the CMake variables that hold the workspace's folders."""
     devel, build = workspace.devel.as_posix(), workspace.build.as_posix()
     return {"CATKIN_DEVEL_PREFIX": devel, "CMAKE_BINARY_DIR": build}
 

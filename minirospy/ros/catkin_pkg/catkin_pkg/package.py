@@ -97,7 +97,7 @@ class InvalidPackage(Exception):
 
 
 class _Conditional:
-    """An element with a condition; ``evaluated_condition`` is None until the condition is evaluated."""
+    """An element with a condition; ``evaluated_condition`` is None before evaluation."""
 
     condition: str | None
     evaluated_condition: bool | None
@@ -109,7 +109,7 @@ class _Conditional:
 
 
 class Dependency(_Conditional):
-    """A dependency, with the versions that it accepts."""
+    """A dependency and the versions it accepts."""
 
     __slots__ = ["condition", "evaluated_condition", "name", *_VERSIONS]
 
@@ -160,7 +160,7 @@ class GroupMembership(_Group):
 
 
 class Export(_Conditional):
-    """A tag inside ``<export>``; ``content`` is the XML inside that tag."""
+    """A tag inside ``<export>``; ``content`` is the tag's inner XML."""
 
     __slots__ = ["attributes", "content", "evaluated_condition", "tagname"]
 
@@ -285,7 +285,7 @@ class Package:
         return str({name: getattr(self, name) for name in self.__slots__})
 
     def has_buildtool_depend_on_catkin(self) -> bool:
-        """Return whether the package is built by catkin."""
+        """Return whether the package has a build tool dependency on catkin."""
         return "catkin" in (each.name for each in self.buildtool_depends)
 
     def get_build_type(self) -> str:
@@ -570,7 +570,7 @@ def _text(element: Element) -> str:
 
 
 def _inside(element: Element) -> str:
-    """Return the XML inside an element, including child elements."""
+    """Return an element's inner XML."""
     return (
         escape(element.text or "")
         + "".join(tostring(each, encoding="unicode").replace(" />", "/>") for each in element)

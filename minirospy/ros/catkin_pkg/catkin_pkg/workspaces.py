@@ -28,7 +28,7 @@ def get_spaces(paths: Sequence[str] | None = None) -> list[str]:
 
 
 def order_paths(paths_to_order: Sequence[str], prefix_paths: Sequence[str]) -> list[str]:
-    """Sort the paths by the prefix that contains them, in the prefixes' order. Put paths outside all prefixes last."""
+    """Sort the paths in the order of the prefixes that contain them; paths outside all prefixes come last."""
     groups: dict[str, list[str]] = {prefix: [] for prefix in prefix_paths}
     others = []
     for path in paths_to_order:

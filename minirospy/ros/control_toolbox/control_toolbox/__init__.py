@@ -46,14 +46,14 @@ class Pid(pid.Pid):
         return found
 
     def serve(self, parameters: Parameters) -> None:
-        """Offer dynamic_reconfigure in the namespace; publish the topic ``state`` if its parameter ``publish_state`` is true."""
+        """Start dynamic_reconfigure in the namespace; publish the topic ``state`` if the parameter ``publish_state`` is true."""
         if parameters.flag("publish_state", False):
             self._state = RealtimePublisher(f"{parameters.namespace}/state", PidState)
             self.on_computed = self._publish
         self._server = Server(ParametersConfig, self._reconfigure, parameters.namespace)
 
     def set_gains(self, gains: PidGains) -> None:
-        """Change the gains, also in dynamic_reconfigure. Do not call this in ``update``, because it calls the master."""
+        """Change the gains, also in dynamic_reconfigure. Do not call this in ``update``: it calls the master."""
         self.gains = gains
         if self._server is not None:
             self._server.update_configuration(_config(gains))
@@ -66,7 +66,7 @@ class Pid(pid.Pid):
             self._state.close()
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # the server has not read the gains that are not parameters yet
+        is_first = level == ~0  # the server has not yet read the gains that are not set as parameters
         if is_first:
             config.update(_config(self.gains))
             return config
@@ -104,7 +104,7 @@ class Pid(pid.Pid):
 
 
 def _config(gains: PidGains) -> dict[str, float | bool]:
-    """Return the gains under the names that dynamic_reconfigure uses."""
+    """Return the gains under their dynamic_reconfigure names."""
     return {
         "p": gains.p,
         "i": gains.i,

@@ -15,7 +15,7 @@ __all__ = ["CvBridge", "CvBridgeError", "cvtColorForDisplay", "getCvType"]
 
 
 def getCvType(encoding: str) -> int:
-    """Return OpenCV's type number for an encoding, such as CV_8UC3 = 16. Raise RuntimeError if the encoding is unknown."""
+    """Return an encoding's OpenCV type number, such as 16 (CV_8UC3). Raise RuntimeError if the encoding is unknown."""
     try:
         return type_of_encoding(encoding)
     except ValueError as error:

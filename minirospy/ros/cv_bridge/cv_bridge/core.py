@@ -115,7 +115,7 @@ class CvBridge:
         return _converted(image, f"{kind}{8 * image.dtype.itemsize}", desired_encoding)
 
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
-        """Convert an array to a compressed message in format jpg, png, bmp, tiff, webp or another that OpenCV supports.
+        """Convert an array to a compressed message: jpg, png, bmp, tiff, webp or another format that OpenCV supports.
 
         Raise CvBridgeError if the format does not support the array, TypeError if ``cvim`` is not an array.
         """
@@ -146,7 +146,7 @@ def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
-    """Convert a Bayer or YUV image to colors with the same depth; return the image with its new encoding.
+    """Convert a Bayer or YUV image to a color image of the same depth; return it with its new encoding.
 
     Raise ValueError if OpenCV is not installed.
     """
@@ -156,7 +156,7 @@ def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
             f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}"
         )
 
-    # OpenCV names a Bayer pattern after the pixels in the second row, starting at the second column.
+    # OpenCV names a Bayer pattern after the second row's pixels, starting at the second column.
     patterns = {
         "bayer_rggb": "BayerBG",
         "bayer_bggr": "BayerRG",

@@ -14,10 +14,10 @@ ERROR = DiagnosticStatus.ERROR
 
 
 class DiagnosticStatusWrapper(DiagnosticStatus):
-    """A diagnostic_msgs/DiagnosticStatus that is filled step by step, and can be published directly."""
+    """A diagnostic_msgs/DiagnosticStatus to fill step by step and publish directly."""
 
     def __init__(self, *args: Any, **kwds: Any) -> None:
-        """Set the fields: all of them by position, or some by keyword."""
+        """Set all fields by position, or some by keyword."""
         super().__init__(*args, **kwds)
 
     @overload

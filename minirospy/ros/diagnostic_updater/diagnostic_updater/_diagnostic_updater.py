@@ -64,7 +64,7 @@ class FunctionDiagnosticTask(DiagnosticTask):
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
-    """Combines several tasks into one status that has all their values, the highest level and the merged messages."""
+    """Combines several tasks into one status with all their values, the highest level and the merged messages."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -107,7 +107,7 @@ class DiagnosticTaskVector:
         self.lock = threading.Lock()
 
     def addedTaskCallback(self, task: DiagnosticTaskInternal) -> None:
-        """Do nothing; subclasses override this method, which is called for each added task."""
+        """Do nothing. Called for each added task; subclasses may override this method."""
 
     def add(self, *args: Any) -> None:
         """Add a task: ``add(task)`` or ``add(name, function)``. Raise TypeError for other arguments."""
@@ -133,7 +133,7 @@ class DiagnosticTaskVector:
 
 
 class Updater(DiagnosticTaskVector):
-    """Runs its tasks in ``update`` every ~diagnostic_period seconds (default 1); publishes statuses on /diagnostics."""
+    """Runs its tasks in ``update`` every ~diagnostic_period seconds (default 1) and publishes their statuses on /diagnostics."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -152,7 +152,7 @@ class Updater(DiagnosticTaskVector):
         self.hwid = hwid
 
     def update(self) -> None:
-        """Run the tasks if the period has passed; call this method often. If the clock jumps back, a new period starts."""
+        """Run the tasks if the period has elapsed; call this method often. A backward clock jump starts a new period."""
         self._check_diagnostic_period()
         if _has_passed(self.last_time, self.period):
             self.force_update()
@@ -197,7 +197,7 @@ class Updater(DiagnosticTaskVector):
         self.publisher.publish(array)
 
     def addedTaskCallback(self, task: DiagnosticTaskVector.DiagnosticTaskInternal) -> None:
-        """Publish the status "Node starting up" for the task."""
+        """Publish the status "Node starting up" for the new task."""
         status = DiagnosticStatusWrapper(name=task.name)
         status.summary(OK, "Node starting up")
         self.publish(status)

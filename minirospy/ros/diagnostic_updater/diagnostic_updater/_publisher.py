@@ -45,7 +45,7 @@ class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
 
 
 class TopicDiagnostic(HeaderlessTopicDiagnostic):
-    """A task that reports a topic's frequency and the age of its time stamps."""
+    """A task that reports a topic's frequency and the age of its timestamps."""
 
     def __init__(
         self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam, stamp: TimeStampStatusParam
@@ -55,13 +55,13 @@ class TopicDiagnostic(HeaderlessTopicDiagnostic):
         self.addTask(self.stamp)
 
     def tick(self, stamp: times.Time | float) -> None:
-        """Count a message with this time stamp."""
+        """Count a message with this timestamp."""
         self.stamp.tick(stamp)
         self.freq.tick()
 
 
 class DiagnosedPublisher(TopicDiagnostic):
-    """Wraps a publisher of messages with headers, and reports its topic's diagnostics."""
+    """Wraps a publisher of messages with headers and reports its topic's diagnostics."""
 
     def __init__(
         self,
@@ -74,6 +74,6 @@ class DiagnosedPublisher(TopicDiagnostic):
         self.publisher = pub
 
     def publish(self, message: Stamped) -> None:
-        """Count a message by its header's time stamp and publish the message."""
+        """Publish a message and count it by its header's timestamp."""
         self.tick(message.header.stamp)
         self.publisher.publish(message)

@@ -27,7 +27,7 @@ class FrequencyStatusParam:
     """The limits of FrequencyStatus."""
 
     def __init__(self, freq_bound: Mapping[str, float], tolerance: float = 0.1, window_size: int = 5) -> None:
-        """Set the limits. ``freq_bound``: a mapping with "min" and optionally "max" in Hz, read at each run.
+        """Set the limits. ``freq_bound`` maps "min" and optionally "max" to Hz, and is read at each run.
 
         ``tolerance``: the fraction by which a frequency may exceed the bounds; ``window_size``: the number of runs over
         which the frequency is measured.
@@ -38,7 +38,7 @@ class FrequencyStatusParam:
 
 
 class FrequencyStatus(DiagnosticTask):
-    """Reports a warning if the frequency is out of bounds, and an error if there was no event in the window."""
+    """Reports a warning if the frequency is out of bounds, or an error if no event occurred in the window."""
 
     def __init__(self, params: FrequencyStatusParam, name: str = "FrequencyStatus") -> None:
         super().__init__(name)
@@ -102,7 +102,7 @@ class FrequencyStatus(DiagnosticTask):
 
 
 class TimeStampStatusParam:
-    """The accepted age of a time stamp on arrival, in seconds; a stamp in the future has a negative age."""
+    """The accepted age of a timestamp on arrival, in seconds; a future timestamp has a negative age."""
 
     def __init__(self, min_acceptable: float = -1, max_acceptable: float = 5) -> None:
         self.max_acceptable = max_acceptable
@@ -110,7 +110,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports time stamps that are zero, too old or too far in the future, and the number of updates with each kind."""
+    """Reports and counts timestamps that are zero, too old or too far in the future."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)
@@ -128,7 +128,7 @@ class TimeStampStatus(DiagnosticTask):
         self.deltas_valid = False
 
     def tick(self, stamp: times.Time | float) -> None:
-        """Count an event with its time stamp: a Time, or seconds."""
+        """Count an event with its timestamp: a Time, or seconds."""
         seconds = stamp if isinstance(stamp, (int, float)) else stamp.to_sec()
         with self.lock:
             if seconds == 0:
@@ -140,7 +140,7 @@ class TimeStampStatus(DiagnosticTask):
             self.deltas_valid = True
 
     def run(self, stat: Status) -> Status:
-        """Fill a status from the time stamps since the last run."""
+        """Fill a status from the timestamps since the last run."""
         with self.lock:
             self._summarize(stat)
             for key, value in (
@@ -173,7 +173,7 @@ class TimeStampStatus(DiagnosticTask):
 
 
 class Heartbeat(DiagnosticTask):
-    """Reports OK and "Alive" at each run."""
+    """Always reports OK and "Alive"."""
 
     def __init__(self) -> None:
         super().__init__("Heartbeat")

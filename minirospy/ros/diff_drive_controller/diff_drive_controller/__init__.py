@@ -48,7 +48,7 @@ DynamicParams:
 
 
 class _Wheels(NamedTuple):
-    """The geometry of the wheels in metres, or correction factors for it."""
+    """The wheels' geometry in metres, or correction factors for it."""
 
     separation: float
     left_radius: float
@@ -56,7 +56,7 @@ class _Wheels(NamedTuple):
 
 
 class DiffDriveController(MobileBase):
-    """Drives the wheels in ``left_wheel`` and ``right_wheel``; each parameter is a name or a list of names."""
+    """Drives the wheels named in ``left_wheel`` and ``right_wheel``; each parameter is a name or a list of names."""
 
     interfaces = (Interface.VELOCITY,)
 
@@ -64,7 +64,7 @@ class DiffDriveController(MobileBase):
     _wheel_states: _WheelStates | None = None
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the wheels, open the topics."""
+        """Read the parameters, claim the wheels and open the topics."""
         parameters = context.parameters
         left, right = _wheel_names(parameters, "left_wheel"), _wheel_names(parameters, "right_wheel")
         if len(left) != len(right):
@@ -73,7 +73,7 @@ class DiffDriveController(MobileBase):
         factors = self._read_factors(parameters)
         self.read_parameters(context)
         self._described = self._read_geometry(context, left[0], right[0])
-        self._wheels = self._scaled(factors)  # replaced by dynamic_reconfigure
+        self._wheels = self._scaled(factors)  # dynamic_reconfigure replaces this object
         self.log_info(
             f"Odometry params : wheel separation {self._wheels.separation:g}, left wheel radius "
             f"{self._wheels.left_radius:g}, right wheel radius {self._wheels.right_radius:g}"
@@ -106,11 +106,11 @@ class DiffDriveController(MobileBase):
         self.opened.callback(close_server, server)
 
     def create_odometry(self, window: int) -> Odometry:
-        """Return the odometry for two rows of wheels."""
+        """Return the odometry for two sides of wheels."""
         return DiffDriveOdometry(window)
 
     def measure(self, odometry: Odometry, time: int) -> bool:
-        """Add the mean motion of each row of wheels."""
+        """Update the odometry from each side's mean wheel motion; return False if a wheel position is not finite."""
         assert isinstance(odometry, DiffDriveOdometry)
         left = sum(joint.position for joint in self._left) / len(self._left)
         right = sum(joint.position for joint in self._right) / len(self._right)
@@ -128,7 +128,7 @@ class DiffDriveController(MobileBase):
         return True
 
     def drive(self, linear: float, angular: float) -> None:
-        """Command the wheels."""
+        """Set the wheels' velocity commands."""
         for joints, velocity in zip((self._left, self._right), self._speeds(linear, angular), strict=True):
             for joint in joints:
                 joint.velocity_command = velocity
@@ -183,7 +183,7 @@ class DiffDriveController(MobileBase):
         return _Wheels(*(value * factor for value, factor in zip(self._described, factors, strict=True)))
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # the server has not read the values that are not parameters yet
+        is_first = level == ~0  # the server has not yet read the values that are not set as parameters
         if is_first:
             config.update(self._config)
             return config
@@ -221,7 +221,7 @@ class _WheelStates:
         self._time: Time | None = None
 
     def publish(self, time: Time, period: Duration, wanted: tuple[float, float]) -> None:
-        """Publish the states of a cycle. ``wanted``: the commanded velocities of the left and right wheels."""
+        """Publish a cycle's wheel states. ``wanted`` holds the commanded velocities of the left and right wheels."""
         joints, wheels = self._joints, len(self._joints) // 2
         dt = period.to_sec()
         elapsed = (time - self._time).to_sec() if self._time else 0.0
@@ -269,7 +269,7 @@ def _minus(left: Sequence[float], right: Sequence[float]) -> list[float]:
 
 
 def _wheel_names(parameters: Parameters, key: str) -> list[str]:
-    """Return the names of the wheels on one side. Raise ControllerError if the parameter is missing or invalid."""
+    """Return the names of one side's wheels. Raise ControllerError if the parameter is missing or invalid."""
     value = parameters.get(key)
     if value is None:
         raise ControllerError(f"Couldn't retrieve wheel param '{key}'.")

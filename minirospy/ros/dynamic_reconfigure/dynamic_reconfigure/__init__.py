@@ -74,5 +74,5 @@ def find_reconfigure_services() -> list[str]:
 
 
 def get_parameter_names(descr: ConfigType) -> Iterable[str]:
-    """Return the names of a type's parameters."""
+    """Return a configuration type's parameter names."""
     return descr.defaults.keys()

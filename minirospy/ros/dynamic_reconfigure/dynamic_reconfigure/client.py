@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Client", "ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv"]
 
-_SLICE_SECONDS = 0.25  # seconds between checks for the node's shutdown
+_SLICE_SECONDS = 0.25  # seconds between checks whether the node is shutting down
 
 _TYPES: dict[str, type] = {"int": int, "double": float, "str": str, "bool": bool}
 _TRUE = ("yes", "true", "t", "1")
@@ -44,7 +44,7 @@ DescriptionCallback = Callable[[list[Entry] | None], object]
 
 
 class Client:
-    """A client that reads and changes the configuration of a server, usually another node."""
+    """A client that reads and changes a server's configuration, usually in another node."""
 
     def __init__(
         self,
@@ -53,12 +53,12 @@ class Client:
         config_callback: ConfigCallback | None = None,
         description_callback: DescriptionCallback | None = None,
     ) -> None:
-        """Wait up to ``timeout`` seconds for the server ``name``; None or 0 means no limit.
+        """Wait up to ``timeout`` seconds for the server ``name``; None or 0 waits forever.
 
         ``config_callback(config)`` is called on each change. Raise ROSException if the server does not appear in time.
         """
         if not isinstance(name, str):
-            # Without this check, the client could wait for a server that cannot exist.
+            # Without this check, the client could wait for an impossible name.
             raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
@@ -80,7 +80,7 @@ class Client:
         )
 
     def get_configuration(self, timeout: float | None = None) -> Config | None:
-        """Return the server's latest configuration, waiting for the first one.
+        """Return the server's latest configuration; wait if none has arrived.
 
         Return None after ``timeout`` seconds or at shutdown.
         """
@@ -92,12 +92,12 @@ class Client:
         return self.config
 
     def get_parameter_descriptions(self, timeout: float | None = None) -> list[Entry] | None:
-        """Return a dict for each of the server's parameters, or None after ``timeout`` seconds or at shutdown."""
+        """Return the server's parameter descriptions, or None after ``timeout`` seconds or at shutdown."""
         self._wait(lambda: self.param_description is not None, timeout)
         return self.param_description
 
     def get_group_descriptions(self, timeout: float | None = None) -> Config | None:
-        """Return the tree of the server's groups, or None after ``timeout`` seconds or at shutdown."""
+        """Return the server's tree of groups, or None after ``timeout`` seconds or at shutdown."""
         self._wait(lambda: self.group_description is not None, timeout)
         return self.group_description
 
@@ -126,7 +126,7 @@ class Client:
         return decode_config(answer, self.get_group_descriptions())
 
     def update_groups(self, changes: Values) -> Config | None:
-        """Return the tree of the server's groups with changed states. ``changes`` maps group names to states."""
+        """Return the server's tree of groups, with states changed as in ``changes``, which maps group names to states."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
         while groups:

@@ -56,10 +56,10 @@ _G = TypeVar("_G", bound="Group | GroupState")
 
 
 class Config(dict[str, Any]):
-    """A configuration; its values are also attributes. Reading a missing attribute raises KeyError, as in ROS."""
+    """A configuration whose values are also attributes. Reading a missing attribute raises KeyError, as in ROS."""
 
     def __init__(self, *args: Iterable[tuple[str, object]] | Values, **kwargs: object) -> None:
-        """Create a configuration from the arguments that dict accepts."""
+        """Create a configuration from dict's arguments."""
         super().__init__(*args, **kwargs)
 
     def __getattr__(self, name: str) -> Any:
@@ -83,7 +83,7 @@ class Config(dict[str, Any]):
 
 
 def encode_description(descr: ConfigType) -> ConfigDescription:
-    """Return the message that describes a type."""
+    """Return the message that describes a configuration type."""
     return ConfigDescription(
         groups=encode_groups(None, descr.config_description),
         max=encode_config(descr.max),
@@ -93,7 +93,7 @@ def encode_description(descr: ConfigType) -> ConfigDescription:
 
 
 def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
-    """Convert a group from a type's description, and all its subgroups, to messages."""
+    """Convert a group and all its subgroups from a type's description to messages."""
     parameters = [
         ParamDescription(*(each[key] for key in ("name", "type", "level", "description", "edit_method")))
         for each in group["parameters"]
@@ -103,7 +103,7 @@ def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
 
 
 def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
-    """Convert a configuration to a message. Omit values other than bool, int, float, str and groups.
+    """Convert a configuration to a message. Omit values that are not bool, int, float, str or groups.
 
     If ``flat``, the key ``groups`` contains a tree, and all groups in the tree are added; otherwise, it contains a dict of the
     groups.
@@ -128,14 +128,14 @@ def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
 
 
 def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
-    """Yield all subgroups of a group; each group follows its own subgroups."""
+    """Yield all nested subgroups of a group, each after its own subgroups."""
     for each in group["groups"].values():
         yield from _inner_groups(each)
         yield each
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group without its subgroups and parameters. A group from a description has the state True."""
+    """Return a group without its subgroups and parameters. If the group comes from a description, its state is True."""
     return Config(
         id=group.id,
         parent=group.parent,
@@ -148,7 +148,7 @@ def group_dict(group: Group | GroupState) -> Config:
 
 
 def decode_description(msg: ConfigDescription) -> Config:
-    """Return a type's groups as a tree; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
+    """Return a type's groups as a tree, with a dict of ``name``, ``min``, ``max``, ``default``, ... for each parameter."""
     least, greatest, defaults = (decode_config(each) for each in (msg.min, msg.max, msg.dflt))
 
     def described(group: Group) -> Config:
@@ -172,7 +172,7 @@ def decode_description(msg: ConfigDescription) -> Config:
 
 
 def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None = None) -> Config:
-    """Return a message's groups as a tree; if ``group`` is given and not the root, return only a dict of its subgroups."""
+    """Return a message's groups as a tree, or only the subgroups of ``group`` as a dict if that is not the root."""
     if group is None or group.id == 0:
         return _tree(m.groups, group_dict)
     return _children(m.groups, group.id, group_dict, set())
@@ -200,7 +200,7 @@ def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config],
 
 
 def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a server's initial configuration. The groups' states are those in the type's description."""
+    """Return a server's initial configuration, with the groups' states from the type's description."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -215,7 +215,7 @@ def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Conf
 
 
 def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Decode a configuration. If ``description`` is given, also put the parameters' values into their groups."""
+    """Decode a configuration. If ``description`` is given, also copy the parameters' values to their groups."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -248,7 +248,7 @@ def _all_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, GroupTree]]:
-    """Yield each group in a configuration together with the group of the same name in its description."""
+    """Yield each group in a configuration with the description's group of the same name."""
     yield group, description
     described = {each["name"]: each for each in _groups_in(description)}
     for name, each in group["groups"].items():
@@ -262,7 +262,7 @@ def extract_params(group: GroupTree) -> list[Entry]:
 
 
 def get_parents(group: GroupTree, descriptions: GroupTree) -> list[GroupTree]:
-    """Return the groups that contain a group, outermost first; ``descriptions["group"]`` lists all groups."""
+    """Return a group's ancestors, outermost first; ``descriptions["group"]`` lists all groups."""
     for each in descriptions["group"]:
         if each["id"] == group["parent"] and each is not group:
             return [*get_parents(each, descriptions), each]

@@ -61,13 +61,13 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """Raise Exception if a description contains a quote, as ROS does: its C++ header cannot represent one."""
+    """As in ROS, raise Exception if a description contains a quote: ROS's C++ header cannot represent one."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 
 
 def check_name(name: str) -> None:
-    """Raise Exception if a parameter cannot have this name."""
+    """Raise Exception if a parameter name is invalid."""
     if not _NAME.match(name):
         raise Exception(
             f"The name of field '{name}' does not follow the ROS naming conventions, "
@@ -83,7 +83,7 @@ class ParameterGenerator:
     defval: Mapping[str, Value] = {int_t: 0, double_t: 0.0, str_t: "", bool_t: False}
 
     class Group:
-        """A group of parameters that are shown together. May have subgroups."""
+        """A group of parameters that user interfaces show together. May have subgroups."""
 
         def __init__(
             self, gen: ParameterGenerator, name: str, type: str, state: bool, id: int, parent: int
@@ -156,7 +156,7 @@ class ParameterGenerator:
             return [*self.parameters, *(each for group in self.groups for each in group.get_parameters())]
 
         def get_parents(self) -> list[str]:
-            """Return the names of the groups that contain this group, outermost first, then this group's name."""
+            """Return the names of this group's ancestors, outermost first, then its own name."""
             above = self.get_group(self.parent).get_parents() if self.id else []
             return [*above, self.name]
 
@@ -166,7 +166,7 @@ class ParameterGenerator:
             return "::".join([*map(str.upper, above), name.lower()])
 
         def get_class(self, parent: bool = False) -> str:
-            """Return the name of this group's C++ class or, if ``parent``, of the enclosing class."""
+            """Return the name of this group's C++ class, or of the enclosing class if ``parent`` is true."""
             names = [name.upper() for name in self.get_parents()]
             return "::".join(names[:-1] if parent else names)
 
@@ -192,7 +192,7 @@ class ParameterGenerator:
             }
 
     def __init__(self) -> None:
-        """Read the folders from the command line. Raise SystemExit if they are missing."""
+        """Read the output folders from the command line. Raise SystemExit if they are missing."""
         self.group = self.Group(self, "Default", "", True, 0, 0)
         self.constants: list[Entry] = []
         if len(sys.argv) < 5:
@@ -228,7 +228,7 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value, or set it to ``default`` if it is None.
+        """Convert a parameter's value to its type, or replace None with ``default``.
 
         Raise TypeError if the value cannot be converted.
         """
@@ -238,7 +238,7 @@ class ParameterGenerator:
             self.check_type(param, field)
 
     def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
-        """Add a constant ``NAME_name`` to the module; return it as an argument for ``enum``.
+        """Add a constant ``NAME_name`` to the module, and return it for use in ``enum``.
 
         Raise Exception for an invalid description, TypeError if the value does not have the type ``type``.
         """
@@ -258,7 +258,7 @@ class ParameterGenerator:
         return constant
 
     def enum(self, constants: Sequence[Entry], description: str) -> str:
-        """Return the ``edit_method`` for a parameter whose value is one of these constants.
+        """Return the ``edit_method`` for a parameter that accepts only these constants.
 
         Raise Exception if the constants have different types, or the description is invalid.
         """
@@ -286,7 +286,7 @@ class ParameterGenerator:
         return self.group.add_group(name, type, state)
 
     def generate(self, pkgname: str, nodename: str, name: str) -> None:
-        """Write NAMEConfig.py and its documentation; ``name`` is the .cfg file's name."""
+        """Write NAMEConfig.py and its documentation, for a .cfg file named ``name``."""
         self.pkgname, self.nodename, self.name = pkgname, nodename, name
         self.msgname = f"{name}Config"
         print(f"Generating reconfiguration files for {name} in {pkgname}")
@@ -310,7 +310,7 @@ class ParameterGenerator:
 
 
 def _source_line() -> tuple[str, int]:
-    """Return the .cfg file's name and its current line, to store in a parameter's description."""
+    """Return the .cfg file's name and current line, which a parameter's description records."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

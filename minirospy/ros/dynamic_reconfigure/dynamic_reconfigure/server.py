@@ -93,7 +93,7 @@ class Server:
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values; return the configuration that the callback returns. Exceptions from the callback are propagated."""
+        """Change values and return the callback's configuration. Exceptions from the callback propagate."""
         with self.mutex:
             config = copy.deepcopy(self.config)
             config.update(changes)
@@ -106,7 +106,7 @@ class Server:
         return encode_config(self.update_configuration(changes))
 
     def _copy_from_parameter_server(self, config: Config) -> None:
-        """Use the values on the parameter server; log an error for each value that has the wrong type."""
+        """Load the values from the parameter server; log an error for each value of the wrong type."""
         for param in self._params:
             name = param["name"]
             value = rospy.get_param(self.ns + name, None)

@@ -26,13 +26,13 @@ __all__ = [
 
 
 class JointPositionController(PidJointPositionController):
-    """Controls a joint's position through its effort."""
+    """Controls a joint's position by commanding its effort."""
 
     interfaces = (Interface.EFFORT,)
 
 
 class JointVelocityController(PidJointVelocityController):
-    """Controls a joint's velocity through its effort."""
+    """Controls a joint's velocity by commanding its effort."""
 
     interfaces = (Interface.EFFORT,)
 
@@ -50,6 +50,6 @@ class JointGroupEffortController(ForwardJointGroupCommandController):
 
 
 class JointGroupPositionController(PidJointGroupPositionController):
-    """Controls several joints' positions through their efforts."""
+    """Controls several joints' positions by commanding their efforts."""
 
     interfaces = (Interface.EFFORT,)

@@ -17,7 +17,7 @@ __all__ = ["ForceTorqueSensorController"]
 
 
 class ForceTorqueSensorController(Controller):
-    """Publishes each sensor of the hardware on the topic with the sensor's name."""
+    """Publishes each force-torque sensor on a topic with the sensor's name."""
 
     interfaces = (Interface.FORCE_TORQUE,)
 
@@ -34,7 +34,7 @@ class ForceTorqueSensorController(Controller):
             self._topics.append((hardware.force_torque_sensor(name), publisher))
 
     def starting(self, time: Time) -> None:
-        """Schedule the first message after one period."""
+        """Schedule the first message one period from now."""
         self._rate.start(time)
 
     def update(self, time: Time, period: Duration) -> None:

@@ -18,12 +18,12 @@ __all__ = ["ForwardCommandController", "ForwardJointGroupCommandController"]
 
 
 class ForwardCommandController(Controller):
-    """Forwards numbers from the topic ``command`` to a joint. The first command is the joint's position at the start, or 0.
+    """Forwards numbers from the topic ``command`` to a joint. The initial command is the joint's current position, or 0.
 
     A subclass sets ``interfaces`` to the interface that it commands.
     """
 
-    is_group: ClassVar[bool] = False  # True if the controller commands several joints with one message
+    is_group: ClassVar[bool] = False  # whether one message commands several joints
 
     _joints: list[Joint]
 
@@ -39,7 +39,7 @@ class ForwardCommandController(Controller):
         self._command = self.opened.enter_context(closing(command))
 
     def starting(self, time: Time) -> None:
-        """Hold the position, or command 0."""
+        """Hold the current position, or command 0."""
         if self.interfaces == (Interface.POSITION,):
             self._command.values = [
                 each.position if math.isfinite(each.position) else each.position_command
@@ -49,7 +49,7 @@ class ForwardCommandController(Controller):
             self._command.values = [0.0] * len(self._joints)
 
     def update(self, time: Time, period: Duration) -> None:
-        """Command the joints."""
+        """Set the joints' commands."""
         field = self._field
         for joint, value in zip(self._joints, self._command.values, strict=True):
             setattr(joint, field, value)

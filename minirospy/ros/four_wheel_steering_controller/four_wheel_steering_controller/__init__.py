@@ -9,10 +9,10 @@ __all__ = ["FourWheelSteeringController"]
 
 
 class FourWheelSteeringController(Controller):
-    """Refuses to be loaded."""
+    """Reports that four wheel steering is not supported."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Raise ControllerError, which names what is missing."""
+        """Raise ControllerError, listing the missing features."""
         raise ControllerError(
             f"controller '{context.name}': minirospy has no four wheel steering (its odometry, and four_wheel_steering_msgs "
             "for the topic cmd_four_wheel_steering), so front_wheel, rear_wheel, front_steering and rear_steering have no "

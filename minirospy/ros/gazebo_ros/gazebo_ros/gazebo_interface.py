@@ -21,7 +21,7 @@ def spawn_sdf_model_client(
     reference_frame: str,
     gazebo_namespace: str,
 ) -> bool | None:
-    """Wait for the service, and spawn a model from SDF; return the response's ``success``, or None if the call failed."""
+    """Wait for the service and spawn a model from SDF; return the response's ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/spawn_sdf_model"
     return _spawn(service, model_name, model_xml, robot_namespace, initial_pose, reference_frame)
 
@@ -34,7 +34,7 @@ def spawn_urdf_model_client(
     reference_frame: str,
     gazebo_namespace: str,
 ) -> bool | None:
-    """Wait for the service, and spawn a model from URDF; return the response's ``success``, or None if the call failed."""
+    """Wait for the service and spawn a model from URDF; return the response's ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/spawn_urdf_model"
     return _spawn(service, model_name, model_xml, robot_namespace, initial_pose, reference_frame)
 
@@ -46,7 +46,7 @@ def set_model_configuration_client(
     joint_positions: Sequence[float],
     gazebo_namespace: str,
 ) -> bool | None:
-    """Set joint positions after one second; return the response's ``success``, or None if the call failed."""
+    """After one second, set joint positions; return the response's ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/set_model_configuration"
     rospy.loginfo(f"Waiting for service {service}")
     rospy.wait_for_service(service)

@@ -38,19 +38,17 @@ __all__ = [
 ]
 
 FIXED_KINDS = ("fixed",)
-MAX_LIMIT = 1e15  # SDF writes 1e16 to mean no limit
+MAX_LIMIT = 1e15  # SDF uses 1e16 for no limit
 MIN_RANGE = 1e-5  # MuJoCo rejects ranges of length zero
 MAX_LIGHTS = 8  # OpenGL's maximum
 MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer substeps, MuJoCo softens contacts, and wheels slip
-VISUAL = "\tvisual"  # separates the names of visuals from those of collisions
-MOTOR_DAMPING = (
-    0.9999  # MuJoCo's maximum impedance: friction rows of joints, and motors, are as stiff as possible
-)
+VISUAL = "\tvisual"  # suffix that separates the names of visuals from those of collisions
+MOTOR_DAMPING = 0.9999  # MuJoCo's maximum impedance: joint friction and motors are as stiff as possible
 
 
 @dataclass
 class BuiltModel:
-    """The parts that were added to the spec for a model.
+    """The parts that a model has added to the MuJoCo spec.
 
     ``roots``: the bodies directly below the world, by link name. ``free``: those with six degrees of freedom. ``joints``: the
     joints in the body tree. ``others``: contact exclusions and equalities.
@@ -64,7 +62,7 @@ class BuiltModel:
 
 
 class Builder:
-    """Adds models to a spec, and deletes them."""
+    """Adds models to a MuJoCo spec and deletes them."""
 
     def __init__(self, physics: Physics) -> None:
         mujoco = load_mujoco()
@@ -76,10 +74,10 @@ class Builder:
         option = self.spec.option
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        option.impratio = 10.0  # reduces creep in friction: 0.5 mm in 2 s on a slope
+        option.impratio = 10.0  # reduces creep under friction to 0.5 mm in 2 s on a slope
         option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.set_physics(physics)
-        self.has_visuals = False  # visuals cost time and memory, and only cameras need them
+        self.has_visuals = False  # only cameras need visuals, which cost time and memory
 
     def set_physics(self, physics: Physics) -> None:
         """Set the time step and gravity for the next compilation."""
@@ -101,7 +99,7 @@ class Builder:
                 self._add_mimics(built, model, name)
         except Exception as error:
             self.delete(built)
-            self.shapes.warnings.clear()  # they would be attributed to the next model
+            self.shapes.warnings.clear()  # otherwise the next model would report these warnings
             if isinstance(error, SimulationError):
                 raise SimulationError(f"model '{name}': {error}") from error.__cause__
             if isinstance(error, (ValueError, TypeError, OSError)):
@@ -110,7 +108,7 @@ class Builder:
         return built
 
     def add_scene(self, world: World) -> None:
-        """Add a world's background and lights, and add visuals for all models added from now on."""
+        """Add a world's background and lights, and the visuals of all models added from now on."""
         self.has_visuals = True
         mujoco = self._mujoco
         red, green, blue, _ = world.background
@@ -143,7 +141,7 @@ class Builder:
                 row.type = names.get(light.kind, kinds.mjLIGHT_POINT)
 
     def add_visuals(self, built: BuiltModel, model: Model, name: str) -> list[str]:
-        """Add a model's visuals. Return a line for each unreadable one, which pictures will lack."""
+        """Add a model's visuals. Return a warning for each unreadable one, which is left out."""
         warnings: list[str] = []
         for link in model.links.values():
             for visual in link.visuals:
@@ -161,7 +159,7 @@ class Builder:
                 self.spec.delete(geom)
 
     def take_warnings(self, name: str) -> list[str]:
-        """Return and clear the warnings about the shapes of a model that was just added."""
+        """Return and clear the warnings about the shapes of the last model added."""
         lines = [f"model '{name}': {line}" for line in self.shapes.warnings]
         self.shapes.warnings.clear()
         return lines
@@ -247,7 +245,7 @@ class Builder:
             row.range = [max(lower, -MAX_LIMIT), min(upper, MAX_LIMIT)]
 
     def _add_excludes(self, built: BuiltModel, model: Model, name: str) -> None:
-        """Exclude contacts within the model or, if the model collides with itself, between links that a joint connects."""
+        """Exclude contacts within the model, or only between links connected by a joint if the model collides with itself."""
         with_shapes = [link for link in model.links.values() if link.collisions]
         joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
         for index, first in enumerate(with_shapes):
@@ -262,7 +260,7 @@ class Builder:
                 )
 
     def _add_loop(self, built: BuiltModel, model: Model, name: str, joint: Joint) -> None:
-        """Close a kinematic loop with an equality: a weld, or connections at one or two points on the axis."""
+        """Close a kinematic loop with an equality constraint: a weld, or connections at one or two points on the axis."""
         child = model.links[joint.child].pose
         parent = IDENTITY if joint.parent == WORLD else model.links[joint.parent].pose
         first = f"{name}::{joint.child}"
@@ -271,7 +269,7 @@ class Builder:
             raise SimulationError(f"joint '{joint.name}' closes a loop: a prismatic joint cannot do that")
         equality = self._mujoco.mjtEq
         if joint.kind == "fixed":
-            pose = relative(child, parent)  # of the parent, in the child's frame
+            pose = relative(child, parent)  # the parent's pose in the child's frame
             data = [0.0] * 11
             data[3:6] = pose.position
             data[6:10] = to_wxyz(pose.orientation)
@@ -320,12 +318,12 @@ def set_inertial(body: Any, inertial: Inertial) -> None:
 
 
 def count_substeps(step: float) -> int:
-    """Return the number of MuJoCo steps for one step of the world, which takes ``step`` seconds."""
+    """Return the number of MuJoCo steps per world step; ``step`` is the world step in seconds."""
     return max(1, math.ceil(step / MAX_SUBSTEP - 1e-9))
 
 
 def axis_names(scoped: str, joint: Joint) -> tuple[str, ...]:
-    """Return the names of the MuJoCo joints for a joint: one per axis, none for a fixed joint."""
+    """Return the names of a joint's MuJoCo joints: one per axis, none for a fixed joint."""
     if joint.kind in FIXED_KINDS:
         return ()
     return (scoped, f"{scoped}/1") if joint.kind == "universal" else (scoped,)
@@ -337,12 +335,12 @@ def has_limits(axis: Axis) -> bool:
 
 
 def _turns_freely(joint: Joint) -> bool:
-    """Return whether a joint rotates without limits."""
+    """Return whether a joint rotates without position limits."""
     return joint.kind == "continuous" or (joint.kind == "revolute" and not has_limits(joint.axis))
 
 
 def _is_wheel(joint: Joint, collision: Collision) -> bool:
-    """Return whether a collision is a short cylinder that a joint without limits rotates about its own axis."""
+    """Return whether a collision is a short cylinder that a joint without limits turns about the cylinder's axis."""
     shape = collision.geometry
     if not _turns_freely(joint) or not isinstance(shape, Cylinder) or shape.length > 2 * shape.radius:
         return False
@@ -356,7 +354,7 @@ def _is_wheel(joint: Joint, collision: Collision) -> bool:
 
 
 def _is_steep(pose: Pose, collision: Collision) -> bool:
-    """Return whether a collision is a plane that is closer to vertical than to horizontal. ``pose``: its pose in the world."""
+    """Return whether a collision is a plane closer to vertical than to horizontal. ``pose`` is the collision's world pose."""
     shape = collision.geometry
     if not isinstance(shape, Plane):
         return False
@@ -365,7 +363,7 @@ def _is_steep(pose: Pose, collision: Collision) -> bool:
 
 
 def _check_numbers(link: Link, joint: Joint | None) -> None:
-    """Raise SimulationError if a number is not finite, or a joint's limit is NaN, because MuJoCo accepts NaN."""
+    """Raise SimulationError if a number is not finite or a joint limit is NaN, because MuJoCo accepts NaN."""
     inertial = link.inertial
     values = [*link.pose.position, *link.pose.orientation, inertial.mass, *inertial.inertia]
     values += [*inertial.pose.position, *inertial.pose.orientation]
@@ -390,14 +388,14 @@ def _check_numbers(link: Link, joint: Joint | None) -> None:
 
 
 def _direction(joint: Joint, axis: Axis) -> Vector:
-    """Return the axis in the child link's frame."""
+    """Return a joint axis in the child link's frame."""
     if not math.hypot(*axis.xyz) > 1e-9:
         raise SimulationError(f"joint '{joint.name}' has an axis of length zero")
     return rotate(joint.pose.orientation, axis.xyz)
 
 
 def _set_first(row: Any, name: str, value: float) -> None:
-    """Set a coefficient: a plain number before MuJoCo 4, the first coefficient of a polynomial since then."""
+    """Set a coefficient: a number before MuJoCo 4, a polynomial's first coefficient since then."""
     if isinstance(getattr(row, name), float):
         setattr(row, name, value)
     else:

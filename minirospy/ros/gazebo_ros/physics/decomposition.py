@@ -18,19 +18,19 @@ from minirospy.workspace.folders import ros_home
 __all__ = ["Decomposition"]
 
 FOLDER = "convex_parts"  # in ROS_HOME
-CONCAVITY = 0.05  # relative to the mesh's size; coacd's default
-MAX_TRIANGLES = 20_000  # a finer mesh would take minutes
+CONCAVITY = 0.05  # concavity threshold, relative to the mesh's size; coacd's default
+MAX_TRIANGLES = 20_000  # decomposing a finer mesh would take minutes
 
 
 class Decomposition:
-    """Splits hollow meshes. ``warnings`` receives a line for each split mesh, and a single line if coacd is missing."""
+    """Splits hollow meshes into convex parts. ``warnings`` names each split mesh; if coacd is missing, it says so once."""
 
     def __init__(self, warnings: list[str]) -> None:
         self._warnings = warnings
         self._is_told = False
 
     def split(self, mesh: Mesh, name: str, most: int) -> list[Mesh] | None:
-        """Return at most this number of convex parts of a connected mesh, or None to use its hull."""
+        """Return at most this many convex parts of a connected mesh, or None to use its convex hull."""
         data = mesh.vertices.tobytes() + mesh.triangles.tobytes() + f"{most} {CONCAVITY}".encode()
         path = Path(ros_home(), FOLDER, f"{hashlib.sha256(data).hexdigest()[:32]}.npz")
         try:
@@ -75,7 +75,7 @@ class Decomposition:
 
 
 def _keep(path: Path, parts: list[Mesh]) -> None:
-    """Write the parts to a file, if possible. A reader never sees an incomplete file."""
+    """Write the parts to a cache file, if possible, without exposing an incomplete file to readers."""
     partial = path.with_name(f"{path.stem}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -21,15 +21,15 @@ from minirospy.ros.gazebo_ros.physics.shapes import GROUP_COLLISION, GROUP_RAY_O
 __all__ = ["Engine"]
 
 RAY_GROUPS = np.array([each in (GROUP_COLLISION, GROUP_RAY_ONLY) for each in range(6)], np.uint8)
-MIN_SWING = 0.5  # rad/s; Coriolis forces of slower joints need no correction
-MIN_GRAIN = 0.1  # sine of the angle to the normal; a direction of friction that is nearer to it is none: bodies tilt a little
+MIN_SWING = 0.5  # rad/s; slower joints need no correction of Coriolis forces
+MIN_GRAIN = 0.1  # sine of the angle to the normal; ignore a friction direction closer to the normal
 MIN_FRICTION = 1e-5  # MuJoCo's own
-MAX_FORCE = 1e9  # N or N m; a motor without a limit
-MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster motor targets would make contacts explode
+MAX_FORCE = 1e9  # N or N m; the limit for a motor without one
+MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster motor targets make contacts unstable
 
 
 class Engine:
-    """The compiled world.
+    """The compiled world in MuJoCo.
 
     A motor is a row of joint friction with a nonzero target velocity, like ODE's motors: the solver maintains the velocity with
     at most the maximum force. MuJoCo computes such a row's reference acceleration as ``-b * velocity``; this class adds ``b *
@@ -42,7 +42,7 @@ class Engine:
         self._set_step(physics)
         self.model: Any = builder.spec.compile()
         self.data: Any = self.mujoco.MjData(self.model)
-        self.generation = 0  # grows with each compilation, which changes the ids of bodies and joints
+        self.generation = 0  # incremented by each compilation, which changes body and joint ids
         self.is_stale = True  # whether positions have changed since the last forward computation
         self.records_details = False  # whether contact and joint forces are recorded for readers
         self.contacts: NDArray[np.int32] = np.zeros((0, 2), np.int32)
@@ -56,18 +56,18 @@ class Engine:
 
     def _set_step(self, physics: Physics) -> None:
         self.physics = physics
-        self.substeps = count_substeps(physics.step)  # number per step of the world
+        self.substeps = count_substeps(physics.step)  # MuJoCo steps per world step
         self.substep = physics.step / self.substeps  # s
 
     def _size_arrays(self) -> None:
         count = self.model.nv
         self.target_velocity: NDArray[np.float64] = np.zeros(count)
-        self.motor_force: NDArray[np.float64] = np.zeros(count)  # in the last step
+        self.motor_force: NDArray[np.float64] = np.zeros(count)  # the motors' forces in the last step
         self.target_position: NDArray[np.float64] = np.zeros(count)
         self.max_velocity: NDArray[np.float64] = np.full(count, MAX_MOTOR_SPEED)
         self.follows_position: NDArray[np.bool_] = np.zeros(count, np.bool_)
-        self.motor_limit: NDArray[np.float64] = np.zeros(count)  # of motors on damped joints
-        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # of these joints; 0 for all others
+        self.motor_limit: NDArray[np.float64] = np.zeros(count)  # force limits of motors on damped joints
+        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # damping of these joints; 0 for all others
         self._damped: NDArray[np.intp] = np.zeros(0, np.intp)
         self._followers: NDArray[np.intp] = np.zeros(0, np.intp)
         self._follower_positions: NDArray[np.intp] = np.zeros(0, np.intp)
@@ -87,7 +87,7 @@ class Engine:
         self.model.dof_solimp[:] = (MOTOR_DAMPING, MOTOR_DAMPING, 0.001, 0.5, 2.0)
 
     def recompile(self) -> None:
-        """Compile the changed spec, keeping the time and the states of remaining models. Raise ValueError if it is invalid."""
+        """Compile the changed spec, keeping the time and the other models' states. Raise ValueError if it is invalid."""
         self.model, self.data = self._builder.spec.recompile(self.model, self.data)
         self.generation += 1
         self.is_stale = True
@@ -105,26 +105,26 @@ class Engine:
         self.is_stale = True
 
     def motors_changed(self) -> None:
-        """Record that the motors' targets have changed."""
+        """Record that motor targets have changed."""
         self._bias = self.target_velocity * self._rate
         self._damped = np.flatnonzero(self.motor_damping)
         self._followers = np.flatnonzero(self.follows_position)
         self._follower_positions = self.position_of_dof[self._followers]
 
     def set_target(self, dof: int, velocity: float) -> None:
-        """Set the target velocity of one motor."""
+        """Set one motor's target velocity."""
         self.target_velocity[dof] = velocity
         self._bias[dof] = velocity * self._rate
 
     def refresh(self) -> None:
-        """If the state has changed, compute the bodies' positions, contacts and velocities."""
+        """Compute the bodies' positions, contacts and velocities if the state has changed."""
         if self.is_stale:
             self.is_stale = False
             self._begin()
             self._forget_details()
 
     def advance(self, left: int = 1) -> None:
-        """Advance by one substep; ``left`` is the number of substeps left in the world's step, including this one."""
+        """Advance by one substep; ``left`` counts the substeps left in the world step, including this one."""
         model, data, mujoco = self.model, self.data, self.mujoco
         self.refresh()
         if self._followers.size:
@@ -164,7 +164,7 @@ class Engine:
                 compute(model, data)
 
     def _find_grains(self) -> None:
-        """Read the two directions of friction of each geom that has them, and both coefficients of all geoms."""
+        """Read the friction directions of geoms that have them, and both friction coefficients of all geoms."""
         model, grains = self.model, self._builder.shapes.grains
         self._grain_directions: NDArray[np.float64] = np.zeros((model.ngeom, 3))
         self._frictions: NDArray[np.float64] = np.repeat(model.geom_friction[:, :1], 2, axis=1)
@@ -176,7 +176,7 @@ class Engine:
         self._has_grains = bool(self._has_grain.any())
 
     def _turn_friction(self) -> bool:
-        """Turn the tangents of contacts to the directions of friction, and set both coefficients. Return whether any changed.
+        """Align contact tangents with the friction directions and set both coefficients; return whether any contact changed.
 
         As in ODE, the smaller ``mu`` and the smaller ``mu2`` of the two geoms count. If both have a direction, that of the geom
         with the smaller ``mu`` does. A direction along the normal is none: then the contact keeps one coefficient.
@@ -209,11 +209,11 @@ class Engine:
         max_range: float,
         excluded_body: int,
     ) -> None:
-        """Write the first geom that each ray hits, and its distance or -1. ``vectors``: (n, 3) unit vectors in world axes."""
-        # Newer versions have an argument for normals.
+        """Store the first geom that each ray hits, and its distance or -1. ``vectors``: (n, 3) unit vectors in world axes."""
+        # Newer MuJoCo versions have an argument for normals.
         normals = (None,) if self._has_normals else ()
-        # MuJoCo checks all geoms of a body for each ray. A room that is one mesh has thousands of geoms for contacts, after the
-        # mesh.
+        # MuJoCo checks a body's first ``body_geomnum`` geoms for each ray. Exclude the contact geoms after them.
+        # A room that is a single mesh has thousands of contact geoms.
         counts = self.model.body_geomnum
         all_counts = counts.copy()
         counts[:] = self._ray_counts
@@ -236,7 +236,7 @@ class Engine:
             counts[:] = all_counts
 
     def _count_ray_geoms(self) -> NDArray[np.int32]:
-        """Return, for each body, how many of its first geoms a ray must check: all up to the last geom that rays can hit."""
+        """Return the number of geoms per body that a ray must check: up to the last geom that rays can hit."""
         model = self.model
         counts = np.zeros(model.nbody, np.int32)
         geoms = np.flatnonzero(RAY_GROUPS[model.geom_group])
@@ -246,7 +246,7 @@ class Engine:
 
     def geoms_within(self, point: NDArray[np.float64], distance: float) -> NDArray[np.intp]:
         """Return the geoms within a distance (m) of a point in the world."""
-        radii = self.model.geom_rbound  # 0 means an infinite geom
+        radii = self.model.geom_rbound  # a radius of 0 means an infinite geom
         away = np.linalg.norm(self.data.geom_xpos - point, axis=1)
         return np.flatnonzero((radii > 0) & (away + radii < distance))
 
@@ -275,7 +275,7 @@ class Engine:
         return correction
 
     def _find_swinging(self) -> NDArray[np.intp]:
-        """Return the degrees of freedom of joints whose links are not balanced as wheels are."""
+        """Return the degrees of freedom of hinge joints that turn an unbalanced mass, unlike wheels."""
         model = self.model
         result: list[int] = []
         for joint in np.flatnonzero(model.jnt_type == self.mujoco.mjtJoint.mjJNT_HINGE).tolist():
@@ -288,14 +288,14 @@ class Engine:
         return np.array(result, np.intp)
 
     def _follow(self, left: int) -> None:
-        """Give position motors the velocity that reaches the target at the last of ``left`` substeps."""
+        """Set position motors' velocities so that they reach their targets in the last of ``left`` substeps."""
         dofs = self._followers
         lacking = self.target_position[dofs] - self.data.qpos[self._follower_positions]
         limit = self.max_velocity[dofs]
         self._bias[dofs] = np.clip(lacking / (left * self.substep), -limit, limit) * self._rate
 
     def _limit_damped(self) -> None:
-        """Set the damping of joints with motors, and the force that their motors have left.
+        """Set the damping of joints with motors, and the motors' remaining force.
 
         MuJoCo integrates damping implicitly: on a light wheel, this slows a motor for many steps, and the reaction pushes the
         robot back. As long as a motor is stronger than the damping, the damping is therefore included in the motor's force
@@ -313,7 +313,7 @@ class Engine:
         self.model.dof_frictionloss[dofs] = np.where(is_strong, left, limit)
 
     def _record(self) -> None:
-        """Save the step's contacts and forces before those of the next step overwrite them."""
+        """Save the step's contacts and forces before the next step overwrites them."""
         data = self.data
         contact = data.contact
         self.contacts = contact.geom.copy()

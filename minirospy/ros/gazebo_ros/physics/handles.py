@@ -34,25 +34,25 @@ __all__ = ["Owner", "SimJoint", "SimLink", "SimModel"]
 
 
 class Owner(Protocol):
-    """The part of the simulation that a model uses."""
+    """The simulation's interface for models."""
 
     engine: Engine
     forced: dict[str, None]
 
     @property
     def time(self) -> float:
-        """Return the time in seconds."""
+        """Return the simulated time in seconds."""
 
     def recompile(self) -> None:
         """Compile the world again."""
 
     def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
-        """Change one of MuJoCo's joints."""
+        """Change a MuJoCo joint's limits and passive forces."""
 
 
 @dataclass
 class TimedWrench:
-    """A wrench in world axes at a point of the link, active while ``start`` <= time < ``end`` (s)."""
+    """A wrench in world axes at a point on the link, active while ``start`` <= time < ``end`` (s)."""
 
     force: Vector
     torque: Vector
@@ -78,7 +78,7 @@ class SimLink:
         self.model = model
         self.record = record
         self.name = record.name
-        self.id = 0  # MuJoCo's id, which changes with each compilation
+        self.id = 0  # MuJoCo's body id, changed by each compilation
         self.wrenches: list[TimedWrench] = []
         self.has_damping = (record.linear_damping > 0 or record.angular_damping > 0) and not model.is_static
 
@@ -89,14 +89,14 @@ class SimLink:
 
     @property
     def pose(self) -> Pose:
-        """Return the pose in the world."""
+        """Return the link's pose in the world."""
         self.engine.refresh()
         data = self.engine.data
         return _pose(data.xpos[self.id], data.xquat[self.id])
 
     @property
     def state(self) -> State:
-        """Return the pose of the link's origin, and its velocity."""
+        """Return the link's pose and the velocity of its origin."""
         pose = self.pose
         engine = self.engine
         velocity = np.zeros(6)
@@ -106,13 +106,13 @@ class SimLink:
         return State(pose, (vx, vy, vz), (wx, wy, wz))
 
     def set_state(self, state: State) -> None:
-        """Move the whole model so that this link has the state. Joint positions stay, and joint velocities become zero."""
+        """Move the whole model to give this link the state. Keep the joint positions and stop the joints."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         self.model.move(self.pose, state)
 
     @property
     def center_of_mass(self) -> Vector:
-        """Return the centre of mass in the world."""
+        """Return the world position of the centre of mass."""
         self.engine.refresh()
         x, y, z = self.engine.data.xipos[self.id].tolist()
         return x, y, z
@@ -132,7 +132,7 @@ class SimLink:
             self.model.simulation.recompile()
 
     def set_inertial(self, inertial: Inertial) -> None:
-        """Change the mass and inertia, and recompile the world. A static model has none."""
+        """Change the mass and inertia and recompile the world. For a static model, only store them."""
         _check(self, inertial.mass, *inertial.inertia, *inertial.pose.position, *inertial.pose.orientation)
         if inertial.mass <= 0:
             raise SimulationError(f"{self.scoped_name}: a mass must be positive")
@@ -168,7 +168,7 @@ class SimLink:
         self.wrenches.clear()
 
     def apply_wrenches(self, now: float) -> bool:
-        """Add this step's forces to MuJoCo's, and drop expired ones. Return whether some remain."""
+        """Pass this step's forces to MuJoCo and remove expired ones. Return whether any remain."""
         step = self.engine.physics.step
         row = self.engine.data.xfrc_applied[self.id]
         position, orientation = self.pose
@@ -180,7 +180,7 @@ class SimLink:
                 row[3:] += add(each.torque, cross(arm, each.force))
         self.wrenches = [each for each in self.wrenches if each.end > now + 1.5 * step]
         if self.has_damping:
-            # As in ODE, a fraction of the velocity is lost in each step.
+            # As in ODE, velocity decay removes a fraction of the velocity in each step.
             _, linear, angular = self.state
             mass = float(self.engine.model.body_mass[self.id])
             moments = self.engine.model.body_inertia[self.id].tolist()
@@ -203,13 +203,13 @@ class SimJoint:
         self.record = record
         self.axis = axis
         self.name = record.name
-        self.scoped = scoped  # MuJoCo's name, or an empty string
+        self.scoped = scoped  # name in MuJoCo, or an empty string
         self.second: SimJoint | None = None  # the second axis of a universal joint
-        self.dof = -1  # MuJoCo's index, which changes with each compilation
+        self.dof = -1  # index of MuJoCo's degree of freedom, changed by each compilation
         self._address = -1
         self._force = 0.0
         self._timed: list[TimedForce] = []
-        self._max_force = 0.0  # of the motor; 0: no motor
+        self._max_force = 0.0  # the motor's maximum force; 0 without a motor
         self._velocity = 0.0
         self._target: float | None = None
         self._max_velocity = MAX_MOTOR_SPEED
@@ -221,24 +221,24 @@ class SimJoint:
 
     @property
     def position(self) -> float:
-        """Return the position."""
+        """Return the joint's position in rad or m."""
         return float(self.engine.data.qpos[self._address]) if self.dof >= 0 else 0.0
 
     @property
     def velocity(self) -> float:
-        """Return the velocity."""
+        """Return the joint's velocity in rad/s or m/s."""
         return float(self.engine.data.qvel[self.dof]) if self.dof >= 0 else 0.0
 
     @property
     def effort(self) -> float:
-        """Return the force in the last step: the applied force, plus that of the motor or of the joint's friction."""
+        """Return the last step's force: the applied force plus that of the motor or joint friction."""
         if self.dof < 0:
             return 0.0
         engine = self.engine
         return float(engine.data.qfrc_applied[self.dof] + engine.motor_force[self.dof])
 
     def set_state(self, position: float, velocity: float = 0.0) -> None:
-        """Set position and velocity immediately."""
+        """Set the position and velocity immediately."""
         _check(self, position, velocity)
         if self.dof >= 0:
             self.engine.data.qpos[self._address] = position
@@ -246,7 +246,7 @@ class SimJoint:
             self.engine.is_stale = True
 
     def set_axis(self, axis: Axis) -> None:
-        """Change limits, damping, friction and spring, but not the direction, and recompile the world.
+        """Change the axis's limits, damping, friction and spring, but not its direction, and recompile the world.
 
         Raise SimulationError if damping or friction is not finite, or a limit is NaN.
         """
@@ -266,24 +266,24 @@ class SimJoint:
             self.engine.is_stale = True
 
     def set_force(self, force: float) -> None:
-        """Apply a force in each step until another one is set. The joint's effort and velocity limits may reduce it."""
+        """Apply a force in each step until it is replaced. The joint's effort and velocity limits may reduce it."""
         _check(self, force)
         self._force = force
         self.model.force_changes()
 
     def add_force(self, force: float, *, start: float = 0.0, duration: float = math.inf) -> None:
-        """Apply a force from ``start`` (s; in the past: now) for a duration (s; negative: forever)."""
+        """Apply a force from ``start`` (s; now if in the past) for ``duration`` (s; forever if negative)."""
         _check(self, force)
         self._timed.append(TimedForce(force, *self.model.force_changes(start, duration)))
 
     def clear_forces(self) -> None:
-        """Remove the forces set by :meth:`set_force` and :meth:`add_force`."""
+        """Remove the forces from :meth:`set_force` and :meth:`add_force`."""
         self._force = 0.0
         self._timed.clear()
         self.model.force_changes()
 
     def set_velocity(self, velocity: float, max_force: float = math.inf) -> None:
-        """Start or change a motor that holds a velocity with a limited force."""
+        """Start or update a motor that holds a velocity with limited force."""
         _check(self, velocity)
         self._velocity, self._target = min(max(velocity, -MAX_MOTOR_SPEED), MAX_MOTOR_SPEED), None
         self._start_motor(max_force)
@@ -291,14 +291,14 @@ class SimJoint:
     def set_position(
         self, position: float, max_force: float = math.inf, max_velocity: float = math.inf
     ) -> None:
-        """Start or change a motor that moves to a position with limited force and velocity."""
+        """Start or update a motor that moves to a position with limited force and velocity."""
         _check(self, position)
         self._velocity, self._target = 0.0, position
         self._max_velocity = min(max_velocity, MAX_MOTOR_SPEED)
         self._start_motor(max_force)
 
     def stop_motor(self) -> None:
-        """Remove the motor, so that the joint moves freely."""
+        """Remove the motor so that the joint moves freely."""
         self._max_force, self._target, self._velocity = 0.0, None, 0.0
         self._write_motor()
 
@@ -325,7 +325,7 @@ class SimJoint:
         engine.motor_limit[dof] = self._max_force
         engine.motor_damping[dof] = damping if self._max_force else 0.0
         engine.model.dof_damping[dof] = 0.0 if self._max_force else damping
-        # Without a motor, the row is the joint's friction, with a target velocity of 0.
+        # Without a motor, this constraint is the joint's friction, with target velocity 0.
         engine.target_velocity[dof] = self._velocity if self._max_force else 0.0
         engine.follows_position[dof] = self._target is not None and self._max_force > 0
         if self._target is not None:
@@ -335,7 +335,7 @@ class SimJoint:
         engine.is_stale = True
 
     def bind(self) -> None:
-        """Look up MuJoCo's ids after a compilation, and set the motor again."""
+        """Look up MuJoCo's ids after a compilation and restore the motor."""
         if not self.scoped or self.record.kind == "ball":
             return
         row = self.engine.model.joint(self.scoped)
@@ -344,7 +344,7 @@ class SimJoint:
             self._write_motor()
 
     def apply_forces(self, now: float) -> bool:
-        """Apply this step's force. Return whether a force remains for later steps."""
+        """Apply this step's force. Return whether forces remain for later steps."""
         if self.dof < 0:
             return False
         force = self._force
@@ -363,13 +363,13 @@ class SimJoint:
         return bool(self._force or self._timed)
 
     def reset(self) -> None:
-        """Return to the initial position, and remove forces and the motor."""
+        """Return to the initial position; remove the forces and the motor."""
         self.clear_forces()
         self.stop_motor()
         self.set_state(self.axis.initial_position)
 
     def wrench(self) -> Wrench:
-        """Return the force and torque that the child exerts on the parent at the joint, in the child link's axes.
+        """Return the force and torque that the child link exerts on its parent at the joint, in the child's axes.
 
         They belong to the last step, and require ``Simulation.records_details``.
         """
@@ -389,7 +389,7 @@ class SimJoint:
 
 
 class SimModel:
-    """A model in the simulation: its links and joints by name."""
+    """A simulated model: its links and joints by name."""
 
     def __init__(self, simulation: Owner, name: str, record: Model, start: Pose, built: BuiltModel) -> None:
         self.simulation = simulation
@@ -397,7 +397,7 @@ class SimModel:
         self.name = name
         self.record = record
         self.built = built
-        self.start = start  # the pose to which a reset returns
+        self.start = start  # the pose that reset() restores
         self.is_removed = False
         self.links: Mapping[str, SimLink] = {
             key: SimLink(engine, self, link) for key, link in record.links.items()
@@ -412,23 +412,23 @@ class SimModel:
 
     @property
     def is_static(self) -> bool:
-        """Return whether the model never moves by itself."""
+        """Return whether the model is static and never moves by itself."""
         return self.record.is_static
 
     @property
     def canonical_link(self) -> SimLink:
-        """Return the link that carries the model's frame: the first one."""
+        """Return the first link, which carries the model's frame."""
         return next(iter(self.links.values()))
 
     @property
     def pose(self) -> Pose:
-        """Return the pose of the model's frame, which moves with the first link."""
+        """Return the pose of the model's frame, which is fixed to the first link."""
         link = self.canonical_link
         return compose(link.pose, inverse(link.record.pose))
 
     @property
     def state(self) -> State:
-        """Return the pose of the model's frame, and the velocity of its origin."""
+        """Return the pose of the model's frame and the velocity of its origin."""
         link = self.canonical_link
         state = link.state
         pose = compose(state.pose, inverse(link.record.pose))
@@ -436,18 +436,18 @@ class SimModel:
         return State(pose, add(state.linear, cross(state.angular, arm)), state.angular)
 
     def set_state(self, state: State) -> None:
-        """Move the model. Joint positions stay, and joint velocities become zero."""
+        """Move the model. Keep the joint positions and stop the joints."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         self.move(self.pose, state)
 
     def set_velocity(self, linear: Vector, angular: Vector) -> None:
-        """Set the velocity of the model's origin in world axes. The pose and the joints stay unchanged."""
+        """Set the velocity of the model's origin in world axes. Keep the pose and the joint states."""
         _check(self, *linear, *angular)
         origin = self.pose.position
         self._set_free_velocities(linear, angular, origin)
 
     def move(self, base: Pose, state: State) -> None:
-        """Move the model as a rigid body, so that its frame at the pose ``base`` gets the state. Joints stop."""
+        """Move the model rigidly, which moves its frame from the pose ``base`` to ``state``. The joints stop."""
         self.engine.refresh()
         change = compose(state.pose, inverse(base))
         for joint in self.all_joints():
@@ -459,12 +459,12 @@ class SimModel:
         self._set_free_velocities(state.linear, state.angular, state.pose.position)
 
     def _rest_pose(self, root: str) -> Pose:
-        """Return a non-free root body's pose in the world, with its joint at position 0."""
+        """Return a non-free root body's world pose at joint position 0."""
         model, body = self.engine.model, self.links[root].id
         return _pose(model.body_pos[body], model.body_quat[body])
 
     def _place(self, root: str, pose: Pose) -> None:
-        """Set a root body's pose, with its joint, if any, at position 0."""
+        """Set a root body's pose at joint position 0."""
         engine = self.engine
         body = self.links[root].id
         x, y, z, w = normalized(pose.orientation)
@@ -478,7 +478,7 @@ class SimModel:
         engine.model.body_quat[body] = (w, x, y, z)
 
     def _set_free_velocities(self, linear: Vector, angular: Vector, origin: Vector) -> None:
-        """Set the velocities of free bodies, as of one rigid body; MuJoCo's angular part is in the body's axes."""
+        """Give all free bodies the velocity of one rigid body. MuJoCo expects the angular part in body axes."""
         engine = self.engine
         for link in map(self.links.__getitem__, self.built.free):
             pose = link.pose
@@ -488,7 +488,7 @@ class SimModel:
         engine.is_stale = True
 
     def all_joints(self) -> Iterator[SimJoint]:
-        """Yield each joint, followed by the second axis if the joint is universal."""
+        """Yield each joint; a universal joint is followed by its second axis."""
         for joint in self.joints.values():
             yield joint
             if joint.second is not None:
@@ -523,14 +523,14 @@ class SimModel:
         return remains
 
     def force_changes(self, start: float = 0.0, duration: float = 0.0) -> tuple[float, float]:
-        """Tell the simulation that a force acts on this model. Return its start, which is not in the past, and its end (s)."""
+        """Notify the simulation of a force on this model. Return the force's start (now or later) and end, in s."""
         self.simulation.forced[self.name] = None
         start = max(start, self.simulation.time)
         return start, start + duration if duration >= 0 else math.inf
 
 
 def _check(owner: SimLink | SimJoint | SimModel, *values: float) -> None:
-    """Raise SimulationError, which names the owner, if a value is infinite or NaN."""
+    """Raise SimulationError, naming the owner, if a value is infinite or NaN."""
     if not all(map(math.isfinite, values)):
         name = owner.name if isinstance(owner, SimModel) else f"{owner.model.name}::{owner.name}"
         raise SimulationError(f"{name}: a force, position or velocity is not finite")

@@ -17,7 +17,7 @@ class SimulationError(MinirospyError):
 
 @cache
 def load_mujoco() -> Any:
-    """Return the module ``mujoco``. If it is missing, raise SimulationError with the command that installs it."""
+    """Return the module ``mujoco``. If it is missing, raise SimulationError with the command to install it."""
     try:
         mujoco = importlib.import_module("mujoco")
     except ImportError as error:
@@ -26,13 +26,13 @@ def load_mujoco() -> Any:
         raise SimulationError(
             f"the simulation needs MuJoCo: {install_command('minirospy[sim]')} ({error})"
         ) from None
-    # Invalid states are detected after each step. By default, MuJoCo also prints warnings and writes them to MUJOCO_LOG.TXT.
+    # The simulation checks for invalid states itself; MuJoCo would also print warnings and write MUJOCO_LOG.TXT.
     mujoco.set_mju_user_warning(lambda text: None)
     return mujoco
 
 
 def import_context(backend: str) -> Any:
-    """Return the OpenGL context class of ``egl``, ``osmesa``, ``glfw`` or ``cgl``.
+    """Return the OpenGL context class for ``egl``, ``osmesa``, ``glfw`` or ``cgl``.
 
     May raise any exception: the OpenGL libraries raise ImportError, AttributeError or their own errors.
     """

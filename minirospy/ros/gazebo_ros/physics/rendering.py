@@ -24,15 +24,15 @@ __all__ = ["MAX_PIXELS", "Renderer"]
 
 MAX_GEOMS = 20_000  # per picture
 MAX_PIXELS = 4096  # per side
-SPARE_GEOMS = 100  # for shapes that are not geoms, such as lights
+SPARE_GEOMS = 100  # spare capacity for shapes that are not geoms, such as lights
 _VARIABLE = "MUJOCO_GL"
 
 
 class Renderer:
-    """Renders pictures of one size."""
+    """Renders pictures of a fixed size."""
 
     def __init__(self, engine: Engine, width: int, height: int) -> None:
-        """Open an OpenGL context. If that fails, raise SimulationError, which names the library to install."""
+        """Open an OpenGL context. On failure, raise SimulationError with the library to install."""
         if not (0 < width <= MAX_PIXELS and 0 < height <= MAX_PIXELS):
             raise SimulationError(f"a picture of {width}x{height} is not possible: at most {MAX_PIXELS}")
         self.engine = engine
@@ -51,7 +51,7 @@ class Renderer:
         self._option.geomgroup[GROUP_VISUAL] = 1
 
     def capture(self, pose: Pose, horizontal_fov: float, near: float = 0.1, far: float = 100.0) -> None:
-        """Copy the world as seen from a pose: x points forward, z up. The angle is in radians, distances in metres."""
+        """Copy the world as seen from a pose (x forward, z up). The angle is in radians, distances are in metres."""
         engine, mujoco = self.engine, self._mujoco
         engine.refresh()
         if self._generation != engine.generation:
@@ -75,18 +75,18 @@ class Renderer:
             each.frustum_near, each.frustum_far = near, far
 
     def color(self) -> NDArray[np.uint8]:
-        """Return the captured picture (height, width, 3) as RGB, top row first."""
+        """Return the captured picture as an RGB array (height, width, 3), top row first."""
         picture: NDArray[np.uint8] = np.empty((self.height, self.width, 3), np.uint8)
         self._draw()
         self._mujoco.mjr_readPixels(picture, None, self._area, self._context)
         return picture[::-1]
 
     def depth(self) -> NDArray[np.float32]:
-        """Return the distances along the camera's axis (height, width) in metres; infinite where there is nothing."""
+        """Return distances along the camera's axis (height, width) in metres, infinite if a pixel shows nothing."""
         values = np.empty((self.height, self.width), np.float32)
         self._draw(has_background=False)
         self._mujoco.mjr_readPixels(None, values, self._area, self._context)
-        # The buffer is 1 at the near plane and 0 at the far plane.
+        # The depth buffer is 1 at the near plane and 0 at the far plane.
         near, far = self._near, self._far
         with np.errstate(divide="ignore"):
             distances = near * far / (near + values[::-1].astype(np.float64) * (far - near))
@@ -94,7 +94,7 @@ class Renderer:
         return distances.astype(np.float32)
 
     def close(self) -> None:
-        """Free the context."""
+        """Release the OpenGL context."""
         if self._context is not None:
             self._gl.make_current()
             self._context.free()
@@ -110,7 +110,7 @@ class Renderer:
             self._context.free()
         model.vis.global_.offwidth = self.width
         model.vis.global_.offheight = self.height
-        # With multisampling, depths belong to points next to the pixel's centre.
+        # Disable multisampling, which would take depths from points beside the pixel's centre.
         model.vis.quality.offsamples = 0
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
@@ -139,7 +139,7 @@ def open_context(width: int, height: int) -> tuple[str, Any]:
             context.make_current()
         except Exception as error:  # noqa: BLE001 (OpenGL's libraries raise errors of many types)
             faults.append(f"{backend}: {' '.join(str(error).split())[:100] or type(error).__name__}")
-            # PyOpenGL selects its platform by this variable, and the next backend needs a different one.
+            # PyOpenGL reads its platform from this variable, and the next backend needs another one.
             if before is None:
                 os.environ.pop("PYOPENGL_PLATFORM", None)
             continue

@@ -50,33 +50,32 @@ __all__ = [
     "to_wxyz",
 ]
 
-# MuJoCo's geom groups, by which rays and cameras select geoms.
+# MuJoCo's geom groups, which select the geoms for rays and cameras.
 GROUP_COLLISION = 0
 GROUP_VISUAL = 2
 GROUP_CONTACT_ONLY = 3
 GROUP_RAY_ONLY = 4
 
-SOLREF = (0.005, 1.0)  # s, damping ratio: contacts are stiff, and stable with steps of 1 to 2.5 ms
-# A contact is soft at first, and stiff from a depth of 0.6 mm. If it were stiff from the start, a robot on four supports would
-# rattle: its supports would lift off in turn, and its wheels would lose their grip.
+SOLREF = (0.005, 1.0)  # time constant (s), damping ratio: stiff contacts, stable with steps of 1 to 2.5 ms
+# Contacts are soft at first, and stiff from a depth of 0.6 mm. If they were stiff from the start,
+# a robot on four supports would rattle: supports would lift off in turn, and wheels would lose their grip.
 SOLIMP = (0.5, 0.99, 0.0006, 0.5, 2.0)
-# A wheel that turns in place is also pulled sideways. With the contact above, it would lift off in most steps, and a robot with
-# four such wheels would turn too slowly. This contact is softer at first.
+# A turning wheel is also pulled sideways. With the contact above, it would lift off in most steps,
+# and a robot with four such wheels would turn too slowly, so this contact is softer at first.
 SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
-# A larger coefficient, such as 1e5, does not hold better, and a wheel that touches the ground at two points would then resist
-# turning.
+# A larger coefficient, such as 1e5, does not hold better, and would stop a wheel with two contact points from turning.
 MAX_FRICTION = 2.0
 PART = "\t"  # separates a collision's name from its geom's number
 MIN_SIZE = 1e-6  # m; MuJoCo rejects sizes of zero
-MIN_VERTICES = 4  # per mesh; MuJoCo rejects a mesh with fewer
-MIN_AREA = 1e-14  # m^2; MuJoCo rejects a mesh with less
-WALL_THICKNESS = 0.01  # m; a robot at 10 m/s does not pass through it in a step of 1 ms
+MIN_VERTICES = 4  # minimum per mesh; MuJoCo rejects meshes with fewer
+MIN_AREA = 1e-14  # m^2, minimum per mesh; MuJoCo rejects smaller ones
+WALL_THICKNESS = 0.01  # m; too thick for a robot at 10 m/s to pass through in a 1 ms step
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 
 
 class Grain(NamedTuple):
-    """A surface whose friction has two directions: that of ``mu``, in the body's axes, and the coefficients."""
+    """A surface with direction-dependent friction: the direction of ``mu`` in body axes, and both coefficients."""
 
     direction: Vector
     mu: float
@@ -84,7 +83,7 @@ class Grain(NamedTuple):
 
 
 def grain(collision: Collision) -> Grain | None:
-    """Return the two directions of a collision's friction, or None if ``fdir1`` is missing or both coefficients are equal."""
+    """Return a collision's friction directions, or None if ``fdir1`` is missing or both coefficients are equal."""
     surface = collision.surface
     direction = unit(rotate(collision.pose.orientation, surface.fdir1))
     mu, mu2 = _coefficients(surface)
@@ -111,7 +110,7 @@ def _coefficients(surface: Surface) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A geom to add: its type, sizes and pose in the shape's frame, or the name of a mesh or heightmap."""
+    """A geom to add: its type, sizes and pose in the shape's frame, or a mesh or heightmap's name."""
 
     kind: str
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -119,12 +118,12 @@ class _Piece:
     asset: str = ""
     group: int = GROUP_COLLISION
     color: Color | None = None
-    texture: str = ""  # the path of a picture
+    texture: str = ""  # path of a picture
     has_texcoords: bool = False
 
 
 class Shapes:
-    """Adds geoms to bodies of an MjSpec, and shares the meshes among them.
+    """Adds geoms to an MjSpec's bodies; geoms share meshes.
 
     grains: by the names of geoms that have or had one; a later geom of the same name replaces it.
     """
@@ -133,11 +132,11 @@ class Shapes:
         self._mujoco = load_mujoco()
         self._spec = spec
         self.grains: dict[str, Grain | None] = {}
-        self.warnings: list[str] = []  # about textures and moving meshes
+        self.warnings: list[str] = []  # warnings about textures and moving meshes
         self._textures = Textures(spec, self.warnings)
         self._decomposition = Decomposition(self.warnings)
         self._assets: dict[tuple[object, ...], list[_Piece]] = {}
-        self._elements: dict[int, Any] = {}  # the spec's meshes and heightmaps, by number
+        self._elements: dict[int, Any] = {}  # the spec's meshes and heightmaps by number
         self._count = 0
 
     @property
@@ -146,7 +145,7 @@ class Shapes:
         return self._count
 
     def delete_after(self, last: int) -> None:
-        """Delete the meshes and heightmaps with numbers above ``last``. Call this only if no geom uses them."""
+        """Delete the meshes and heightmaps with numbers above ``last``, which no geom may use."""
         numbers = [number for number in self._elements if number > last]
         names = {self._elements[number].name for number in numbers}
         for number in numbers:
@@ -191,7 +190,7 @@ class Shapes:
                 geom.contype = geom.conaffinity = 0
 
     def add_visual(self, body: Any, name: str, visual: Visual) -> None:
-        """Add a visual's geoms, which do not collide."""
+        """Add a visual's geoms. They do not collide."""
         opacity = 1.0 - min(max(visual.transparency, 0.0), 1.0)
         for index, piece in enumerate(self._visible(visual.geometry)):
             geom = self._add(body, f"{name}{PART}{index}" if index else name, piece, visual.pose)
@@ -243,7 +242,7 @@ class Shapes:
         except MeshError as error:
             raise SimulationError(f"{getattr(geometry, 'path', 'polyline')}: {error}") from error
         is_whole = parts.are_exact
-        if not is_whole:  # first in the body, as Engine.cast expects
+        if not is_whole:  # this geom must be the body's first, as Engine.cast expects
             yield _Piece("MESH", asset=self._add_mesh(mesh.vertices, mesh.triangles), group=GROUP_RAY_ONLY)
         for part in parts.meshes:
             asset = self._add_mesh(part.vertices, part.triangles if is_whole else None)
@@ -271,7 +270,7 @@ class Shapes:
         return self._assets[key]
 
     def _section(self, mesh: Mesh) -> _Piece:
-        """Add the part of a mesh that has one material."""
+        """Add a mesh section, the part with one material."""
         (material,) = mesh.materials[:1]
         asset = self._add_mesh(mesh.vertices, mesh.triangles, mesh.texcoords)
         has_texcoords = mesh.texcoords is not None
@@ -300,8 +299,7 @@ class Shapes:
         if lacking > 0:
             vertices = np.concatenate([vertices, vertices[-1:].repeat(lacking, axis=0)])
         mesh.uservert = vertices.astype(np.float32).ravel()
-        # An open or flat mesh has no volume. The bodies' inertias are given explicitly, so this affects only the mesh's own
-        # frame.
+        # An open or flat mesh has no volume, so treat it as a shell. Bodies have explicit inertias in any case.
         mesh.inertia = self._mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         return name
 
@@ -310,7 +308,7 @@ class Shapes:
             heights = terrain(shape.path)
         except MeshError as error:
             raise SimulationError(str(error)) from error
-        # MuJoCo scales the lowest point to 0 and the highest to 1. In SDF, the highest point has the given height.
+        # MuJoCo scales heights to 0..1; in SDF, the highest point has the given height.
         highest = max(float(heights.max()), MIN_SIZE)
         lowest = float(heights.min()) / highest
         self._count += 1
@@ -329,7 +327,7 @@ class Shapes:
 
 
 def _primitive(geometry: Geometry) -> _Piece | None:
-    """Return the geom of a shape that MuJoCo supports directly, or None."""
+    """Return the geom for a shape that MuJoCo supports directly, or None."""
     if isinstance(geometry, Box):
         x, y, z = (max(abs(side) / 2, MIN_SIZE) for side in geometry.size)
         return _Piece("BOX", (x, y, z))
@@ -343,7 +341,7 @@ def _primitive(geometry: Geometry) -> _Piece | None:
 
 
 def _wheel(shape: Cylinder) -> list[_Piece]:
-    """Return an ellipsoid for contacts, and the cylinder for rays.
+    """Return an ellipsoid for contacts and a cylinder for rays.
 
     A cylinder touches the ground along a line. When a robot turns, one end of that line slips forward and the other backward, so
     that the effective distance between the wheels depends on the friction. An ellipsoid touches the ground only at its middle.
@@ -356,7 +354,7 @@ def _wheel(shape: Cylinder) -> list[_Piece]:
 
 
 def _wall(shape: Plane) -> _Piece:
-    """Return a thin box of the plane's size: posters and walls are finite, and leave the ground behind them free."""
+    """Return a thin box of the plane's size, because posters and walls must not extend to infinity."""
     x, y = (max(side / 2, MIN_SIZE) for side in shape.size)
     turn = _turn_to(shape.normal)
     behind = rotate(turn, (0.0, 0.0, -WALL_THICKNESS / 2))
@@ -364,7 +362,7 @@ def _wall(shape: Plane) -> _Piece:
 
 
 def _area(mesh: Mesh) -> float:
-    # MuJoCo has the vertices in single precision.
+    # MuJoCo stores vertices in single precision.
     rounded = Mesh(mesh.vertices.astype(np.float32).astype(np.float64), mesh.triangles)
     return float(np.linalg.norm(rounded.crosses, axis=1).sum()) / 2
 
@@ -384,7 +382,7 @@ def _joined(meshes: list[Mesh]) -> Mesh:
 
 
 def _turn_to(normal: tuple[float, float, float]) -> Quaternion:
-    """Return the rotation that turns the z axis to the normal."""
+    """Return the rotation from the z axis to the normal."""
     x, y, z = normal
     length = (x * x + y * y + z * z) ** 0.5
     if length < MIN_SIZE:

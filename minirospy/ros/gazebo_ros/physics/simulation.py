@@ -27,21 +27,21 @@ if TYPE_CHECKING:
 
 __all__ = ["Simulation"]
 
-MAX_DISTANCE = 1e5  # m from the origin; a model farther away has left the world
-MAX_SPEED = 1e5  # m/s or rad/s; a faster model has become unstable
+MAX_DISTANCE = 1e5  # m from the origin; models farther away are removed
+MAX_SPEED = 1e5  # m/s or rad/s; faster models are unstable and are removed
 NANOSECONDS = 1_000_000_000
 
 
 class Simulation:
-    """The running world."""
+    """Simulates a world with MuJoCo."""
 
     def __init__(self, world: World | None = None, *, seed: int = 0) -> None:
         """Build the world. Raise SimulationError if MuJoCo is missing; invalid models are listed in ``warnings``."""
         world = world or World()
         self.world = world
-        self.random = np.random.default_rng(seed)  # for sensor noise
+        self.random = np.random.default_rng(seed)  # random generator for sensor noise
         self.warnings: list[str] = []
-        self.forced: dict[str, None] = {}  # the models to which forces are applied
+        self.forced: dict[str, None] = {}  # names of the models with applied forces
         self._had_forces = False
         self._time_ns = 0
         self._models: dict[str, SimModel] = {}
@@ -50,7 +50,7 @@ class Simulation:
         self._geom_names: list[str] = []
         self._model_of_dof: list[str] = []
         self._model_of_position: list[str] = []
-        self._farthest: NDArray[np.float64] = np.zeros(0)  # for each MuJoCo position; angles have no limit
+        self._farthest: NDArray[np.float64] = np.zeros(0)  # maximum position per joint; infinite for angles
         self._add_all(world.models)
 
     # ---- time and steps
@@ -62,7 +62,7 @@ class Simulation:
 
     @property
     def time_ns(self) -> int:
-        """Return the time in nanoseconds: an exact sum of steps, without rounding errors."""
+        """Return the time in nanoseconds: the exact sum of all steps."""
         return self._time_ns
 
     @property
@@ -71,7 +71,7 @@ class Simulation:
         return self.engine.physics
 
     def set_physics(self, physics: Physics) -> None:
-        """Set the time step and gravity. Raise SimulationError if a value is not finite, or the step is below 1 ns."""
+        """Set the time step and gravity. Raise SimulationError if a value is not finite or the step is below 1 ns."""
         if not (
             MIN_STEP <= physics.step <= 1 and all(map(math.isfinite, (*physics.gravity, physics.update_rate)))
         ):
@@ -82,7 +82,7 @@ class Simulation:
 
     @property
     def records_details(self) -> bool:
-        """Return whether each step's contacts and joint wrenches are recorded, which takes time."""
+        """Return whether to record each step's contacts and joint wrenches, which takes time."""
         return self.engine.records_details
 
     @records_details.setter
@@ -90,7 +90,7 @@ class Simulation:
         self.engine.records_details = value
 
     def step(self, count: int = 1) -> list[LostModel]:
-        """Advance by a number of steps. Return the models removed because their state was invalid or they left the world."""
+        """Advance by a number of steps. Return the models removed for an invalid state or for leaving the world."""
         lost: list[LostModel] = []
         for _ in range(count):
             if self.forced or self._had_forces:
@@ -102,7 +102,7 @@ class Simulation:
         return lost
 
     def _advance(self, left: int) -> list[LostModel]:
-        """Advance by the first of ``left`` substeps. Return the models that were removed."""
+        """Advance by the first of ``left`` substeps. Return the removed models."""
         engine = self.engine
         engine.refresh()
         positions, velocities = engine.data.qpos.copy(), engine.data.qvel.copy()
@@ -126,7 +126,7 @@ class Simulation:
     def _remove_lost(
         self, positions: NDArray[np.float64], velocities: NDArray[np.float64]
     ) -> list[LostModel]:
-        """Remove the models that caused invalid states; all others return to their state before the substep."""
+        """Remove the models that caused invalid states; restore all others to the state before the substep."""
         data = self.engine.data
         broken: dict[str, str] = {}
         fastest = np.full(len(data.qvel), MAX_SPEED)
@@ -147,7 +147,7 @@ class Simulation:
         return result
 
     def _sources(self, broken: Iterable[str], velocities: NDArray[np.float64]) -> list[str]:
-        """Return the models that caused the invalid states of the last substep. ``velocities``: those before it.
+        """Return the models that caused the last substep's invalid states. ``velocities`` are those before the substep.
 
         Contacts spread large velocities and NaN to other models. The source is the model whose velocity is too large even when
         computed without contacts. If there is none, it is the fastest of the invalid models.
@@ -175,7 +175,7 @@ class Simulation:
             raise SimulationError(f"there is no model '{name}'") from None
 
     def add_model(self, model: Model, pose: Pose | None = None, name: str = "") -> SimModel:
-        """Add a model at a pose and under a name; the model's own ones are the defaults.
+        """Add a model at a pose and under a name, by default its own pose and name.
 
         The time and the other models' states are kept. Raise SimulationError if the name is in use or the model is invalid.
         """
@@ -191,22 +191,22 @@ class Simulation:
         return added
 
     def remove_model(self, name: str) -> None:
-        """Remove a model, keeping the time and the others' states. Raise SimulationError if the model does not exist."""
+        """Remove a model; keep the time and the other models' states. Raise SimulationError if the model does not exist."""
         self.model(name)
         self._remove([name])
 
     def recompile(self) -> None:
-        """Recompile the world after a change of the spec."""
+        """Recompile the world after a change to the spec."""
         self.engine.recompile()
         self._bind()
 
     def set_axis(self, scoped: str, kind: str, axis: Axis) -> None:
-        """Change the limits and passive forces of a MuJoCo joint."""
+        """Change a MuJoCo joint's limits and passive forces."""
         self._builder.set_axis(scoped, kind, axis)
         self.recompile()
 
     def _add_all(self, models: Iterable[Model]) -> None:
-        """Add the world's models with one compilation or, if that fails, one by one."""
+        """Add the world's models in one compilation or, if it fails, one by one."""
         added: list[SimModel] = []
         last = self._builder.shapes.last
         for model in models:
@@ -219,7 +219,7 @@ class Simulation:
         except ValueError:
             for each in added:
                 self._drop(each)
-            # An invalid mesh must be removed, because it would make every later compilation fail.
+            # Remove an invalid mesh: it would make every later compilation fail.
             self._builder.shapes.delete_after(last)
             for each in added:
                 try:
@@ -291,7 +291,7 @@ class Simulation:
     # ---- resets
 
     def reset_models(self) -> None:
-        """Return all models to their initial poses and joint positions, at rest. The time continues."""
+        """Return all models to rest at their initial poses and joint positions. The time continues."""
         for model in self._models.values():
             model.reset()
         self.engine.data.qacc_warmstart[:] = 0
@@ -327,15 +327,14 @@ class Simulation:
             origin = np.array(pose.position)
             vectors = np.ascontiguousarray(directions @ _matrix(pose).T)
             body = engine.model.body(exclude).id if exclude else -1
-            # MuJoCo can cast many rays only from a single point. Hide geoms that lie completely within the minimum range, such as
-            # the housing.
+            # MuJoCo casts many rays only from one point, so hide geoms entirely within the minimum range (the housing).
             inner = engine.geoms_within(origin, min_range)
             groups = engine.model.geom_group
             shown = groups[inner]
             groups[inner] = GROUP_CONTACT_ONLY
             engine.cast(origin, vectors, ids, distances, max_range, body)
             groups[inner] = shown
-            # If another geom, such as a wall, is that close, cast single rays that start at the minimum range.
+            # If another geom, such as a wall, is that close, cast its rays one by one from the minimum range.
             for index in np.flatnonzero((distances >= 0) & (distances < min_range)).tolist():
                 start = origin + min_range * vectors[index]
                 found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
@@ -358,7 +357,7 @@ class Simulation:
         return renderer
 
     def open_renderer(self, width: int, height: int) -> Renderer:
-        """Return a renderer for the calling thread, which may be any thread. The caller must call :meth:`add_visuals` itself.
+        """Return a renderer for the calling thread, which may be any. The caller must first call :meth:`add_visuals`.
 
         Raise SimulationError if OpenGL or a library is missing.
         """
@@ -367,7 +366,7 @@ class Simulation:
         return Renderer(self.engine, width, height)
 
     def add_visuals(self) -> None:
-        """Add the visible shapes and lights for cameras, also for models that are added later."""
+        """Add visuals and lights for cameras, also for models added later."""
         if self._builder.has_visuals:
             return
         self._builder.add_scene(self.world)
@@ -382,10 +381,10 @@ class Simulation:
         self._bind()
 
     def _add_visuals_one_by_one(self) -> None:
-        """Add the visuals of each model that MuJoCo accepts; the others are listed in ``warnings``."""
+        """Add each model's visuals if MuJoCo accepts them; otherwise add a line to ``warnings``."""
         for model in self._models.values():
             last = self._builder.shapes.last
-            self._builder.add_visuals(model.built, model.record, model.name)  # warnings already recorded
+            self._builder.add_visuals(model.built, model.record, model.name)  # already in warnings
             try:
                 self.engine.recompile()
             except ValueError as error:
@@ -399,20 +398,20 @@ class Simulation:
         self._builder.shapes.delete_after(last)
 
     def body_poses(self) -> NDArray[np.float64]:
-        """Return (n, 7) positions and orientations (x, y, z, w) in the world, indexed by link id."""
+        """Return the links' world poses (n, 7): position and orientation (x, y, z, w), indexed by link id."""
         self.engine.refresh()
         data = self.engine.data
         return np.concatenate((data.xpos, data.xquat[:, (1, 2, 3, 0)]), axis=1)
 
     def contact_points(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the points and unit normals, both (n, 3), of all contacts, in the world."""
+        """Return all contacts' points and unit normals in the world, both (n, 3)."""
         self.engine.refresh()
         contact = self.engine.data.contact
         touching = contact.dist <= 0
         return contact.pos[touching].copy(), contact.frame[touching, :3].copy()
 
     def contacts(self) -> list[Contact]:
-        """Return the last step's contacts; ``records_details`` must have been set before that step."""
+        """Return the last step's contacts, which are recorded if ``records_details`` was set before the step."""
         engine = self.engine
         pairs: dict[tuple[str, str], list[int]] = {}
         for index, (first, second) in enumerate(engine.contacts.tolist()):
@@ -422,7 +421,7 @@ class Simulation:
 
     def _contact(self, first: str, second: str, rows: list[int]) -> Contact:
         engine = self.engine
-        # MuJoCo's normals point from the first geom to the second, and its forces act on the second.
+        # MuJoCo's normals point from the first geom to the second; its forces act on the second.
         frames = engine.contact_frames[rows].reshape(-1, 3, 3)
         local = engine.contact_wrenches[rows].reshape(-1, 2, 3)
         wrenches = -np.einsum("nij,nki->nkj", frames, local)

@@ -30,7 +30,7 @@ class Wrench(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """The contact points between two collisions, named ``model::link::collision``.
+    """The contact points of two collisions, named ``model::link::collision``.
 
     The normals point from the second collision to the first. The forces act on the first one, and the torques are the torques of
     these forces about the contact points.
@@ -45,14 +45,14 @@ class Contact(NamedTuple):
 
 
 class RayHits(NamedTuple):
-    """The distances (m, infinite if nothing is hit) and the names of the collisions (empty if nothing is hit)."""
+    """Each ray's distance (m) and collision name: infinite and empty if it hits nothing."""
 
     distances: NDArray[np.float64]
     collisions: tuple[str, ...]
 
 
 class LostModel(NamedTuple):
-    """A model that the simulation has removed, and the reason in one line."""
+    """A model that the simulation has removed, with the reason in one line."""
 
     name: str
     reason: str

@@ -8,13 +8,13 @@ from minirospy.ros.gazebo_ros.physics.library import load_mujoco
 
 __all__ = ["Textures"]
 
-MAX_PIXELS = 1024  # per side; larger pictures are scaled down, because cameras show less detail
-SIDES = (90, 270, 180, 0, 0, 180)  # degrees, for upright pictures at x, -x, y, -y, z and -z
-MAX_AREA = 60_000_000  # pixels per file; reading more takes seconds
+MAX_PIXELS = 1024  # maximum per side; larger pictures are scaled down, because cameras cannot show more
+SIDES = (90, 270, 180, 0, 0, 180)  # degrees, to turn the pictures at x, -x, y, -y, z and -z upright
+MAX_AREA = 60_000_000  # pixels per file; larger ones take seconds to read
 
 
 class Textures:
-    """Adds pictures to an MjSpec, each once. An unreadable picture causes one warning, and its shapes have no picture."""
+    """Adds each picture to an MjSpec once. An unreadable picture causes one warning and is left out."""
 
     def __init__(self, spec: Any, warnings: list[str]) -> None:
         self._spec = spec
@@ -22,7 +22,7 @@ class Textures:
         self._warnings = warnings
 
     def material(self, path: str, *, is_flat: bool) -> str:
-        """Return the name of the material with a picture, or an empty string if the picture is unreadable.
+        """Return the name of a picture's material, or an empty string if the picture is unreadable.
 
         ``is_flat``: the picture is applied to a plane, or to a mesh by its texture coordinates. On all other shapes it is
         repeated on six sides.
@@ -39,7 +39,7 @@ class Textures:
         return self._names.get(key, "")
 
     def _add(self, path: str, is_flat: bool) -> str:
-        """Add a texture and its material. Raise OSError, ValueError or SyntaxError, as Pillow does, if it is unreadable."""
+        """Add a texture and its material. Raise OSError, ValueError or SyntaxError, like Pillow, if the file is unreadable."""
         try:
             from PIL import Image
         except ImportError:

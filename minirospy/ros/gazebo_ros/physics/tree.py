@@ -14,7 +14,7 @@ WORLD = "world"
 
 @dataclass
 class LinkTree:
-    """The bodies of a model; parents precede their children.
+    """A model's bodies, parents before children.
 
     ``joint_of``: the joint that connects a link to its parent in the tree; a link without one moves freely. ``loops``: the joints
     that close kinematic loops.

@@ -32,4 +32,4 @@ class InvalidMsgSpec(Exception):
 
 
 class MsgGenerationException(MessageException):
-    """Raised if no class can be generated from the definition."""
+    """Raised if no class can be generated from a definition."""

@@ -25,7 +25,7 @@ __all__ = [
 def find_msg_dependencies_with_type(
     pkg_name: str, msg_file: str, search_paths: SearchPath
 ) -> list[tuple[str, str | None]]:
-    """Return (type, file) for each message that the message in ``msg_file`` uses.
+    """Return (type, file) for each message that the message defined in ``msg_file`` uses.
 
     Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing.
     """

@@ -11,7 +11,7 @@ __all__ = ["compute_full_text", "compute_md5", "compute_md5_text"]
 
 
 def compute_md5_text(msg_context: MsgContext, spec: MsgSpec) -> str:
-    """Return the text whose md5sum is the message's md5sum. Raise KeyError if the message uses an unknown message."""
+    """Return the text from which a message's md5sum is computed. Raise KeyError if the message uses an unknown message."""
     return digest.md5_text(parsed_message(spec), lookup_in(msg_context))
 
 
@@ -23,7 +23,7 @@ def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
 
 
 def compute_full_text(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the full definition of a message or service, with the messages that it uses, as in connection headers and bags.
+    """Return the full definition of a message or service, including the messages that it uses, as in bags.
 
     Raise KeyError if :func:`load_depends` has not been called for ``spec``.
     """

@@ -69,11 +69,11 @@ __all__ = [
 
 _BETWEEN = re.compile(r"^---.*\n?", re.MULTILINE)
 
-SearchPath = Mapping[str, Sequence[str]]  # maps a package to the folders that contain its definitions
+SearchPath = Mapping[str, Sequence[str]]  # maps a package to the folders with its definitions
 
 
 class MsgNotFound(Exception):
-    """Raised if the file that contains a definition was not found."""
+    """Raised if the file with a definition was not found."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class MsgNotFound(Exception):
 
 
 class MsgContext:
-    """Stores the known messages, their files, and the message types that each one uses."""
+    """Stores the known messages, their files and the types that each message uses."""
 
     def __init__(self) -> None:
         self._specs: dict[str, MsgSpec] = {}
@@ -118,15 +118,15 @@ class MsgContext:
         return self._specs[bare_msg_type(full_msg_type)]
 
     def set_file(self, full_msg_type: str, file_path: str) -> None:
-        """Record the file that contains a definition."""
+        """Record the file that contains a message's or service's definition."""
         self._files[full_msg_type] = file_path
 
     def get_file(self, full_msg_type: str) -> str | None:
-        """Return the file that contains a definition, or None if the file is unknown."""
+        """Return the file that contains a message's or service's definition, or None if it is unknown."""
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
-        """Set the types of the messages that a message's fields use."""
+        """Set the message types that a message's fields use."""
         self._depends[full_msg_type] = dependencies
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
@@ -134,7 +134,7 @@ class MsgContext:
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return all messages that a message uses, directly or indirectly. Each message precedes those that it uses.
+        """Return all message types that a message uses, directly or indirectly. Each type precedes those that it uses.
 
         Raise KeyError if :func:`load_depends` has not been called.
         """
@@ -266,12 +266,12 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
 
 
 def lookup_in(msg_context: MsgContext) -> digest.Lookup:
-    """Return a function that looks up a message in ``msg_context``, and returns a MessageSpec or raises KeyError."""
+    """Return a lookup function for ``msg_context`` that returns a MessageSpec or raises KeyError."""
     return lambda name: parsed_message(msg_context.get_registered(name))
 
 
 def parsed_message(spec: MsgSpec) -> MessageSpec:
-    """Convert a message to minirospy's MessageSpec. Raise InvalidMsgSpec if the definition is invalid."""
+    """Convert a genmsg message to minirospy's MessageSpec. Raise InvalidMsgSpec if the definition is invalid."""
     return _parsed(spec.text, spec.full_name)
 
 
@@ -287,7 +287,7 @@ def parsed_service(text: str, full_name: str) -> ServiceSpec:
     package, name = package_resource_name(full_name)
     request, *responses = _BETWEEN.split(text)
     if len(responses) != 1:
-        # genmsg also accepts a definition without a separator line or with several.
+        # genmsg also accepts a definition with no separator line, or several.
         text = "\n".join([request, "---", *responses])
     try:
         return parse_service(text, package, name)

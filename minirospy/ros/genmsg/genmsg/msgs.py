@@ -101,7 +101,7 @@ class Field:
 
 
 class MsgSpec:
-    """A message: its fields' ``types`` and ``names``, its constants, text and name."""
+    """A message specification: the fields' ``types`` and ``names``, the constants, text and name."""
 
     def __init__(
         self,
@@ -130,15 +130,15 @@ class MsgSpec:
         self.header_present = self.has_header()
 
     def fields(self) -> list[tuple[str, str]]:
-        """Return (type, name) for each field."""
+        """Return each field's (type, name)."""
         return list(zip(self.types, self.names, strict=True))
 
     def parsed_fields(self) -> list[Field]:
-        """Return the fields with parsed types."""
+        """Return the fields with their types parsed."""
         return [Field(name, type_) for type_, name in self.fields()]
 
     def has_header(self) -> bool:
-        """Return whether the first field is a header. Publishers fill it in."""
+        """Return whether the first field is a header, which publishers fill in."""
         return self.fields()[:1] == [(HEADER_FULL_NAME, "header")]
 
     def __eq__(self, other: object) -> bool:
@@ -160,7 +160,7 @@ class MsgSpec:
 
 
 def is_builtin(msg_type_name: str) -> bool:
-    """Return whether a type is built-in, that is, not a message type."""
+    """Return whether a type is built-in, not a message type."""
     return msg_type_name in BUILTIN_TYPES
 
 
@@ -170,7 +170,7 @@ def is_header_type(msg_type: str) -> bool:
 
 
 def is_valid_msg_type(x: str) -> bool:
-    """Return whether a string is a valid type name, with or without brackets."""
+    """Return whether a string is a valid type name, with or without array brackets."""
     return bool(x) and re.match(r"(?!.*//)[A-Za-z][\w/]*(\[\d*\])*\Z", x, re.ASCII) is not None
 
 
@@ -185,21 +185,21 @@ def is_valid_constant_type(x: str) -> bool:
 
 
 def bare_msg_type(msg_type: str) -> str:
-    """Return a type without its brackets."""
+    """Return a type without its array brackets."""
     return msg_type[: msg_type.index("[")] if msg_type and "[" in msg_type else msg_type
 
 
 def resolve_type(msg_type: str, package_context: str) -> str:
-    """Return a type's full name, resolved as in the definitions of ``package_context``."""
+    """Return a type's full name, resolved in the package ``package_context``."""
     bare = bare_msg_type(msg_type)
     if "/" in bare or is_builtin(bare):
         return msg_type
-    # Keep the brackets after Header; ROS's genmsg drops them.
+    # Keep array brackets after Header; ROS's genmsg drops them.
     return f"std_msgs/{msg_type}" if bare == "Header" else f"{package_context}/{msg_type}"
 
 
 def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
-    """Return (base type, whether it is an array, its length if fixed). Raise ValueError if the type is invalid."""
+    """Return (base type, whether it is an array, the array's fixed length or None). Raise ValueError if the type is invalid."""
     if not msg_type:
         raise ValueError("Invalid empty type")
     if "[" not in msg_type:

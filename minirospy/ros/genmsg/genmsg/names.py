@@ -22,7 +22,7 @@ BASE_RESOURCE_NAME_LEGAL_CHARS_P = re.compile(r"^[A-Za-z][\w_]*$")
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
-    """Return ``package/name``, or the name alone if its package is ``my_pkg``."""
+    """Return ``package/name``, or only the name if its package is ``my_pkg``."""
     return name if res_pkg_name == my_pkg else res_pkg_name + PRN_SEPARATOR + name
 
 

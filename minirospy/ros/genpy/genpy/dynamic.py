@@ -28,7 +28,7 @@ def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
 
 
 def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception:
-    """Return the error that genpy raises for an invalid full definition."""
+    """Return the exception that genpy raises for an invalid full definition."""
     from minirospy.ros.genmsg.genmsg.base import InvalidMsgSpec
     from minirospy.ros.genmsg.genmsg.msg_loader import (
         MsgContext,
@@ -54,6 +54,6 @@ def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception
     except (InvalidMsgSpec, MsgNotFound) as found:
         return found
     except (ValueError, RecursionError):
-        # The definition has an invalid name, or a message that contains itself; use the text from minirospy's error.
+        # Use minirospy's text for an error that genmsg does not detect, such as a message that contains itself.
         pass
     return InvalidMsgSpec(str(error))

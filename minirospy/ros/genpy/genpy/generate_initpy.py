@@ -20,6 +20,6 @@ def write_modules(outdir: str) -> int:
 
 
 def write_module(basedir: str, generated_modules: Iterable[str]) -> None:
-    """Write an ``__init__.py`` that re-exports the names in these modules. Raise OSError if the file cannot be written."""
+    """Write an ``__init__.py`` that re-exports the names in these modules. Raise OSError on failure."""
     lines = [f"from .{module} import *\n" for module in generated_modules]
     Path(basedir, "__init__.py").write_text("".join(lines), encoding="utf-8")

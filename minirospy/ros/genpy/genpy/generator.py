@@ -88,7 +88,7 @@ def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
 
 
 def make_python_safe(spec: MsgSpec) -> MsgSpec:
-    """Rename a message's fields and constants that are Python keywords; return the new message."""
+    """Rename a message's fields and constants that are Python keywords; return the changed message."""
     constants = [
         Constant(each.type, _remap_reserved(each.name), each.val, each.val_text) for each in spec.constants
     ]
@@ -103,7 +103,7 @@ def _remap_reserved(field_name: str) -> str:
 
 
 class Generator:
-    """Generates modules for one kind of definition.
+    """Generates modules for messages or services.
 
     ``what`` names the kind, ``ext`` is its file extension. The functions load a definition and yield its module's lines.
     """
@@ -150,7 +150,7 @@ class Generator:
                 OSError,
                 UnicodeDecodeError,
             ) as error:
-                # Report the error, and continue with the other definitions.
+                # Report the error and continue with the other definitions.
                 text = f"ERROR: Unable to generate {self.what} for package '{package}': while processing '{file}': {error}"
                 print(f"\n{text}\n", file=sys.stderr)
                 status = 1

@@ -19,12 +19,12 @@ __all__ = ["genmain", "usage"]
 
 
 def usage(progname: str) -> None:
-    """Print a generator's usage."""
+    """Print the generator's usage."""
     print(f"{progname} file(s)")
 
 
 def genmain(argv: Sequence[str], progname: str, gen: Generator) -> NoReturn:
-    """Run a generator for the command line ``argv``, which starts with the program's name, and exit.
+    """Run a generator with the command line ``argv``, including the program's name, and exit.
 
     The exit status is 0, 1 to 3 after an error, or 2 after a usage error. Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER
     FILE ...``, or ``--initpy -o FOLDER``.

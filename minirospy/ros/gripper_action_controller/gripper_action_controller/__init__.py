@@ -27,7 +27,7 @@ _NOT_RUNNING = "Can't accept new action goals. Controller is not running."
 
 
 class GripperActionController(Controller):
-    """Executes the action ``gripper_cmd``. A subclass for a hardware interface sets ``interfaces`` and overrides :meth:`send`.
+    """Executes the action ``gripper_cmd``. A subclass sets ``interfaces`` and overrides :meth:`send` for its hardware interface.
 
     As in ROS, it publishes no feedback. A result contains the values of the cycle that decided the outcome. In ROS, it contains
     the values at the time it is sent, up to one period of ``action_monitor_rate`` later.
@@ -41,7 +41,7 @@ class GripperActionController(Controller):
         self._effort = 0.0  # last commanded effort
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the joint, and open the action."""
+        """Read the parameters, claim the joint and open the action."""
         parameters = context.parameters
         monitor_rate = parameters.finite("action_monitor_rate", 20.0)
         if monitor_rate <= 0.0:
@@ -76,23 +76,23 @@ class GripperActionController(Controller):
         self._action = self.opened.enter_context(closing(action))
 
     def read_gains(self, context: ControllerContext) -> None:
-        """Read the parameters that only this hardware interface needs."""
+        """Read the parameters specific to the hardware interface."""
 
     def starting(self, time: Time) -> None:
-        """Hold the present position."""
+        """Hold the current position."""
         self._hold()
         self._action.start()
-        self.is_running = True  # only now, so that the action is ready for each accepted goal
+        self.is_running = True  # set last, so that the action is ready for each accepted goal
 
     def update(self, time: Time, period: Duration) -> None:
-        """Send this cycle's command, and the goal's result when it is due."""
+        """Send this cycle's command and, when due, the goal's result."""
         joint, now = self.joint, time.to_nsec()
         command = self.gripper.check(now, joint.position, joint.velocity, self._effort)
         self._effort = self.send(command, period.to_nsec() / _SECOND)
         self._action.report(now)
 
     def send(self, command: GripperCommand, dt: float) -> float:
-        """Set the joint's command; return the effort to report in a goal's result. ``dt``: s since the last cycle."""
+        """Set the joint's command; return the effort for the goal's result. ``dt`` is in seconds since the last cycle."""
         raise NotImplementedError
 
     def stopping(self, time: Time) -> None:
@@ -123,18 +123,18 @@ class GripperActionController(Controller):
 
 
 class PositionGripperActionController(GripperActionController):
-    """position_controllers/GripperActionController: commands the goal's position, and only reports its effort."""
+    """position_controllers/GripperActionController: commands the goal's position and only reports the effort."""
 
     interfaces = (Interface.POSITION,)
 
     def send(self, command: GripperCommand, dt: float) -> float:
-        """Command the position."""
+        """Command the position; return the effort to report."""
         self.joint.position_command = command.position
         return command.max_effort
 
 
 class EffortGripperActionController(GripperActionController):
-    """effort_controllers/GripperActionController: computes the effort with a PID controller, from ``gains/JOINT``.
+    """effort_controllers/GripperActionController: computes the effort with a PID controller from ``gains/JOINT``.
 
     As in ROS, a goal with max_effort 0 allows no effort at all.
     """
@@ -142,17 +142,17 @@ class EffortGripperActionController(GripperActionController):
     interfaces = (Interface.EFFORT,)
 
     def read_gains(self, context: ControllerContext) -> None:
-        """Read the gains, and allow dynamic_reconfigure to change them."""
+        """Read the gains and make them configurable with dynamic_reconfigure."""
         self._pid = Pid.open(context.parameters.below(f"gains/{self.joint.name}"), self.opened)
 
     def starting(self, time: Time) -> None:
-        """Hold the present position, with zero effort until the first update."""
+        """Hold the current position, with zero effort until the first update."""
         self._pid.reset()
         self.joint.effort_command = 0.0
         super().starting(time)
 
     def send(self, command: GripperCommand, dt: float) -> float:
-        """Command the effort."""
+        """Command the effort and return it."""
         joint, limit = self.joint, abs(command.max_effort)
         effort = self._pid.compute(command.position - joint.position, -joint.velocity, dt)
         joint.effort_command = min(max(effort, -limit), limit)

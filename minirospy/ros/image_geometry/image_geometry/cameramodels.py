@@ -40,7 +40,7 @@ def mkmat(rows: int, cols: int, L: Sequence[float]) -> Matrix:
 
 
 class PinholeCameraModel:
-    """A camera described by its CameraInfo; binning and region of interest are applied to K and P."""
+    """A camera described by a CameraInfo. K and P include binning and the region of interest."""
 
     def __init__(self) -> None:
         self.K: Matrix = None
@@ -73,7 +73,7 @@ class PinholeCameraModel:
         if not any((msg.roi.x_offset, msg.roi.y_offset, msg.roi.width, msg.roi.height)):
             self.raw_roi.width, self.raw_roi.height = self.width, self.height
 
-        # Shift the principal point by the region's offset first, then scale it by the binning.
+        # First shift the principal point by the region's offset, then scale it by the binning.
         for matrix in (self.K, self.P):
             matrix[0, 2] -= self.raw_roi.x_offset
             matrix[1, 2] -= self.raw_roi.y_offset
@@ -104,7 +104,7 @@ class PinholeCameraModel:
         return np.array([raw_u[0], raw_v[0]])
 
     def project3dToPixel(self, point: Point) -> tuple[float, float]:
-        """Return a point's rectified pixel (u, v); (nan, nan) if the point is in the plane through the camera's center."""
+        """Return a point's rectified pixel (u, v), or (nan, nan) if the point's depth is 0."""
         u, v, w = (float(row) for row in self._checked_P() @ [point[0], point[1], point[2], 1.0])
         return (u / w, v / w) if w != 0 else (math.nan, math.nan)
 
@@ -137,7 +137,7 @@ class PinholeCameraModel:
         return self.resolution
 
     def intrinsicMatrix(self) -> Matrix:
-        """Return the 3x3 camera matrix K. All matrices are None before ``fromCameraInfo``."""
+        """Return the 3x3 camera matrix K. Like all matrices, it is None before ``fromCameraInfo``."""
         return self.K
 
     def distortionCoeffs(self) -> Matrix:
@@ -177,7 +177,7 @@ class PinholeCameraModel:
         return self._of_P(1, 1)
 
     def Tx(self) -> float:
-        """Return the x translation in P; for the right camera in a pair, it is -fx times the baseline."""
+        """Return the x translation in P: for the right camera of a pair, -fx times the baseline."""
         return self._of_P(0, 3)
 
     def Ty(self) -> float:
@@ -214,7 +214,7 @@ class PinholeCameraModel:
 
 
 class StereoCameraModel:
-    """A pair of rectified cameras. The baseline is computed from the right camera's P."""
+    """A pair of rectified cameras. The baseline comes from the right camera's P."""
 
     def __init__(self) -> None:
         self.left = PinholeCameraModel()
@@ -235,11 +235,11 @@ class StereoCameraModel:
         self.Q[3, 2] = _ratio(1.0, baseline)
 
     def tfFrame(self) -> str | None:
-        """Return the left camera's frame ID. The points are also in this frame."""
+        """Return the left camera's frame ID, which is also the frame of all points."""
         return self.left.tfFrame()
 
     def project3dToPixel(self, point: Point) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the rectified pixels of a point in the left and the right image."""
+        """Return a point's rectified pixels in the left and right images."""
         return self.left.project3dToPixel(point), self.right.project3dToPixel(point)
 
     def projectPixelTo3d(self, left_uv: Point, disparity: float) -> tuple[float, float, float]:
@@ -262,7 +262,7 @@ class StereoCameraModel:
 
 
 def _ratio(above: float, below: float) -> float:
-    """Divide two numbers. If the divisor is zero, return inf or nan like numpy, but without its warning."""
+    """Divide two numbers; for a zero divisor, return inf or nan like numpy, but without a warning."""
     if below:
         return above / below
     if above == 0 or math.isnan(above):

@@ -29,7 +29,7 @@ _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
 def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Values) -> Values:
-    """Return the rectified pixel for a raw pixel. Raise ValueError if the number of coefficients in D is not supported."""
+    """Return a raw pixel's rectified pixel. Raise ValueError if D has an unsupported number of coefficients."""
     import numpy as np
 
     k = _coefficients(D)
@@ -59,7 +59,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Map rectified pixels to raw pixels; return two arrays u and v.
+    """Map rectified pixels to raw pixels; return the arrays u and v.
 
     Raise ValueError if the number of coefficients in D is not supported.
     """
@@ -120,7 +120,7 @@ def _coefficients(D: Distortion) -> list[float]:
 
 
 def _tilt(tau_x: float, tau_y: float) -> Values:
-    """Return the matrix for a sensor that is tilted relative to the lens."""
+    """Return the matrix for a sensor tilted relative to the lens."""
     import numpy as np
 
     cx, sx, cy, sy = math.cos(tau_x), math.sin(tau_x), math.cos(tau_y), math.sin(tau_y)
@@ -133,7 +133,7 @@ def _tilt(tau_x: float, tau_y: float) -> Values:
 
 
 def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
-    """Return an image whose pixels are read from ``raw`` at the positions in the maps, with bicubic interpolation.
+    """Return ``raw`` sampled at the maps' positions with bicubic interpolation.
 
     Positions outside ``raw`` become black.
     """
@@ -184,11 +184,11 @@ def _weights() -> Values:
 
 @functools.cache
 def _fixed_weights() -> Values:
-    """Return the weights as integers that sum to ``_ONE``, rounded as in OpenCV."""
+    """Return the weights as integers that sum to ``_ONE``, with OpenCV's rounding."""
     import numpy as np
 
     table: Values = np.rint(_weights() * np.float32(_ONE)).astype(np.int32)
-    # OpenCV corrects the largest or the smallest of these four weights by the rounding error.
+    # OpenCV adds the rounding error to the largest or smallest of these four weights.
     corner = table[:, :, 2:, 2:].reshape(_STEPS, _STEPS, 4)
     excess = table.sum(axis=(2, 3)) - _ONE
     places = np.where(excess < 0, corner.argmax(axis=2), corner.argmin(axis=2))

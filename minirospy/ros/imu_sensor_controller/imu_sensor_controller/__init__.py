@@ -23,7 +23,7 @@ _NOT_MEASURED = [-1.0, *_UNKNOWN[1:]]
 
 
 class ImuSensorController(Controller):
-    """Publishes each sensor of the hardware on the topic with the sensor's name."""
+    """Publishes each IMU sensor on a topic with the sensor's name."""
 
     interfaces = (Interface.IMU,)
 
@@ -39,7 +39,7 @@ class ImuSensorController(Controller):
             self._topics.append((hardware.imu(name), publisher))
 
     def starting(self, time: Time) -> None:
-        """Schedule the first message after one period."""
+        """Schedule the first message one period from now."""
         self._rate.start(time)
 
     def update(self, time: Time, period: Duration) -> None:
@@ -70,7 +70,7 @@ def _message(sensor: ImuSensor, time: Time) -> Imu:
 
 
 def _covariance(measured: Sequence[float] | None, covariance: Sequence[float] | None) -> list[float]:
-    """Return a covariance for a message. As sensor_msgs/Imu specifies, -1 means not measured and 0 means unknown."""
+    """Return a covariance for an Imu message, which defines -1 as not measured and 0 as unknown."""
     if covariance is not None:
         return list(covariance)
     return _NOT_MEASURED if measured is None else _UNKNOWN

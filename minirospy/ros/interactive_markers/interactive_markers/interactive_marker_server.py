@@ -28,7 +28,7 @@ Callback = Callable[[InteractiveMarkerFeedback], object]
 
 _QUEUE_SIZE = 100
 _KEEP_ALIVE = 0.5  # seconds between keep-alive updates to viewers
-_TURN = 1.0  # seconds for which feedback from one viewer blocks feedback from the others
+_TURN = 1.0  # seconds for which one viewer's feedback blocks feedback from others
 _UNCHANGED: Callback | int = -1
 
 
@@ -58,12 +58,12 @@ class UpdateContext:
 
 
 class InteractiveMarkerServer:
-    """The markers in one namespace. ``applyChanges`` publishes changes."""
+    """Serves the markers in a namespace. ``applyChanges`` publishes pending changes."""
 
     DEFAULT_FEEDBACK_CB = 255
 
     def __init__(self, topic_ns: str, server_id: str = "", q_size: int = 100) -> None:
-        """Create a server. ``server_id`` is required if a node has several servers; ``q_size`` is the feedback queue's size."""
+        """Create a server. A node with several servers must set ``server_id``; ``q_size`` is the feedback queue's size."""
         self.topic_ns = topic_ns
         self.seq_num = 0
         self.mutex = Lock()
@@ -102,7 +102,7 @@ class InteractiveMarkerServer:
     def setCallback(
         self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
     ) -> bool:
-        """Set the callback for one type of feedback, or the fallback for all types without a callback.
+        """Set the callback for one type of feedback, or the default for types without a callback.
 
         None removes the callback. The change takes effect immediately. Return whether the marker exists.
         """
@@ -122,7 +122,7 @@ class InteractiveMarkerServer:
             return bool(found)
 
     def setPose(self, name: str, pose: Pose, header: Header = Header()) -> bool:  # noqa: B008 - it is only read
-        """Move a marker; if ``header`` has no frame, keep the marker's header. Return whether the marker has been published.
+        """Move a marker; without a frame in ``header``, keep the marker's header. Return whether the marker has been published.
 
         As in ROS, a marker that the next ``applyChanges`` adds or replaces is not moved.
         """
@@ -170,7 +170,7 @@ class InteractiveMarkerServer:
                 self._apply(name, update, message)
             self.pending_updates = {}
             self.seq_num += 1
-            # Publish with the lock held, so that no other message is sent before the one with the new sequence number.
+            # Publish while holding the lock, so that messages are sent in the order of their sequence numbers.
             self.publish(message)
         self.publishInit()
 
@@ -185,7 +185,7 @@ class InteractiveMarkerServer:
             context.int_marker = update.int_marker
             message.markers.append(context.int_marker)
         elif context is None:
-            # The marker was added and erased between two applyChanges() calls, so it has never been published.
+            # The marker was added and erased since the last applyChanges(), so it was never published.
             return
         elif update.update_type == UpdateContext.POSE_UPDATE:
             marker = context.int_marker
@@ -200,7 +200,7 @@ class InteractiveMarkerServer:
     # --- messages from and to viewers
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Move a marker at a viewer's request, and call the program's callback.
+        """Move a marker at a viewer's request and call the program's callback.
 
         For the next second, ignore other viewers' feedback on that marker.
         """
@@ -210,7 +210,7 @@ class InteractiveMarkerServer:
                 return
             now = rospy.Time.now()
             age = (now - context.last_feedback).to_sec()
-            # If the age is negative, the clock has jumped back.
+            # A negative age means that the clock has jumped back.
             if context.last_client_id != feedback.client_id and 0 <= age < _TURN:
                 rospy.logdebug(
                     f"Rejecting feedback for {feedback.marker_name}: conflicting feedback from separate clients."
@@ -219,7 +219,7 @@ class InteractiveMarkerServer:
             context.last_feedback, context.last_client_id = now, feedback.client_id
 
             if feedback.event_type == feedback.POSE_UPDATE:
-                # If the header has no time stamp, keep the marker's frame.
+                # If the header has no timestamp, keep the marker's frame.
                 header = context.int_marker.header
                 self.doSetPose(
                     self.pending_updates.get(feedback.marker_name),

@@ -31,7 +31,7 @@ class EntryContext:
 
 
 class MenuHandler:
-    """A menu. ``apply`` attaches it to markers. Entries are identified by handles, numbered from 1."""
+    """A menu to attach to markers with ``apply``. Handles identify entries and start at 1."""
 
     NO_CHECKBOX = 0
     CHECKED = 1
@@ -51,7 +51,7 @@ class MenuHandler:
         command: str = "",
         callback: Callback | None = None,
     ) -> int | None:
-        """Add an entry, below ``parent`` if that is given; return the entry's handle, or None if the parent does not exist."""
+        """Add an entry, below ``parent`` if given; return the entry's handle, or None if the parent does not exist."""
         handle = self.doInsert(title, command_type, command, callback)
         if parent is None:
             self.top_level_handles_.append(handle)
@@ -109,8 +109,8 @@ class MenuHandler:
         return True
 
     def reApply(self, server: InteractiveMarkerServer) -> bool:
-        """Apply the menu again to all markers that use it; return whether all of these still exist."""
-        # Build a list instead of using a generator, so that all markers are processed even if one is missing.
+        """Update the menu on all markers that use it; return whether all of them still exist."""
+        # Build a list first, because all() with a generator would stop at a missing marker.
         found = [self.apply(server, marker) for marker in list(self.managed_markers_)]
         return all(found)
 
@@ -123,7 +123,7 @@ class MenuHandler:
     def pushMenuEntries(
         self, handles_in: Iterable[int], entries_out: list[MenuEntry], parent_handle: int
     ) -> bool:
-        """Append the messages for entries and their submenus; return whether all the entries exist."""
+        """Append the messages for entries and their submenus; return whether all entries exist."""
         for handle in handles_in:
             context = self.entry_contexts_.get(handle)
             if context is None:

@@ -26,11 +26,11 @@ _XMLRPC_TYPES = {
     float: 3,
     str: 4,
     list: 7,
-}  # numbers of the XmlRpcValue types, which ROS prints
+}  # XmlRpcValue's type numbers, which ROS prints
 
 
 class JointStateController(Controller):
-    """Publishes ``joint_states``: all joints, or those in the parameter ``joints``, plus ``extra_joints``, which never move."""
+    """Publishes ``joint_states``: all joints or those in ``joints``, plus ``extra_joints``, whose states are constant."""
 
     interfaces = (Interface.JOINT_STATE,)
 
@@ -53,13 +53,13 @@ class JointStateController(Controller):
         self.opened.callback(self._publisher.close)
 
     def starting(self, time: Time) -> None:
-        """Publish in the next cycle. If the controller is restarted, the publishing schedule continues."""
+        """Publish in the next cycle. After a restart, keep the publishing schedule."""
         if not self._has_started:
             self._rate.start(time, is_due=True)
             self._has_started = True
 
     def update(self, time: Time, period: Duration) -> None:
-        """Publish the state of the joints."""
+        """Publish the joints' states."""
         if not self._rate.is_due(time):
             return
         joints, (positions, velocities, efforts) = self._joints, self._extra
@@ -74,7 +74,7 @@ class JointStateController(Controller):
 
 
 def _extra_joints(parameters: Parameters, names: list[str]) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield each extra joint's name and state. Log the reason if one is ignored."""
+    """Yield each extra joint's name and state; ignore invalid ones and log the reason."""
     listed = parameters.get("extra_joints")
     if listed is None:
         return

@@ -70,7 +70,7 @@ class JointTrajectoryController(Controller):
     follower: TrajectoryFollower
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the joints, and open the topics, the action and the service."""
+        """Read the parameters, claim the joints and open the topics, the action and the service."""
         parameters = context.parameters
         state_rate = parameters.finite("state_publish_rate", 50.0)
         monitor_rate = parameters.finite("action_monitor_rate", 20.0)
@@ -90,7 +90,7 @@ class JointTrajectoryController(Controller):
         self.read_gains(context)
 
         self._state_period = max(1, round(_SECOND / state_rate))  # ns
-        self._state_due = 0  # ns of the uptime
+        self._state_due = 0  # ns of uptime at which to publish the state next
         state = RealtimePublisher(f"{context.namespace}/state", JointTrajectoryControllerState)
         self._state = self.opened.enter_context(closing(state))
         action = RealtimeActionServer(
@@ -110,21 +110,21 @@ class JointTrajectoryController(Controller):
         self.opened.callback(query.shutdown)
 
     def read_gains(self, context: ControllerContext) -> None:
-        """Read the parameters that only this hardware interface needs."""
+        """Read the parameters specific to the hardware interface."""
 
     def starting(self, time: Time) -> None:
-        """Hold the present positions."""
+        """Hold the current positions."""
         positions = [
             joint.position if math.isfinite(joint.position) else joint.position_command
             for joint in self.joints
         ]
-        self._action.start()  # first, so that the action is ready for each goal that the follower accepts
+        self._action.start()  # start first, so that the action is ready for each goal that the follower accepts
         self.follower.start(time.to_nsec(), positions, [joint.velocity for joint in self.joints])
         self._state_due = self._state_period
         self.reset()
 
     def update(self, time: Time, period: Duration) -> None:
-        """Send this cycle's commands; publish the state, feedback and the goal's result when they are due."""
+        """Send this cycle's commands; publish the state, the feedback and the goal's result when due."""
         joints, follower = self.joints, self.follower
         now = time.to_nsec()
         elapsed = period.to_nsec()
@@ -153,14 +153,14 @@ class JointTrajectoryController(Controller):
         self.stopping(time)
 
     def send(self, dt: float) -> None:
-        """Set the joints' commands from the follower's desired states and errors. ``dt``: s since the last cycle."""
+        """Set the joints' commands from the follower's desired states and errors. ``dt`` is in seconds since the last cycle."""
         raise NotImplementedError
 
     def reset(self) -> None:
-        """Set the joints' commands for the time before the first update."""
+        """Set the joints' commands until the first update."""
 
     def _fill(self, message: _State, time: Time, positions: list[float], velocities: list[float]) -> _State:
-        """Fill a message with the states of this cycle."""
+        """Fill a message with this cycle's states."""
         follower = self.follower
         desired_time, actual_time = follower.times_from_start()
         message.header.stamp = time
@@ -217,7 +217,7 @@ class JointTrajectoryController(Controller):
         tolerances: Sequence[JointTolerances] | None,
         goal: MonitoredGoal | None,
     ) -> None:
-        """Queue a trajectory for the loop; one without points holds the joints. Raise TrajectoryError if it is rejected."""
+        """Queue a trajectory for the loop; an empty one holds the joints. Raise TrajectoryError if it is rejected."""
         if not self.follower.is_running:
             raise TrajectoryError(_NOT_RUNNING.format("commands"))
         if not message.points:
@@ -250,7 +250,7 @@ class PositionJointTrajectoryController(JointTrajectoryController):
     interfaces = (Interface.POSITION,)
 
     def reset(self) -> None:
-        """Command the present positions."""
+        """Command the current positions."""
         for joint, position in zip(self.joints, self.follower.positions, strict=True):
             joint.position_command = position
 
@@ -285,24 +285,24 @@ class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
 
 
 class _ClosedLoopController(JointTrajectoryController):
-    """Commands the desired velocities times ``velocity_ff/JOINT``, plus the output of a PID controller with ``gains/JOINT``."""
+    """Commands ``velocity_ff/JOINT`` times the desired velocities plus the output of a PID controller with ``gains/JOINT``."""
 
-    command: ClassVar[str]  # the attribute of a joint that holds the command
+    command: ClassVar[str]  # the joint's attribute for the command
 
     def read_gains(self, context: ControllerContext) -> None:
-        """Read the gains, and allow dynamic_reconfigure to change them."""
+        """Read the gains and make them configurable with dynamic_reconfigure."""
         parameters = context.parameters
         self._velocity_ff = [parameters.finite(f"velocity_ff/{name}", 0.0) for name in self._names]
         self._pids = [Pid.open(parameters.below(f"gains/{name}"), self.opened) for name in self._names]
 
     def reset(self) -> None:
-        """Reset the PID controllers, and command 0."""
+        """Reset the PID controllers and command 0."""
         for pid, joint in zip(self._pids, self.joints, strict=True):
             pid.reset()
             setattr(joint, self.command, 0.0)
 
     def send(self, dt: float) -> None:
-        """Command the output of the PID controllers."""
+        """Command the PID controllers' output plus the feed-forward velocities."""
         follower, command = self.follower, self.command
         for joint, pid, velocity_ff, velocity, error, rate in zip(
             self.joints,
@@ -317,14 +317,14 @@ class _ClosedLoopController(JointTrajectoryController):
 
 
 class VelocityJointTrajectoryController(_ClosedLoopController):
-    """velocity_controllers/JointTrajectoryController."""
+    """velocity_controllers/JointTrajectoryController: commands velocities."""
 
     interfaces = (Interface.VELOCITY,)
     command = "velocity_command"
 
 
 class EffortJointTrajectoryController(_ClosedLoopController):
-    """effort_controllers/JointTrajectoryController."""
+    """effort_controllers/JointTrajectoryController: commands efforts."""
 
     interfaces = (Interface.EFFORT,)
     command = "effort_command"
@@ -342,7 +342,7 @@ def _tolerance(message: JointTolerance) -> GoalTolerance:
 
 
 def _log(error: TrajectoryError) -> None:
-    """Log why a trajectory is rejected, at ROS's level."""
+    """Log why a trajectory is rejected, at the same level as ROS."""
     log = rospy.logwarn if isinstance(error, PastTrajectoryError) else rospy.logerr
     log("%s", error)
 

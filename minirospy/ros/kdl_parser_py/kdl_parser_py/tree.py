@@ -22,7 +22,7 @@ _TYPE_NAMES = {
 
 
 class Joint:
-    """A segment's joint."""
+    """A segment's joint, connecting it to its parent."""
 
     def __init__(self, joint: UrdfJoint) -> None:
         self._joint = joint
@@ -45,16 +45,16 @@ class Segment:
 
     @property
     def is_moving(self) -> bool:
-        """Return whether the joint is movable."""
+        """Return whether the segment's joint is movable."""
         return self._segment.is_moving
 
     @property
     def parent(self) -> str:
-        """Return the parent link's name."""
+        """Return the name of the parent link."""
         return self._segment.joint.parent
 
     def getName(self) -> str:
-        """Return the link's name."""
+        """Return the name of the segment's link."""
         return self._segment.joint.child
 
     def getJoint(self) -> Joint:
@@ -62,12 +62,12 @@ class Segment:
         return self._joint
 
     def pose(self, q: float) -> Pose:
-        """Return the link's pose relative to its parent link: translation, and rotation as (x, y, z, w)."""
+        """Return the link's pose relative to its parent: translation, and rotation as (x, y, z, w)."""
         return self._segment.pose(q)
 
 
 class Chain:
-    """The segments from a link down to one of its descendants."""
+    """The segments from a link to one of its descendants."""
 
     def __init__(self, segments: list[Segment]) -> None:
         self._segments = segments
@@ -81,7 +81,7 @@ class Chain:
         return sum(segment.is_moving for segment in self._segments)
 
     def getSegment(self, nr: int) -> Segment:
-        """Return a segment; number 0 is the topmost."""
+        """Return the segment with this index; 0 is the topmost."""
         return self._segments[nr]
 
 
@@ -93,7 +93,7 @@ class Tree:
         self._segments: dict[str, Segment] = {}
 
     def addSegment(self, segment: Segment, hook_name: str) -> bool:
-        """Add a segment below a link; return False if the link does not exist, or the segment already exists."""
+        """Add a segment below a link; return False if the link does not exist or the segment already exists."""
         name = segment.getName()
         is_known = hook_name == self._root or hook_name in self._segments
         if not is_known or name in self._segments or name == self._root:
@@ -110,7 +110,7 @@ class Tree:
         return sum(segment.is_moving for segment in self._segments.values())
 
     def getChain(self, chain_root: str, chain_tip: str) -> Chain:
-        """Return the segments from a link down to a descendant. Raise ValueError if ``chain_tip`` is not a descendant."""
+        """Return the segments from a link to a descendant. Raise ValueError if ``chain_tip`` is not a descendant."""
         found: list[Segment] = []
         link = chain_tip
         while link != chain_root:

@@ -11,7 +11,7 @@ __all__ = ["treeFromFile", "treeFromParam", "treeFromString", "treeFromUrdfModel
 
 
 class Writable(Protocol):
-    """A robot model that can be serialized, such as urdf_parser_py's."""
+    """A robot model that can be serialized to XML, such as urdf_parser_py's."""
 
     def to_xml_string(self) -> str:
         """Return the description as XML."""
@@ -26,7 +26,7 @@ def treeFromFile(filename: str) -> tuple[bool, Tree]:
 
 
 def treeFromParam(param: str) -> tuple[bool, Tree]:
-    """Build the tree from the robot description in a parameter.
+    """Build the tree from the robot description in a ROS parameter.
 
     Raise KeyError if the parameter is not set, UrdfError if the description is invalid.
     """

@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 __all__ = ["LaserProjection", "PointCloud2"]
 
 _VIEWPOINT = ("vp_x", "vp_y", "vp_z")
-_INT32, _FLOAT32 = 5, 7  # the numbers of these types in PointField
+_INT32, _FLOAT32 = 5, 7  # PointField's numbers for these types
 
 
 class LaserProjection:
-    """Converts scans to clouds. Keeps the beams' directions for the next scan."""
+    """Converts laser scans to point clouds. Caches the beams' directions for the next scan."""
 
     LASER_SCAN_INVALID = -1.0
     LASER_SCAN_MIN_RANGE = -2.0
     LASER_SCAN_MAX_RANGE = -3.0
 
     class ChannelOption:
-        """Bits that select a cloud's fields in addition to x, y and z."""
+        """Bits that select a point cloud's fields besides x, y and z."""
 
         NONE = 0x00
         INTENSITY = 0x01
@@ -57,7 +57,7 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Convert a scan to a cloud in the scan's frame. Omit ranges outside the scan's limits.
+        """Convert a scan to a point cloud in the scan's frame. Omit ranges outside the scan's limits.
 
         ``range_cutoff``: omit ranges from this distance in meters; if negative, only the scan's limit applies.
         ``channel_options``: the fields, from ``ChannelOption``; ``INTENSITY`` is ignored if the scan has no intensities.
@@ -102,7 +102,7 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Convert a scan to a cloud in another frame.
+        """Convert a scan to a point cloud in another frame.
 
         Each point is transformed by the laser's pose at the time when the point was measured.
 
@@ -154,7 +154,7 @@ class LaserProjection:
 
 
 def _cloud(scan: LaserScan, columns: Sequence[tuple[str, int, Values | int]], count: int) -> PointCloud2:
-    """Return a cloud with these fields, given as (name, type, values)."""
+    """Return a point cloud with these fields, given as (name, type, values)."""
     import numpy as np
 
     fields = [PointField(name, 4 * at, datatype, 1) for at, (name, datatype, _) in enumerate(columns)]
@@ -180,7 +180,7 @@ def _later(stamp: genpy.Time, seconds: float) -> genpy.Time:
 
 
 def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Values) -> Values:
-    """Interpolate between two rotations along the shorter arc; return quaternions x y z w with shape (4, ratios)."""
+    """Interpolate between two rotations along the shorter arc; return x y z w quaternions with shape (4, ratios)."""
     import numpy as np
 
     start, end = (
@@ -200,7 +200,7 @@ def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Value
 
 
 def _rotated(points: Values, rotations: Values) -> Values:
-    """Rotate each point by the rotation with the same index; return points with shape (3, points)."""
+    """Rotate each point by the rotation with the same index; return an array with shape (3, points)."""
     import numpy as np
 
     vectors = np.array([points[axis] for axis in "xyz"], np.float64)

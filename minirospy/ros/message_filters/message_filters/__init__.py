@@ -33,23 +33,23 @@ class Input(Protocol):
     """An object that a filter can be connected to."""
 
     def registerCallback(self, cb: Callback, *args: object) -> object:
-        """Register ``cb``, which is called with each message, followed by ``args``."""
+        """Register a callback. It is called with each message, followed by ``args``."""
 
 
 class SimpleFilter:
-    """The base class of filters: stores callbacks, and calls them with the messages that pass."""
+    """Base class of filters: stores callbacks and calls them with the messages that pass."""
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callback, tuple[object, ...]]] = {}
 
     def registerCallback(self, cb: Callback, *args: object) -> int:
-        """Register ``cb``, called with each message or set that passes, followed by ``args``; return the callback's ID."""
+        """Register a callback and return its ID. It is called with each message or set that passes, followed by ``args``."""
         conn = len(self.callbacks)
         self.callbacks[conn] = (cb, args)
         return conn
 
     def signalMessage(self, *msg: object) -> None:
-        """Call every callback with a message or a set of messages."""
+        """Call all callbacks with a message or a set of messages."""
         for cb, args in tuple(self.callbacks.values()):
             cb(*msg, *args)
 
@@ -72,17 +72,17 @@ class Subscriber(SimpleFilter):
         return self.topic
 
     def __getattr__(self, key: str) -> object:
-        # A copied object has no attributes at first, so looking up ``sub`` would recurse endlessly.
+        # A copy has no attributes at first, so looking up ``sub`` would recurse endlessly.
         if key == "sub":
             raise AttributeError(key)
         return getattr(self.sub, key)
 
 
 class Cache(SimpleFilter):
-    """Caches the last ``cache_size`` messages from a filter for look-up by time. Forwards each message."""
+    """Caches the last ``cache_size`` messages from a filter for lookup by time, and forwards each message."""
 
     def __init__(self, f: Input, cache_size: int = 1, allow_headerless: bool = False) -> None:
-        """Create a cache.
+        """Create a cache for the messages from a filter.
 
         ``allow_headerless``: stamp a message without a header on arrival, instead of dropping it with a warning.
         """
@@ -114,7 +114,7 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[object]:
-        """Return the messages from one time stamp to another, inclusive.
+        """Return the messages from one timestamp to another, inclusive.
 
         Raise AssertionError if ``to_stamp`` precedes ``from_stamp``.
         """
@@ -130,21 +130,21 @@ class Cache(SimpleFilter):
         return next((msg for time, msg in reversed(self._stored()) if time <= stamp), None)
 
     def getLatestTime(self) -> Time | None:
-        """Return the time stamp of the message that was stored last, or None."""
+        """Return the timestamp of the last message stored, or None."""
         stored = self._stored()
         return stored[-1][0] if stored else None
 
     def getLastestTime(self) -> Time | None:
-        """Return ``getLatestTime()``; this is its old, misspelt name."""
+        """Return ``getLatestTime()``, under its old, misspelled name."""
         return self.getLatestTime()
 
     def getOldestTime(self) -> Time | None:
-        """Return the time stamp of the message that was stored first, or None."""
+        """Return the timestamp of the first message stored, or None."""
         stored = self._stored()
         return stored[0][0] if stored else None
 
     def getLast(self) -> object | None:
-        """Return the first stored message that is not older than the one stored last, or None."""
+        """Return the earliest-stored message at or after ``getLatestTime()``, or None."""
         latest = self.getLatestTime()
         return None if latest is None else self.getElemAfterTime(latest)
 
@@ -154,19 +154,19 @@ class Cache(SimpleFilter):
 
 
 class TimeSynchronizer(SimpleFilter):
-    """Forwards sets of messages with equal time stamps, one from each input.
+    """Forwards sets of messages with equal timestamps, one from each input.
 
     A callback's arguments are one message per input. Callbacks do not run concurrently.
     """
 
     def __init__(self, fs: Iterable[Input], queue_size: int, reset: bool = False) -> None:
-        """Connect the inputs. ``queue_size``: how many messages to queue per input while waiting for the other inputs.
+        """Connect the inputs. ``queue_size`` is the number of messages per input to keep while waiting for the others.
 
         ``reset``: if simulated time jumps back, discard the input's queued messages.
         """
         super().__init__()
         self.queue_size = queue_size
-        # Use a reentrant lock, because a callback may publish to an input in the same process.
+        # Use a reentrant lock: a callback may publish to an input in the same process.
         self.lock = threading.RLock()
         self.enable_reset = reset
         self.connectInput(fs)
@@ -184,7 +184,7 @@ class TimeSynchronizer(SimpleFilter):
         ]
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message from an input; forward each complete set.
+        """Store an input's message; forward each complete set.
 
         Raise AttributeError if the message has no header.
         """
@@ -197,12 +197,12 @@ class TimeSynchronizer(SimpleFilter):
                 return
 
             for each in sorted(set(self.queues[0]).intersection(*self.queues[1:]) if self.queues else ()):
-                # A callback may already have completed this set by adding messages to the queues.
+                # A callback may have added messages and already completed this set.
                 if all(each in queue for queue in self.queues):
                     self.signalMessage(*[queue.pop(each) for queue in self.queues])
 
     def _reset_if_time_jumped(self, my_queue: Queue, my_queue_index: int | None) -> bool:
-        """Clear an input's queue if simulated time has jumped back. Return True if another input has a later time."""
+        """Clear an input's queue if simulated time has jumped back. Return True if another input has a later timestamp."""
         if not self.enable_reset or is_wallclock():
             return False
         now = rospy.Time.now()
@@ -215,7 +215,7 @@ class TimeSynchronizer(SimpleFilter):
 
 
 class ApproximateTimeSynchronizer(TimeSynchronizer):
-    """Forwards sets of messages, one from each input, whose time stamps differ by less than ``slop`` seconds.
+    """Forwards sets of messages, one from each input, whose timestamps differ by less than ``slop`` seconds.
 
     A new message is matched with the closest messages from the other inputs. If several sets are possible, the one that ROS
     would try first is used.
@@ -229,7 +229,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         allow_headerless: bool = False,
         reset: bool = False,
     ) -> None:
-        """Connect the inputs. ``slop`` is in seconds.
+        """Connect the inputs. ``slop`` is the maximum difference between timestamps, in seconds.
 
         ``allow_headerless``: stamp a message without a header with its arrival time.
         """
@@ -239,7 +239,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         super().__init__(fs, queue_size, reset)
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message from an input; if it completes a set, forward the set."""
+        """Store an input's message; forward the set that it completes, if any."""
         try:
             stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         except AttributeError:
@@ -266,12 +266,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             if waiting > self.queue_size:
                 _keep_newest(my_queue, self.queue_size)
                 if my_queue_index is not None and stamp not in my_queue:
-                    # The queue is full, and the new message was removed again because it is the oldest.
+                    # The queue was full, and the new message was the oldest, so it has been removed.
                     return
             if is_stale:
                 return
 
-            # Skip the search if an input has no messages, which is the most frequent case.
+            # Skip the search if an input has no messages, the most frequent case.
             if self.queues is self._stamp_queues and not all(self._orders):
                 return
             found = self._match(my_queue_index, nanoseconds)
@@ -280,12 +280,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     @property
     def last_added(self) -> Time:
-        """Return the last message's arrival time."""
+        """Return the arrival time of the last message."""
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
-        """Remove the set that a time stamp completes from the queues; return its messages, or [] if there is no set."""
-        # Use ``_stamp_queues``, because a subclass may have replaced ``queues`` with its own list of dicts.
+        """Remove the set that a timestamp completes from the queues; return its messages, or [] if there is no set."""
+        # Use ``_stamp_queues``: a subclass may have replaced ``queues`` with a list of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:
             queues = [queue if isinstance(queue, StampQueue) else StampQueue(queue) for queue in self.queues]
@@ -301,7 +301,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
 
 def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
-    """Return a message's time stamp. If it has no header, return the current time, or log a warning and return None."""
+    """Return a message's timestamp. Without a header, return the current time, or log a warning and return None."""
     try:
         stamp: Time = message.header.stamp  # type: ignore[attr-defined]
     except AttributeError:

@@ -11,12 +11,12 @@ __all__ = ["StampQueue", "closest_stamps"]
 
 
 class StampQueue(MutableMapping[Time, object]):
-    """One input's messages, keyed by time stamp: a dict as in ROS, plus a sorted list of the stamps."""
+    """One input's messages, keyed by timestamp: a dict as in ROS, plus a sorted list of the stamps."""
 
     __slots__ = ("_entries", "order")
 
     def __init__(self, messages: Mapping[Time, object] | None = None) -> None:
-        """Create a queue. ``messages``: the initial contents, in order of arrival."""
+        """Create a queue with the initial ``messages`` in order of arrival."""
         self.order: list[int] = []
         """Stamps in nanoseconds, ascending; always the same list object."""
         self._entries: dict[int, tuple[Time, object]] = {}
@@ -45,10 +45,10 @@ class StampQueue(MutableMapping[Time, object]):
         return repr(dict(self))
 
     def put(self, nanoseconds: int, stamp: Time, message: object) -> None:
-        """Store a message under its stamp, given both in nanoseconds and as a Time."""
+        """Store a message under its stamp, given in nanoseconds and as a Time."""
         entries, order = self._entries, self.order
         if nanoseconds in entries:
-            # As in a dict, storing under an existing key keeps the key's position and the key object.
+            # Like a dict, keep an existing key's position and key object.
             stamp = entries[nanoseconds][0]
         elif order and nanoseconds < order[-1]:
             insort(order, nanoseconds)
@@ -69,7 +69,7 @@ class StampQueue(MutableMapping[Time, object]):
         return message
 
     def stamp_at(self, nanoseconds: int) -> Time:
-        """Return the stamp object that was stored. Raise KeyError if there is no such stamp."""
+        """Return the stored stamp object. Raise KeyError if there is no such stamp."""
         return self._entries[nanoseconds][0]
 
     def keep_newest(self, size: int) -> None:
@@ -78,7 +78,7 @@ class StampQueue(MutableMapping[Time, object]):
             del self._entries[self.order.pop(0)]
 
     def nearest(self, stamp: int) -> int:
-        """Return the stored stamp closest to ``stamp``; of two equally close stamps, the first to arrive.
+        """Return the stored stamp closest to ``stamp``; of two equally close ones, the first to arrive.
 
         Raise IndexError if empty.
         """
@@ -98,7 +98,7 @@ class StampQueue(MutableMapping[Time, object]):
         return self.order[bisect_left(self.order, first) : bisect_right(self.order, last)]
 
     def by_distance(self, stamps: Sequence[int], stamp: int) -> list[int]:
-        """Sort some of the queue's stamps by distance to ``stamp``; stamps at equal distance stay in order of arrival."""
+        """Sort some of the queue's stamps by distance to ``stamp``, keeping the order of arrival at equal distances."""
         ranks = {each: rank for rank, each in enumerate(self._entries)}
         return sorted(stamps, key=lambda each: (abs(each - stamp), ranks[each]))
 
@@ -106,7 +106,7 @@ class StampQueue(MutableMapping[Time, object]):
 def closest_stamps(
     queues: Sequence[StampQueue], stamp: int, slop: int, index: int | None = None
 ) -> list[int] | None:
-    """Return one stamp from each queue such that all differ by less than ``slop``, or None if there is no such set.
+    """Return one stamp from each queue such that all differ by less than ``slop``, or None if that is impossible.
 
     ``stamp`` is the new stamp, from queue number ``index``; the set contains it.
 
@@ -130,19 +130,19 @@ def closest_stamps(
     if last - first < slop:
         return nearest
 
-    # Stamps that differ by less than `slop` lie in a window of width `slop` that starts at one of them.
+    # Stamps that differ by less than `slop` fit into a window of that width, which starts at one of them.
     candidates = [
         [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
         for at, queue in enumerate(queues)
     ]
-    # The window must contain the new stamp, so it starts at that stamp or before it.
+    # The window must contain the new stamp, so it starts at or before that stamp.
     last = stamp + slop if index is None else stamp
     starts = {each for stamps in candidates for each in stamps if each <= last}
     windows = [start for start in sorted(starts) if _has_each(candidates, start, start + slop - 1)]
 
     chosen = []
     for queue, stamps in zip(queues, candidates, strict=True):
-        # Choose the first stamp that lies in a remaining window, because ROS's loops reach that stamp first.
+        # Choose the first stamp in a remaining window, because ROS's loops reach that stamp first.
         for each in queue.by_distance(stamps, stamp):
             if left := _around(windows, each, slop):
                 windows = left

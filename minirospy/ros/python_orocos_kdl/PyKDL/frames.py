@@ -22,7 +22,7 @@ class Rotation:
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, *args: Any) -> None:
-        """Create a rotation from nine numbers (row by row), three column vectors, or a Rotation; by default, the identity."""
+        """Create a rotation from nine numbers (row by row), three column vectors or a Rotation; default: the identity."""
         if not args:
             self._m = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
         elif len(args) == 1 and isinstance(args[0], Rotation):
@@ -36,7 +36,7 @@ class Rotation:
                 "a Rotation is made of nothing, of nine numbers, of three Vectors, or of another Rotation"
             )
 
-    # --- created from angles
+    # --- constructors from angles
 
     @staticmethod
     def Identity() -> Rotation:
@@ -97,7 +97,7 @@ class Rotation:
 
     @staticmethod
     def Quaternion(x: float, y: float, z: float, w: float) -> Rotation:
-        """Return the rotation for a quaternion. The quaternion is not normalized first."""
+        """Return the rotation for a quaternion, without normalizing it."""
         xx, yy, zz, ww = x * x, y * y, z * z, w * w
         return Rotation(
             ww + xx - yy - zz, 2 * x * y - 2 * w * z, 2 * x * z + 2 * w * y,
@@ -105,7 +105,7 @@ class Rotation:
             2 * x * z - 2 * w * y, 2 * y * z + 2 * w * x, ww - xx - yy + zz,
         )  # fmt: skip
 
-    # --- returned as angles and axes
+    # --- conversions to angles and axes
 
     def GetRPY(self) -> tuple[float, float, float]:
         """Return roll, pitch and yaw."""
@@ -146,14 +146,14 @@ class Rotation:
         return (m[2] + m[6]) / s, (m[5] + m[7]) / s, 0.25 * s, (m[3] - m[1]) / s
 
     def GetRotAngle(self, eps: float = EPSILON) -> tuple[float, Vector]:
-        """Return the angle and the axis; if the angle is 0, the axis is z."""
+        """Return the angle and the axis, which is z if the angle is 0."""
         m = self._m
         cosine = (m[0] + m[4] + m[8] - 1) / 2.0
         tolerance = eps * eps / 2.0
         if cosine > 1 - tolerance:
             return 0.0, Vector(0, 0, 1)
         if cosine < -1 + tolerance:
-            # A rotation by 180 degrees has two possible axes; return the same one as KDL, which points up.
+            # A rotation by 180 degrees has two possible axes; like KDL, return the one that points up.
             x, y, z = (math.sqrt(max(0.0, (m[each] + 1.0) / 2)) for each in (0, 4, 8))
             x = -x if m[2] < 0 else x
             y = -y if m[7] < 0 else y
@@ -164,7 +164,7 @@ class Rotation:
         return math.atan2(length / 2, cosine), axis / length
 
     def GetRot(self) -> Vector:
-        """Return the rotation vector: the axis, with the angle as its length."""
+        """Return the rotation vector: the rotation axis, with the angle as its length."""
         angle, axis = self.GetRotAngle()
         return axis * angle
 
@@ -180,7 +180,7 @@ class Rotation:
         """Get or set the z axis, the third column."""
         return self._column(2, value)
 
-    # --- modified and inverted
+    # --- modification and inversion
 
     def DoRotX(self, angle: float) -> None:
         """Rotate about the local x axis."""
@@ -204,7 +204,7 @@ class Rotation:
     def Inverse(self, arg: _T) -> _T: ...
 
     def Inverse(self, arg: Vector | Twist | Wrench | None = None) -> object:
-        """Return the inverse, or a vector, twist or wrench rotated by the inverse."""
+        """Return the inverse, or a vector, twist or wrench rotated by it."""
         m = self._m
         inverse = Rotation(m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
         return inverse if arg is None else inverse * arg
@@ -269,10 +269,10 @@ class Frame:
     """A pose: the rotation ``M`` and the position ``p``."""
 
     __hash__ = None  # type: ignore[assignment]
-    header: Header  # set only by tf2_ros.Stamped
+    header: Header  # only tf2_ros.Stamped sets this
 
     def __init__(self, R: Rotation | Vector | Frame | None = None, V: Vector | None = None) -> None:
-        """Create a pose from a Rotation and a Vector, from either of them, or from another Frame; by default, the identity."""
+        """Create a pose from a Rotation and a Vector, one of them, or another Frame; default: the identity."""
         self.M: Rotation
         self.p: Vector
         if isinstance(R, Frame):
@@ -308,7 +308,7 @@ class Frame:
         )
 
     def Integrate(self, twist: Twist, frequency: float) -> None:
-        """Move the frame by a twist, given in this frame, for ``1 / frequency`` seconds."""
+        """Move the frame by a twist, expressed in this frame, for ``1 / frequency`` seconds."""
         angle = twist.rot.Norm() / frequency
         if angle < EPSILON:
             self.p = self.p + self.M * (twist.vel / frequency)
@@ -322,7 +322,7 @@ class Frame:
     def Inverse(self, arg: _T) -> _T: ...
 
     def Inverse(self, arg: object = None) -> object:
-        """Return the inverse, or a point, twist or wrench transformed into this frame."""
+        """Return the inverse, or a point, twist or wrench transformed by it."""
         back = self.M.Inverse()
         if arg is None:
             return Frame(back, -(back * self.p))

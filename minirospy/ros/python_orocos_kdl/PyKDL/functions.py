@@ -24,7 +24,7 @@ def dot(a: Vector | Twist | Wrench, b: Vector | Twist | Wrench) -> float:
 
 
 def Equal(a: object, b: object, eps: float = EPSILON) -> bool:
-    """Return whether two objects of the same type differ by less than ``eps`` in each number.
+    """Return whether all numbers of two objects of the same type differ by less than ``eps``.
 
     Raise TypeError for objects of different types.
     """
@@ -62,7 +62,7 @@ def diff(a: Any, b: Any, dt: float = 1) -> Any:
 
 
 def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
-    """Return ``a`` moved with velocity ``da`` for time ``dt``; the inverse of :func:`diff`."""
+    """Return ``a`` moved with velocity ``da`` for time ``dt``: the inverse of :func:`diff`."""
     if isinstance(a, Frame):
         return Frame(addDelta(a.M, da.rot, dt), addDelta(a.p, da.vel, dt))
     if isinstance(a, Rotation):
@@ -73,7 +73,7 @@ def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
 
 
 def refusal(name: str) -> type:
-    """Return a placeholder class with this name; creating an instance raises NotImplementedError with advice."""
+    """Return a placeholder class with this name. Creating an instance raises NotImplementedError with advice."""
 
     def refuse(*_: object, **__: object) -> NoReturn:
         raise NotImplementedError(

@@ -16,10 +16,10 @@ _S = TypeVar("_S", bound="Screw")
 
 
 class Vector:
-    """Three floats: a point or a direction. Other attributes can be set."""
+    """Three floats: a point or a direction. Accepts additional attributes."""
 
     __hash__ = None  # type: ignore[assignment]
-    header: Header  # set only by tf2_ros.Stamped
+    header: Header  # only tf2_ros.Stamped sets this
 
     @overload
     def __init__(self, x: float, y: float, z: float) -> None: ...
@@ -50,7 +50,7 @@ class Vector:
     def x(self) -> float: ...
 
     def x(self, value: float | None = None) -> float | None:
-        """Get or set x."""
+        """Get or set the x component."""
         return self._component(0, value)
 
     @overload
@@ -59,7 +59,7 @@ class Vector:
     def y(self) -> float: ...
 
     def y(self, value: float | None = None) -> float | None:
-        """Get or set y."""
+        """Get or set the y component."""
         return self._component(1, value)
 
     @overload
@@ -68,7 +68,7 @@ class Vector:
     def z(self) -> float: ...
 
     def z(self, value: float | None = None) -> float | None:
-        """Get or set z."""
+        """Get or set the z component."""
         return self._component(2, value)
 
     def Norm(self, eps: float = EPSILON) -> float:
@@ -77,7 +77,7 @@ class Vector:
         return 0.0 if length < eps else length
 
     def Normalize(self, eps: float = EPSILON) -> float:
-        """Scale the vector to length 1 and return the previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
+        """Scale the vector to length 1 and return its previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
         length = self.Norm(eps)
         self._v = [1.0, 0.0, 0.0] if length < eps else [each / length for each in self._v]
         return length
@@ -130,7 +130,7 @@ class Vector:
     def __truediv__(self, other: float) -> Vector:
         if not isinstance(other, int | float):
             return NotImplemented
-        # Like KDL in C++, return infinities for a division by zero.
+        # Like KDL in C++, return infinities on division by zero.
         return self * (1.0 / other if other else math.inf)
 
     def __eq__(self, other: object) -> bool:
@@ -149,11 +149,11 @@ class Vector:
 
 
 class Screw:
-    """The base class of Twist and Wrench: two vectors, also indexed as six numbers."""
+    """Base class of Twist and Wrench: two vectors, also indexed as six numbers."""
 
     _NAMES: tuple[str, str]
     __hash__ = None  # type: ignore[assignment]
-    header: Header  # set only by tf2_ros.Stamped
+    header: Header  # only tf2_ros.Stamped sets this
 
     def _parts(self) -> tuple[Vector, Vector]:
         first, second = (getattr(self, name) for name in self._NAMES)
@@ -221,7 +221,7 @@ class Screw:
 
 
 class Twist(Screw):
-    """A velocity: linear velocity ``vel`` and angular velocity ``rot``."""
+    """A velocity: linear ``vel`` and angular ``rot``."""
 
     _NAMES = ("vel", "rot")
 
@@ -239,7 +239,7 @@ class Twist(Screw):
         return Twist()
 
     def RefPoint(self, base: Vector) -> Twist:
-        """Return the same motion, with ``vel`` as the velocity of the point ``base``."""
+        """Return the same motion with ``vel`` for the point ``base``."""
         return Twist(self.vel + self.rot * base, self.rot)
 
 
@@ -262,15 +262,15 @@ class Wrench(Screw):
         return Wrench()
 
     def RefPoint(self, base: Vector) -> Wrench:
-        """Return the same load, with the torque about the point ``base``."""
+        """Return the same load with the torque about the point ``base``."""
         return Wrench(self.force, self.torque + self.force * base)
 
 
 def are_near(a: Sequence[float], b: Sequence[float], eps: float = EPSILON) -> bool:
-    """Return whether all pairs of numbers differ by less than ``eps``, KDL's criterion for equality."""
+    """Return whether all pairs of numbers differ by less than ``eps``, KDL's test for equality."""
     return all(abs(x - y) < eps for x, y in zip(a, b, strict=True))
 
 
 def numbers_text(values: list[float]) -> str:
-    """Format numbers like KDL, in columns 12 characters wide."""
+    """Format numbers like KDL, in columns of 12 characters."""
     return f"[{','.join(f'{each:12.6g}' for each in values)}]"

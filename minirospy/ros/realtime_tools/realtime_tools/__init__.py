@@ -36,7 +36,7 @@ class RealtimePublisher(Generic[_T]):
         self._queue_size = queue_size
 
     def publish(self, message: _T) -> bool:
-        """Queue a message for the thread. If ``queue_size`` messages are already queued, drop it and return False."""
+        """Queue a message for the thread. If the queue already holds ``queue_size`` messages, drop this one and return False."""
         if len(self._waiting) >= self._queue_size:
             return False
         self._waiting.append(message)
@@ -44,7 +44,7 @@ class RealtimePublisher(Generic[_T]):
         return True
 
     def close(self) -> None:
-        """Close the topic, and drop queued messages."""
+        """Close the topic and drop queued messages."""
         self._waiting.clear()
         self._publisher.unregister()
 
@@ -54,7 +54,7 @@ class RealtimePublisher(Generic[_T]):
             message = self._waiting.popleft()
             self._publisher.publish(message)
         except (IndexError, rospy.ROSException):
-            pass  # the topic is closed, or the node is shutting down
+            pass  # the topic is closed or the node is shutting down
 
 
 class Rejection(Exception):
@@ -66,7 +66,7 @@ class Rejection(Exception):
 
 
 class RealtimeActionServer:
-    """An action server for a control loop, with one active goal. A new goal preempts the active one.
+    """An action server for a control loop, with one active goal at a time. A new goal preempts the active one.
 
     ``accept(message)`` runs in another thread: it checks a goal, queues it for the loop, and returns it as a goal whose outcome
     the loop will decide; or it raises Rejection. ``cancel()`` makes the loop stop because a client has cancelled the active goal.
@@ -93,17 +93,17 @@ class RealtimeActionServer:
         self._server.start()
 
     def start(self) -> None:
-        """Record that the loop is running. Call this in the loop's thread, like :meth:`report` and :meth:`stop`."""
+        """Record that the loop is running. Call this, :meth:`report` and :meth:`stop` in the loop's thread."""
         self._is_running = True
 
     def report(self, time: int) -> bool:
-        """Report the active goal's outcome if it is due; return whether feedback is due. ``time``: ns of ROS time."""
+        """Report the active goal's outcome, if it has one; return whether feedback is due. ``time`` is ROS time in ns."""
         active = self._active
         if active is None:
             return False
         outcome, period = active.goal.outcome, self._period
         if active.due is None or active.due - time > period:
-            active.due = time + period  # this is the goal's first cycle, or ROS time has jumped back
+            active.due = time + period  # first cycle of this goal, or ROS time has jumped back
         is_due = time >= active.due
         if is_due:
             active.due += period * (1 + (time - active.due) // period)
@@ -142,11 +142,11 @@ class RealtimeActionServer:
             handle.set_rejected(rejection.result, str(rejection))
             return
         self.preempt()
-        # The action server's lock is held until this method returns, so that a goal's acceptance is reported before its outcome.
+        # The action server's lock is held, so that the goal's acceptance is reported before its outcome.
         self._active = _Active(handle, goal)
         handle.set_accepted()
         if not self._is_running:
-            self.preempt()  # the loop has stopped meanwhile
+            self.preempt()  # the loop has stopped in the meantime
 
     def _receive_cancel(self, handle: ServerGoalHandle) -> None:
         active = self._active
@@ -156,13 +156,13 @@ class RealtimeActionServer:
             self._finish(active, _call)
 
     def _finish(self, active: _Active, call: Callable[[Callable[[], None]], None]) -> None:
-        """Report the outcome of a goal that is ending. A goal without an outcome is cancelled."""
+        """Report the outcome of a goal that is ending, by default cancelled."""
         if self._active is active:
             self._active = None
         active.goal.finish(CANCELLED)
         outcome = active.goal.outcome
         assert outcome is not None
-        # Several threads may get here at the same time; only one of them reports.
+        # Several threads may get here at once; only the first one reports.
         if active.report_once.acquire(blocking=False):
             ends = {
                 GoalEvent.SUCCEED: active.handle.set_succeeded,
@@ -174,12 +174,12 @@ class RealtimeActionServer:
 
 @dataclass(eq=False)
 class _Active:
-    """The goal that a RealtimeActionServer follows."""
+    """The active goal of a RealtimeActionServer."""
 
     handle: ServerGoalHandle
     goal: MonitoredGoal
-    due: int | None = None  # ns of ROS time at which the next report is due; None before the first cycle
-    report_once: threading.Lock = field(default_factory=threading.Lock)  # the reporting thread acquires it
+    due: int | None = None  # ROS time in ns of the next report; None before the first cycle
+    report_once: threading.Lock = field(default_factory=threading.Lock)  # acquired by the thread that reports
 
 
 def _call(function: Callable[[], None]) -> None:
@@ -187,7 +187,7 @@ def _call(function: Callable[[], None]) -> None:
 
 
 def _call_soon(function: Callable[[], None]) -> None:
-    """Call a function in the shared thread."""
+    """Call a function in the shared sender thread."""
     _sender().put(function)
 
 
@@ -196,7 +196,7 @@ _queues: list[SimpleQueue[Callable[[], None]]] = []
 
 
 def _sender() -> SimpleQueue[Callable[[], None]]:
-    """Return the queue of the shared thread, which starts on first use."""
+    """Return the queue of the shared sender thread, which starts on first use."""
     if not _queues:
         with _lock:
             if not _queues:
@@ -209,7 +209,7 @@ def _sender() -> SimpleQueue[Callable[[], None]]:
 def _send(queue: SimpleQueue[Callable[[], None]]) -> None:
     while True:
         function = queue.get()
-        # An error on one topic must not end the thread that serves all topics.
+        # An error on one topic must not end the thread, which serves all topics.
         try:
             function()
         except rospy.ROSException:

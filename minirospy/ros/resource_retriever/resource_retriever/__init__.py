@@ -12,11 +12,11 @@ from minirospy.ros.rospkg.rospkg.rospack import RosPack
 __all__ = ["PACKAGE_PREFIX", "URLError", "get", "get_filename", "urlopen"]
 
 PACKAGE_PREFIX = "package://"
-_TIMEOUT = 60.0  # seconds without data before a server counts as unreachable
+_TIMEOUT = 60.0  # seconds without data until a server counts as unreachable
 
 
 def get(url: str) -> bytes:
-    """Fetch a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or any that urllib can open (http, https, ...).
+    """Fetch a URL: ``package://PACKAGE/FILE``, ``file:///FILE`` or any other that urllib supports (http, https, ...).
 
     Raise Exception, as ROS does, if there is no such resource, ResourceNotFound if the package is not found, ValueError if
     ``url`` is not a URL.

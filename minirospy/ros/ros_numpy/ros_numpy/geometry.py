@@ -58,7 +58,7 @@ def point_to_numpy(msg: Point, hom: bool = False) -> Floats:
 
 @converts_from_numpy(Point)
 def numpy_to_point(arr: Array) -> object:
-    """Return a point from three values, or from four homogeneous coordinates."""
+    """Return a point from three values or four homogeneous coordinates."""
     if arr.shape[-1] == 4:
         arr = arr[..., :-1] / arr[..., -1:]
     return _each(arr, 1, lambda row: Point(*row.tolist()))
@@ -115,7 +115,7 @@ def _parts(matrix: Array, position: type[_P]) -> tuple[_P, Quaternion]:
 
 
 def _each(arr: Array, dimensions: int, make: Callable[[Array], object]) -> object:
-    """Return a message made from the last ``dimensions`` axes, or an array of messages if there are more axes."""
+    """Convert the last ``dimensions`` axes to a message; with more axes, return an array of messages."""
     if arr.ndim == dimensions:
         return make(arr)
     shape = arr.shape[:-dimensions]

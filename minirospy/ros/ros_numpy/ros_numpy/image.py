@@ -18,7 +18,7 @@ __all__ = ["image_to_numpy", "numpy_to_image"]
 
 @converts_to_numpy(Image)
 def image_to_numpy(msg: Image) -> Array:
-    """Convert an image to an array: a read-only view into the message if the byte order is native.
+    """Convert an image to an array, which is a read-only view of the message if the byte order is native.
 
     Raise TypeError if the image cannot be converted.
     """

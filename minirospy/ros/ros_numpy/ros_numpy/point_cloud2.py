@@ -78,7 +78,7 @@ def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
 
 @converts_to_numpy(PointCloud2)
 def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
-    """Return the points as a read-only view with shape (height, width), or (width,) if ``squeeze`` and there is one row.
+    """Return a read-only view of the points with shape (height, width), or (width,) if ``squeeze`` and there is one row.
 
     Raise ValueError if the message has too little data for its size.
     """
@@ -102,7 +102,7 @@ def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
 def array_to_pointcloud2(
     cloud_arr: Array, stamp: Time | None = None, frame_id: str | None = None
 ) -> PointCloud2:
-    """Convert a structured array to a cloud. Mark the cloud as dense if all values are finite."""
+    """Convert a structured array to a point cloud, marked as dense if all values are finite."""
     cloud_arr = np.atleast_2d(cloud_arr)
     cloud = PointCloud2()
     if stamp is not None:
@@ -120,7 +120,7 @@ def array_to_pointcloud2(
 
 
 def merge_rgb_fields(cloud_arr: Array) -> Array:
-    """Merge the fields r, g and b into one field rgb: a float with the same bits as the color, as in PCL."""
+    """Merge the fields r, g and b into a field rgb: a float with the color's bits, as in PCL."""
     red, green, blue = (np.asarray(cloud_arr[name], np.uint32) for name in "rgb")
     merged = _without(cloud_arr, ("r", "g", "b"), [("rgb", np.float32)])
     merged["rgb"] = np.asarray((red << 16) | (green << 8) | blue, np.uint32).view(np.float32)
@@ -146,7 +146,7 @@ def _without(cloud: Array, left_out: tuple[str, ...], added: list[tuple[str, typ
 
 
 def get_xyz_points(cloud_array: Array, remove_nans: bool = True, dtype: DTypeLike = float) -> Array:
-    """Return x, y and z on an array's last axis; if ``remove_nans``, omit points that are not finite."""
+    """Return x, y and z along an array's last axis; if ``remove_nans``, omit points that are not finite."""
     if remove_nans:
         good = np.isfinite(cloud_array["x"]) & np.isfinite(cloud_array["y"]) & np.isfinite(cloud_array["z"])
         cloud_array = cloud_array[good]
@@ -154,5 +154,5 @@ def get_xyz_points(cloud_array: Array, remove_nans: bool = True, dtype: DTypeLik
 
 
 def pointcloud2_to_xyz_array(cloud_msg: PointCloud2, remove_nans: bool = True) -> Array:
-    """Return a cloud's x, y and z; see ``get_xyz_points``."""
+    """Return a point cloud's x, y and z; see ``get_xyz_points``."""
     return get_xyz_points(pointcloud2_to_array(cloud_msg), remove_nans=remove_nans)

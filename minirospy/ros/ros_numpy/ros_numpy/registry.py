@@ -26,7 +26,7 @@ The keys are names because messages read from a bag have other classes.
 
 
 def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a conversion from a message type (if ``plural``, from lists of messages) to an array."""
+    """Return a decorator that registers a converter from ``msgtype``, or from lists of it if ``plural``, to arrays."""
 
     def register(function: _F) -> _F:
         _to_numpy[msgtype._type, plural] = function
@@ -36,7 +36,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a converter from arrays to ``msgtype``, or to lists of ``msgtype`` if ``plural``."""
+    """Return a decorator that registers a converter from arrays to ``msgtype``, or to lists of it if ``plural``."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function
@@ -46,7 +46,7 @@ def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callabl
 
 
 def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
-    """Convert a message or a list of messages to an array; return None for None. Raise ValueError if there is no conversion."""
+    """Convert a message or a list of messages to an array; return None for None. Raise ValueError if there is no converter."""
     if msg is None:
         return None
     plural = isinstance(msg, Sequence)
@@ -62,7 +62,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
 
 
 def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
-    """Convert an array to a message, or if ``plural`` to a list of messages. Raise ValueError if there is no conversion."""
+    """Convert an array to a message, or to a list of messages if ``plural``. Raise ValueError if there is no converter."""
     function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
     if function is None:
         raise ValueError(

@@ -19,7 +19,7 @@ __all__ = ["is_authentic", "mac_of", "main"]
 
 SECRET_LENGTH = 16
 _SECRET_FILE = "secret_file_location"
-# ROS's node returns -1, -2 and -3, which a shell shows as these exit statuses.
+# ROS's node returns -1, -2 and -3, which become these exit statuses.
 _NO_PARAMETER, _NO_FILE, _NO_SECRET = 255, 254, 253
 
 
@@ -57,13 +57,13 @@ def main() -> int:
 
 
 def mac_of(request: AuthenticationRequest, secret: str) -> str:
-    """Compute the MAC that a client with the secret sends in this request: a SHA-512 hash in hexadecimal."""
+    """Compute a request's MAC with the secret: a SHA-512 hash in hexadecimal."""
     text = f"{secret}{request.client}{request.dest}{request.rand}{request.t.secs}{request.level}{request.end.secs}"
     return hashlib.sha512(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def is_authentic(request: AuthenticationRequest, secret: str, now: times.Time, allowed_delta: float) -> bool:
-    """Return whether a request has the right MAC, is recent and has not expired.
+    """Return whether a request has the correct MAC, is recent and has not expired.
 
     If ``allowed_delta`` is negative, check only the MAC.
     """

@@ -41,7 +41,7 @@ def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
 
 
 def list_bag(path: str, topic: str | None) -> None:
-    """Print the topics of a bag, ordered by first message.
+    """Print a bag's topics, ordered by first message.
 
     If ``topic`` is given, print that topic's message count, and the topics in its namespace.
     """
@@ -109,7 +109,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
         for message in reader.messages(paths) if options.limit != 0 else ():
             connection = message.connection
             field = paths[connection.id]
-            # Topics without a field share one Echo, so that -p prints a single line of column names at the start.
+            # Topics with the same field share one Echo, so that -p prints a single line of column names at the start.
             if field not in echoes:
                 echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
             echo = echoes[field]
@@ -132,12 +132,11 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
 
 
 def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
-    """Return a dict of connection IDs to print, with the path of the field to print ("": the whole message)."""
+    """Return a dict from connection IDs to the path of the field to print ("" for the whole message)."""
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")
-    # The longest matching topic takes precedence.
-    # A topic with the full name wins over a field of a topic with a shorter name.
+    # The longest matching topic wins: a topic with the full name precedes a field of a shorter one.
     holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
     topic = max(holders, key=len, default="")
     return {
@@ -148,12 +147,12 @@ def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
 
 
 def _global(topic: str) -> str:
-    """Return the global name of a topic, because a bag may contain relative names."""
+    """Return a topic's global name, because bags may contain relative names."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
 def show_bag(path: str, type_: str, *, raw: bool) -> None:
-    """Print the definition of a type as stored in a bag, either expanded or as raw text."""
+    """Print a type's definition as stored in a bag, expanded or as raw text."""
     from minirospy.core.idl.load import specs_of_text
     from minirospy.introspect.interfaces import describe
 

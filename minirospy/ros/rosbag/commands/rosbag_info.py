@@ -32,7 +32,7 @@ def report(line: str) -> None:
 
 
 def unreadable(path: str, error: BagError | OSError) -> str:
-    """Return ROS's message for a bag that cannot be opened or read."""
+    """Return ROS's error message for a bag that cannot be opened or read."""
     if isinstance(error, BagEncryptedError):
         return f"ERROR: {error}"
     if isinstance(error, McapUnindexedError):
@@ -150,7 +150,7 @@ def _filter(words: list[str], print: str | None) -> int:
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
 
-    # Check the name before showing the progress.
+    # Check the name before displaying progress.
     bags.check_bag_name(target)
     keep = bags.Expression(text)
     show = bags.Expression(print) if print else None
@@ -162,7 +162,7 @@ def _filter(words: list[str], print: str | None) -> int:
         return 0 if isinstance(error, BagEncryptedError) else 1
 
     try:
-        # Show no progress bar if matches are printed to a terminal, because both would overwrite each other.
+        # Hide the progress bar if matches are printed to the same terminal, because both would overwrite each other.
         with showing_progress(target, total, quiet=show is not None and sys.stdout.isatty()) as progress:
             bags.filter_bag(source, target, keep, progress, show=show, on_shown=_print_match, warn=report)
     except (BagError, ValueTextError, MessageException) as error:

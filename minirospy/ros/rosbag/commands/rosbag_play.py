@@ -25,7 +25,7 @@ _FOREVER = 1e12
 
 
 class PlayArguments(NamedTuple):
-    """The parsed command line of rosbag play."""
+    """Parsed command line of rosbag play."""
 
     bagfiles: list[str]
     prefix: str
@@ -159,7 +159,7 @@ def _nanoseconds(name: str, seconds: float) -> int:
 
 
 def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> int:
-    # Imported here because --help does not need the client library.
+    # imported here because --help does not need the client library
     from minirospy import client
     from minirospy.introspect.bags import left_out
     from minirospy.ros.rosbag.recording.player import Player
@@ -192,7 +192,7 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
             player = Player(bags, options, serve if foxglove_port is not None else None)
             return player.run()
         except ROSInterruptException:
-            return 0  # interrupted during registration
+            return 0  # interrupted while registering
         finally:
             client.signal_shutdown("the end")
 

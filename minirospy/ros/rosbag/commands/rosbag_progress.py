@@ -13,12 +13,12 @@ from minirospy.base.escape import escaped, own_output
 __all__ = ["showing_progress"]
 
 _REFRESH = 1.0
-_BESIDE_PATH = 37  # number of columns of ROS's progress line without the path
+_BESIDE_PATH = 37  # columns of ROS's progress line without the path
 
 
 @contextlib.contextmanager
 def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """Yield a function that takes the number of bytes done, out of ``total``, and shows the progress.
+    """Yield a function that displays the progress, given the number of bytes done out of ``total``.
 
     The output ends with a newline, even if the block raises an exception.
     """
@@ -49,7 +49,7 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         DownloadColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    # Write to the wrapped stream: the commands' stdout escapes control sequences, but the bar uses them to move the cursor.
+    # Write to the unwrapped stream: the commands' stdout escapes the control sequences that move the bar's cursor.
     console = Console(file=own_output())
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
         task = progress.add_task(escaped(path), total=max(total, 1))

@@ -20,7 +20,7 @@ __all__ = ["COMMAND", "VERB", "main", "without_split_size"]
 
 
 class RecordArguments(NamedTuple):
-    """The parsed command line of rosbag record."""
+    """Parsed command line of rosbag record."""
 
     topics: list[str]
     all: bool
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Replace the ``--split=N`` and ``--split N`` of old launch files with ``--split --size N``. Yield the new words."""
+    """Yield the words, replacing ``--split=N`` and ``--split N`` from old launch files with ``--split --size N``."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()
@@ -136,7 +136,7 @@ def _parser() -> Parser:
 
 
 def _record_verb(given: RecordArguments) -> int:
-    # `rosrun rosbag record` accepts both options together; the name takes precedence.
+    # `rosrun rosbag record` accepts both options together and uses the name.
     if given.output_prefix and given.output_name:
         text = "Can't set both prefix and name."
         raise Misuse(text, text)
@@ -199,7 +199,7 @@ def _record(given: RecordArguments) -> int:
 
 
 def _run(options: RecordOptions, *, quiet: bool) -> int:
-    # Imported here because --help does not need the client library.
+    # imported here because --help does not need the client library
     from minirospy import client
     from minirospy.core.bag.compression import check_compression
     from minirospy.core.bag.mcap_writer import check_mcap

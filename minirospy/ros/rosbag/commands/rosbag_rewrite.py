@@ -84,7 +84,7 @@ def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) 
 
 
 def _reindex_one(source: str, target: str, quiet: bool) -> None:
-    import shutil  # imported here because the import takes longer than these commands
+    import shutil  # imported here because importing takes longer than these commands
 
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
@@ -110,7 +110,7 @@ def _rewrite(
     *,
     unindexed: bool = False,
 ) -> int:
-    """Rewrite each bag with ``write(source, target)``, into a folder, or in place with a backup of the original.
+    """Rewrite each bag with ``write(source, target)``: to a folder, or in place with a backup of the original.
 
     Return the exit status.
     """
@@ -133,7 +133,7 @@ def _rewrite(
             target = os.path.join(output_dir, os.path.basename(path))
             if os.path.realpath(target) != os.path.realpath(path):
                 if not _write(path, path, target, write) and unindexed:
-                    # As in ROS, only reindex fails if the target cannot be created; compress and decompress continue.
+                    # As in ROS, compress and decompress continue if the target cannot be created; reindex fails.
                     status = 1
                 continue
 
@@ -163,7 +163,7 @@ def _is_readable(path: str, *, unindexed: bool) -> bool:
     try:
         with open_reader(path) as reader:
             if not unindexed:
-                # Read the headers of all chunks first, so that a bag with a damaged header is not rewritten.
+                # Read all chunk headers first, to avoid rewriting a bag with a damaged header.
                 data_size(reader)
             return True
     except (BagError, OSError) as error:
@@ -187,7 +187,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
     try:
         write(source, target)
     except BagError as error:
-        # The target already contains the messages that precede the damage.
+        # The target already contains the messages before the damage.
         print()
         report(f"ERROR operating on {source}: {error}")
     except OSError as error:

@@ -25,7 +25,7 @@ Script = Callable[[list[str]], int]
 
 
 def main(name: str, argv: Sequence[str] | None = None) -> int:
-    """Run the program of this name; return its exit status."""
+    """Run the program with this name; return its exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
     return run(name, lambda: (SCRIPTS.get(name) or migration_scripts()[name])(words))
 
@@ -33,7 +33,7 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> Script:
-    """Return a program that copies a bag with changes.
+    """Return a program that copies a bag with modifications.
 
     The bags are its first two arguments or, if there are four, the second and the last.
     """
@@ -70,7 +70,7 @@ def _with_md5sum_of_definition(connection: Connection) -> Connection:
 
 
 def fix_each(words: list[str], usage: str, verb: str, fix: Callable[[str, str], bool]) -> int:
-    """Rewrite each bag by calling ``fix(bag, temporary)``; the original becomes BAG.old."""
+    """Rewrite each bag with ``fix(bag, temporary)``; the original becomes BAG.old."""
     if not words:
         print(usage)
         return 0

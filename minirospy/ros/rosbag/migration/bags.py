@@ -13,7 +13,7 @@ __all__ = ["check_bag", "check_classes", "fix_bag"]
 
 
 def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) -> list[Migration]:
-    """Return the migrations that messages of these classes require, one per class."""
+    """Return the migrations that these message classes require, one per class."""
     found = []
     seen = set()
     for each in classes:
@@ -47,7 +47,7 @@ def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object
 def fix_bag(
     migrator: MessageMigrator, source: str, target: str, warn: Callable[[str], object], *, force: bool = False
 ) -> list[Migration]:
-    """Migrate a bag's messages into a new bag; return the migrations without a rule.
+    """Migrate a bag's messages into a new bag; return the migrations that lack a rule.
 
     If any rule is missing, write nothing.
 

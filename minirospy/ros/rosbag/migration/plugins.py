@@ -16,7 +16,7 @@ _PLUGIN_TAGS = (
 
 
 def plugin_rule_files() -> Iterator[tuple[Path, str]]:
-    """Yield the path and the name for each rule file that a package exports."""
+    """Yield the path and name of each rule file that a package exports."""
     from minirospy.base.errors import ManifestError
     from minirospy.workspace.manifest import read_manifest
     from minirospy.workspace.packages import Packages

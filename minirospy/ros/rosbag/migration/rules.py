@@ -40,7 +40,7 @@ Key = tuple[str, str]
 
 
 class BagMigrationException(Exception):
-    """Raised if the migration is not possible, or a rule is used incorrectly."""
+    """Raised if a migration is impossible or a rule is used incorrectly."""
 
 
 class _Step(Protocol):
@@ -52,7 +52,7 @@ class _Step(Protocol):
 
 
 class Migrator(Protocol):
-    """The methods in :class:`minirospy.ros.rosbag.migration.rules_files.MessageMigrator` that a rule needs."""
+    """The methods of :class:`minirospy.ros.rosbag.migration.rules_files.MessageMigrator` that rules call."""
 
     rename_map: dict[str, set[str]]
 
@@ -70,7 +70,7 @@ class Migrator(Protocol):
 
 
 class MessageUpdateRule:
-    """The base class of all rules. Subclasses set the class attributes and override :meth:`update`.
+    """Base class of all rules. Subclasses set the class attributes and override :meth:`update`.
 
     ``order`` sorts the rules for a type; ``migrated_types`` contains the pairs (old, new) of field types that update()
     migrates.
@@ -97,7 +97,7 @@ class MessageUpdateRule:
         self.sub_rules: list[MessageUpdateRule] = []
 
     def find_sub_paths(self) -> None:
-        """Find the rules for the migrated field types; print a warning for each type that has no rule."""
+        """Find the rules for field types that need migration; print a warning for each type without a rule."""
         self.sub_rules_valid = True
         for old_name, new_name in self.migrated_types:
             try:
@@ -123,15 +123,15 @@ class MessageUpdateRule:
         self.sub_rules_done = True
 
     def get_new_class(self, t: str) -> MessageClass:
-        """Return the class for a field's type in the new message. Raise KeyError if the message has no field with this type."""
+        """Return the new message's class for a field type. Raise KeyError if no field has this type."""
         return _class_named(t, self.new_types, self.new_type)
 
     def get_old_class(self, t: str) -> MessageClass:
-        """Return the class for a field's type in the old message. Raise KeyError if the message has no field with this type."""
+        """Return the old message's class for a field type. Raise KeyError if no field has this type."""
         return _class_named(t, self.old_types, self.old_type)
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill a message field from the old one; called in update().
+        """Fill a message field from the old one. Call this in update().
 
         Raise BagMigrationException if the field's types are not in ``migrated_types``.
         """
@@ -141,7 +141,7 @@ class MessageUpdateRule:
     def migrate_array(
         self, msg_from_array: Sequence[Message], msg_to_array: list[Message], msg_to_name: str
     ) -> None:
-        """Fill an array of messages from the old one; called in update().
+        """Fill an array of messages from the old one. Call this in update().
 
         Raise BagMigrationException if the types are not in ``migrated_types``, KeyError if the new message does not use
         the type.
@@ -157,7 +157,7 @@ class MessageUpdateRule:
         return None
 
     def apply(self, old_msg: Message) -> Message:
-        """Return a new message converted from an old one.
+        """Convert an old message to a new one and return it.
 
         Raise BagMigrationException if the rule or the message's class is invalid.
         """
@@ -193,7 +193,7 @@ class MessageUpdateRule:
 
 
 def clean_name(name: str, top_name: str) -> str:
-    """Remove the package from a type's name if the package is std_msgs, or that of the enclosing message ``top_name``."""
+    """Remove a type's package if it is std_msgs or that of the enclosing message ``top_name``."""
     parts = name.split("/")
     for package in ("std_msgs", top_name.split("/", maxsplit=1)[0]):
         if package in parts:
@@ -202,7 +202,7 @@ def clean_name(name: str, top_name: str) -> str:
 
 
 def qualified_name(name: str, top_name: str) -> str:
-    """Return a type's name with its package. ``top_name`` is the enclosing message's type."""
+    """Return a type's name with its package. ``top_name`` is the type of the enclosing message."""
     clean = clean_name(name, top_name)
     if "/" in clean or clean in PRIMITIVES:
         return clean
@@ -218,7 +218,7 @@ def get_message_key(c: MessageClass) -> Key | None:
 
 
 def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | None]:
-    """Return the key for a migration from one class to another: a pair of message keys."""
+    """Return a migration's key: the old and new classes' message keys."""
     return get_message_key(c1), get_message_key(c2)
 
 
@@ -230,7 +230,7 @@ def copy_message(msg_from: Message, msg_to: Message) -> None:
 
 
 def migration_default_value(field_type: str) -> str:
-    """Return the source code for a new field's default value in a .bmr file."""
+    """Return source code for a new field's default value, for a .bmr file."""
     type_ = _parsed(field_type)
     if type_.is_array:
         if type_.base in ("byte", "uint8"):
@@ -248,7 +248,7 @@ def migration_default_value(field_type: str) -> str:
 
 
 def constants_from_def(core_type: str, msg_def: str) -> set[tuple[str, object, str]]:
-    """Return the constants in a full message definition: name, value and type."""
+    """Return the name, value and type of each constant in a full message definition."""
     from minirospy.core.idl.load import specs_of_text
 
     spec = specs_of_text(core_type, msg_def)[core_type]
@@ -261,7 +261,7 @@ Step = Callable[[MessageUpdateRule, "Message", "Message"], None]
 def make_update_rule(
     migrator: Migrator, old_class: MessageClass, new_class: MessageClass
 ) -> type[MessageUpdateRule]:
-    """Return a rule that copies fields with equal names. It is valid if no field is lost and no value has to be invented."""
+    """Return a rule that copies fields with equal names. It is valid if all old fields are used and all new ones filled."""
     lines: list[str] = []
     steps: list[Step] = []
     migrated: list[tuple[str, str]] = []
@@ -354,12 +354,12 @@ def _rule(
 
 
 def _quoted(text: str) -> str:
-    """Return a definition escaped for use in a triple-quoted string."""
+    """Escape a definition for use in a triple-quoted string."""
     return text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
 
 
 def _mismatch(old_type: str | None, new_type: str) -> str:
-    """Compare two field types; return the reason why the field cannot be copied, or "" if it can."""
+    """Compare two field types; return why the field cannot be copied, or "" if it can."""
     if old_type is None:
         return "No matching field name in old message"
     old, new = _parsed(old_type), _parsed(new_type)
@@ -377,7 +377,7 @@ def _mismatch(old_type: str | None, new_type: str) -> str:
 
 
 def _message_pair(migrator: Migrator, old: tuple[str, str], new: tuple[str, str]) -> tuple[str, str] | str:
-    """Return the message types of two fields, or the reason why there is no migration between these types.
+    """Return two fields' message types, or the reason why there is no migration between them.
 
     ``old`` and ``new`` are pairs: the field's type, and the type of the message that contains the field.
     """
@@ -423,7 +423,7 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
-    """Generate the classes for a full definition; return them, and the class of the main type.
+    """Generate the classes for a full definition; return all of them, and the main type's class.
 
     Return ({}, None) if there is no type or the definition is invalid.
     """

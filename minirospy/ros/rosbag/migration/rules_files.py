@@ -40,7 +40,7 @@ __all__ = [
 
 
 class RuleChain:
-    """A type's explicit rules: its update rules sorted by ``order``, then the rule that renames the type, if any."""
+    """A type's explicit rules: update rules sorted by ``order``, then the rule that renames the type, if any."""
 
     def __init__(self) -> None:
         self.chain: list[MessageUpdateRule] = []
@@ -53,7 +53,7 @@ class RuleChain:
 
 
 class ScaffoldNode:
-    """A step on a path. Converts one class to another with a rule; ``next`` is the following step."""
+    """A step on a migration path: converts one class to another with a rule; ``next`` is the following step."""
 
     def __init__(
         self, old_class: MessageClass, new_class: MessageClass, rule: MessageUpdateRule | None
@@ -74,19 +74,19 @@ class ScaffoldNode:
         self._rule = rule
 
     def has_rule(self) -> bool:
-        """Return whether this step has a rule yet."""
+        """Return whether this step already has a rule."""
         return self._rule is not None
 
 
 class Migration(NamedTuple):
-    """A type that needs migration, with its path and the rules missing from that path."""
+    """A migration path for a type, with the rules missing from it."""
 
     path: list[ScaffoldNode]
     missing: list[MessageUpdateRule]
 
 
 class MessageMigrator:
-    """Migrates messages by the rules in .bmr files and those exported by packages (``plugins``).
+    """Migrates messages with the rules from .bmr files and from packages (``plugins``).
 
     Raise BagMigrationException if a rule is marked as not valid.
     """
@@ -116,17 +116,17 @@ class MessageMigrator:
         }
 
     def lookup_type(self, key: Key) -> MessageClass:
-        """Return the class with this type and md5sum from the rules' definitions, or None if they do not contain it."""
+        """Return the class with this type and md5sum from the rules' definitions, or None if there is none."""
         return self.class_dict.get(key)
 
     def add_update_rule(self, r: MessageUpdateRule) -> None:
-        """Add an explicit rule. Report and ignore a rule that conflicts with other rules."""
+        """Add an explicit rule. Report and ignore a rule that conflicts with others."""
         if not r.valid:
             print(f"ERROR: Update rule [{r.location}] has valid set to False.", file=sys.stderr)
             self.false_rule_loaded = True
             return
         if r.old_class is None or r.new_class is None:
-            return  # the rule's definitions are invalid, which has been reported
+            return  # invalid definitions have already been reported
         why = self._why_renaming_fails(r) if r.rename_rule else self._why_updating_fails(r)
         if why:
             print(f"WARNING: {why}", file=sys.stderr)
@@ -141,11 +141,11 @@ class MessageMigrator:
             chain.chain.sort(key=lambda each: each.order)
 
     def all_rules_valid(self) -> bool:
-        """Return whether every rule is valid, that is, no rule is missing."""
+        """Return whether all rules are valid; a missing rule counts as invalid."""
         return not self.get_invalid_rules()
 
     def get_invalid_rules(self) -> list[MessageUpdateRule]:
-        """Return the missing rules."""
+        """Return the invalid rules, which the user must complete."""
         rules = [node.rule for node in (*self.base_nodes, *self.extra_nodes) if not node.rule.valid]
         return self.filter_rules_unique(rules)
 
@@ -164,7 +164,7 @@ class MessageMigrator:
         return self.filter_rules_unique(expanded)
 
     def scaffold_range(self, old_type: str, new_type: str) -> list[ScaffoldNode]:
-        """Return the steps from the first rule of ``old_type`` to the last rule that yields ``new_type``."""
+        """Return the steps from the first rule for ``old_type`` to the last rule that yields ``new_type``."""
         node = self.first_type.get(old_type)
         if node is None:
             return []
@@ -180,7 +180,7 @@ class MessageMigrator:
         return found
 
     def find_target(self, old_class: MessageClass) -> MessageClass:
-        """Return the installed class to which messages of ``old_class`` are migrated, or None if none is installed."""
+        """Return the installed class to migrate ``old_class`` to, or None if none is installed."""
         from minirospy.core.idl.load import get_message_class
 
         key = get_message_key(old_class)
@@ -195,7 +195,7 @@ class MessageMigrator:
         return self.found_targets[key]
 
     def find_path(self, old_class: MessageClass, new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from one class to another; a missing rule is generated, and may be invalid."""
+        """Return the steps from one class to another, with a generated, possibly invalid rule for each missing one."""
         key = get_path_key(old_class, new_class)
         if key not in self.found_paths:
             if new_class is None:
@@ -212,7 +212,7 @@ class MessageMigrator:
         msg_from: tuple[str, bytes, str, object, MessageClass],
         msg_to: tuple[str, object, str, object, MessageClass],
     ) -> tuple[str, bytes, str, object, MessageClass]:
-        """Return a raw message (type, bytes, md5sum, position, class) converted to the new type.
+        """Convert a raw message (type, bytes, md5sum, position, class) to the new type.
 
         Raise BagMigrationException if there is no valid path.
         """
@@ -264,7 +264,7 @@ class MessageMigrator:
     # -- loading
 
     def _load(self, path: Path, name: str) -> None:
-        """Execute a rule file (Python code) and add its rules."""
+        """Execute a rule file, which is Python code, and add its rules."""
         scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)
@@ -320,7 +320,7 @@ class MessageMigrator:
     # -- the scaffold
 
     def _build(self) -> None:
-        """Link each type's explicit rules; link the last of them to the next type name or the installed class."""
+        """Link each type's explicit rules, and connect the last one to the next type name or the installed class."""
         ends = []
         for type_, chain in list(self.rulechains.items()):
             self.rename_map[type_] = self._names_of(type_)
@@ -355,7 +355,7 @@ class MessageMigrator:
         return names
 
     def _connect(self, end: ScaffoldNode) -> None:
-        """Link a type's last rule to the step that follows."""
+        """Link a type's last rule to the following step."""
         from minirospy.core.idl.load import get_message_class
 
         installed = get_message_class(end.new_class._type)
@@ -386,7 +386,7 @@ class MessageMigrator:
             end.next = self._node(end.new_class, None, rule)
 
     def _path_to_nowhere(self, old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the path for a type that is not installed. The path ends with a rule that the user must write."""
+        """Return the path for a type that is not installed, which ends with a rule that the user must write."""
         steps = self.scaffold_range(old_class._type, "")
         steps = self._from_start(steps, old_class) or steps
         last = steps[-1].new_class if steps else old_class
@@ -411,7 +411,7 @@ class MessageMigrator:
         return [self._extra(old_class, first, self._made_whole(old_class, first)), *steps]
 
     def _to_end(self, steps: list[ScaffoldNode], new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps up to the new class, adding a generated step if no step leads to this class."""
+        """Return the steps up to the new class; append a generated step if none leads to it."""
         candidates = []
         for number, node in reversed(list(enumerate(steps))):
             if node.new_class is None or node.new_class._type != new_class._type:
@@ -435,7 +435,7 @@ class MessageMigrator:
         return []
 
     def _from_start(self, steps: list[ScaffoldNode], old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from the old class, adding a generated step if none starts there; [] if there is no valid step."""
+        """Return the steps from the old class, with a generated first step if none starts there; [] if that is impossible."""
         if exact := self._exact_start(steps, old_class):
             return exact
         for number, node in reversed(list(enumerate(steps))):

@@ -22,7 +22,7 @@ __all__ = ["SCRIPTS"]
 
 
 def _with_definition_of_md5sum(connection: Connection) -> Connection:
-    """Replace the connection's definition with the one for its md5sum, if a rule or package has that."""
+    """Replace the connection's definition with the one for its md5sum, if a rule or package contains it."""
     from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import class_of_connection
 

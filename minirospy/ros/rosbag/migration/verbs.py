@@ -98,7 +98,7 @@ def _check_rule_file(path: str, *, append: bool) -> None:
 
 
 def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpdateRule]) -> int:
-    """Write the missing rules to a file for the user to complete. If a type has moved, prompt for its new name."""
+    """Write the missing rules to a file for the user to complete. If a type was moved, prompt for its new name."""
     left = migrator.filter_rules_unique(rules)
     if not left:
         print(f"\nNo additional rule files needed to be generated.  {path} not created.")
@@ -226,7 +226,7 @@ def make_migrator(rule_files: Sequence[str], *, noplugins: bool) -> MessageMigra
 
 
 def print_migrations(migrations: Sequence[Migration]) -> list[MessageUpdateRule]:
-    """Print the required migrations; return the rules that are missing."""
+    """Print the required migrations; return the missing rules."""
     rules = []
     for path, missing in migrations:
         _print_change(path[0].old_class, path[-1].new_class, 0)

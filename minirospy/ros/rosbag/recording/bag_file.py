@@ -20,11 +20,11 @@ __all__ = ["BagFile", "FileWriter"]
 _UNLIMITED = 2**31
 _KNOWN_HEADERS = 10_000
 _DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
-"""Fields that a bag requires but that third-party publishers may omit from their connection headers."""
+"""Fields that a bag requires but third-party publishers may omit from their connection headers."""
 
 
 class FileWriter(Protocol):
-    """The interface that the writers for bags and for MCAP files share."""
+    """Interface of the writers for bags and MCAP files."""
 
     @property
     def size(self) -> int:
@@ -32,7 +32,7 @@ class FileWriter(Protocol):
 
     @property
     def gathered(self) -> int:
-        """Return the number of bytes in memory that have not yet been passed to the stream."""
+        """Return the number of buffered bytes not yet passed to the stream."""
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Add a connection and return its number."""
@@ -51,7 +51,7 @@ class FileWriter(Protocol):
 
 
 class BagFile:
-    """A bag that is being recorded. Call its methods with ``lock`` held.
+    """A bag being recorded. Call its methods with ``lock`` held.
 
     ``on_error(file, error, lost)`` is called in the disk thread if the disk or a compression fails. By then, the file has
     its final name and is readable, but ``lost`` messages are missing (-1: the file could not be completed). Raise OSError
@@ -82,7 +82,7 @@ class BagFile:
 
     @property
     def active_name(self) -> str:
-        """Return the file's name while it is being written."""
+        """Return the temporary file name used while recording."""
         return str(self._active)
 
     @property
@@ -96,13 +96,13 @@ class BagFile:
         return self._writer.gathered
 
     def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:
-        """Write a message that arrived with this connection header.
+        """Write a message received with this connection header.
 
         Raise BagFormatError if the bag format cannot store the message.
         """
         if self._is_closed:
             return
-        # All messages on a connection share the same header object.
+        # All messages from a connection share one header object.
         known = self._by_identity.get(id(header))
         number = known[1] if known and known[0] is header else self._connection(topic, header)
         try:
@@ -113,7 +113,7 @@ class BagFile:
             self._give_up(error)
 
     def write_ready(self) -> None:
-        """Write the chunks whose compression has finished since the last message."""
+        """Write the chunks that have been compressed since the last message."""
         if not self._is_closed:
             try:
                 self._writer.write_ready()
@@ -121,11 +121,11 @@ class BagFile:
                 self._give_up(error)
 
     def close(self) -> None:
-        """Complete the file in the disk thread, after its queued writes."""
+        """Complete the file in the disk thread, after the queued writes."""
         self._disk.submit(self._finish)
 
     def _connection(self, topic: str, header: Mapping[str, str]) -> int:
-        # A publisher that reconnects with the same header keeps its connection number.
+        # A reconnecting publisher with the same header keeps its connection number.
         key = topic, frozenset(header.items())
         number = self._by_content.get(key)
         if number is None:
@@ -149,7 +149,7 @@ class BagFile:
             self._salvage(error)
 
     def _give_up(self, error: Exception) -> None:
-        """Complete the file after its queued writes. Called when compressing a chunk has failed."""
+        """Complete the file after its queued writes, because compressing a chunk has failed."""
         self._is_closed = True
         self._disk.submit(lambda: self._salvage(error))
 
@@ -157,7 +157,7 @@ class BagFile:
         with self._lock:
             if self._is_closed:
                 return
-            # Prevent further writes.
+            # Reject further writes.
             self._is_closed = True
         self._salvage(error)
 
@@ -183,6 +183,6 @@ def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | 
         compression=options.compression,
         chunk_threshold=options.chunk_size,
         executor=executor,
-        # the recorder itself limits the queued bytes
+        # the recorder itself limits the number of queued bytes
         max_waiting=_UNLIMITED,
     )

@@ -19,7 +19,7 @@ Buffer = bytes | bytearray | memoryview
 
 
 class DiskThread:
-    """Runs queued calls in order, in a thread that it starts. ``close`` waits until the queue is empty.
+    """Starts a thread that runs queued calls in order. ``close`` waits until the queue is empty.
 
     If a call raises an exception, ``on_error(error)`` is called in that thread, and then the next call runs.
     """
@@ -48,7 +48,7 @@ class DiskThread:
         self._queue.put((function, size))
 
     def close(self) -> None:
-        """Wait until all queued calls are done, and stop the thread."""
+        """Wait until all queued calls are done, then stop the thread."""
         self._queue.put(None)
         self._thread.join()
 
@@ -63,7 +63,7 @@ class DiskThread:
 
 
 class QueuedFile:
-    """A new file with the stream methods that a bag writer needs.
+    """A new file written by the disk thread, with the stream methods that a bag writer needs.
 
     Calls are queued, except that a call from the disk thread runs immediately.
 
@@ -77,19 +77,19 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # Use open_file, which does not follow symbolic links: the name contains the time, which an attacker could guess.
+        # open_file() does not follow symbolic links: an attacker could guess the name, because it contains the time.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
     def write(self, data: Buffer) -> int:
-        """Write all of ``data``, which must not change after the call."""
+        """Queue a write of all ``data``, which must not change after the call."""
         size = len(data)
         self._position += size
         self._do(lambda: self._write_all(data), size)
         return size
 
     def read(self, size: int = -1) -> bytes:
-        """Return the bytes at the current position. Call only in the disk thread."""
+        """Return the bytes at the current position. Call this only in the disk thread."""
         data = self._file.read(size) or b""
         self._position += len(data)
         return data
@@ -97,7 +97,7 @@ class QueuedFile:
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Seek relative to the start or the end of the file."""
         if whence == os.SEEK_END:
-            # Do nothing: the writer seeks to the header and back to the end without writing in between.
+            # Do nothing: between seeking to the header and back to the end, the writer writes nothing.
             return self._position
         self._position = offset
         self._do(lambda: self._file.seek(offset))
@@ -117,11 +117,11 @@ class QueuedFile:
         """Do nothing: the file is unbuffered."""
 
     def written(self) -> int:
-        """Return the file size in bytes. Call only in the disk thread."""
+        """Return the file size in bytes. Call this only in the disk thread."""
         return os.fstat(self._file.fileno()).st_size
 
     def close_file(self) -> None:
-        """Close the file after its queued writes."""
+        """Close the file after the queued writes."""
         self._do(self._file.close)
 
     def _do(self, call: Callable[[], object], size: int = 0) -> None:

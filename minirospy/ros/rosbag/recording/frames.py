@@ -19,13 +19,13 @@ class ReceivedFrame(AnyMsg):
     frame: Buffer
 
     def deserialize(self, str: Buffer) -> ReceivedFrame:
-        """Store the bytes without a copy."""
+        """Store the bytes without copying them."""
         self.frame = str
         return self
 
 
 def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
-    """Return a frame's bytes in two parts; the second part is empty unless a large message was received in two parts."""
+    """Return a frame's bytes in two parts; the second is empty unless a large message was received in two parts."""
     if isinstance(frame, SplitFrame):
         # A memoryview of the frame contains only the first part.
         return memoryview(frame), frame.tail
@@ -33,6 +33,6 @@ def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:
-    """Return a message class of this type. Its messages are published from their serialized bytes, ``_buff``."""
+    """Return a class for publishing already serialized messages of this type from their bytes, ``_buff``."""
     fields = {"_type": type_, "_md5sum": md5sum, "_full_text": definition, "__slots__": []}
     return type("StoredFrame", (AnyMsg,), fields)

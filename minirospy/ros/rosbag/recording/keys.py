@@ -15,7 +15,7 @@ _POLL_SECONDS = 0.05
 
 @contextlib.contextmanager
 def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
-    """Call ``on_key`` from a thread with each key typed while the block runs. Ctrl-C still sends a signal.
+    """While the block runs, call ``on_key`` from a thread with each typed key. Ctrl-C still sends a signal.
 
     Read nothing if there is no standard input. Do not change the terminal while the process is in the background.
     """
@@ -33,7 +33,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
     finally:
         stop.set()
         if thread:
-            # Wait for the thread, because it restores the terminal before it exits.
+            # Wait for the thread to restore the terminal.
             thread.join(10.0)
 
 
@@ -61,7 +61,7 @@ def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
 
 
 class _Terminal:
-    """A terminal in raw mode: keys arrive without Enter and without echo while this process is in the foreground."""
+    """A terminal in single-key mode: keys arrive without Enter or echo while this process is in the foreground."""
 
     def __init__(self, number: int) -> None:
         self._number = number

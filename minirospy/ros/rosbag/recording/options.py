@@ -23,14 +23,14 @@ _NUMBER = re.compile(r"\s*[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 
 
 class RecordOptions(NamedTuple):
-    """The topics to record, and the files to write. Sizes are in bytes, times in nanoseconds; 0 means unlimited."""
+    """The topics to record and the files to write. Sizes are in bytes, times in nanoseconds; 0 means unlimited."""
 
     topics: tuple[str, ...] = ()
     all_topics: bool = False
     regex: bool = False
     exclude: str = ""
     node: str = ""
-    prefix: str = ""  # file name without .bag, or the part of the file name before the date
+    prefix: str = ""  # file name without .bag, or its part before the date
     append_date: bool = True
     split: bool = False
     max_splits: int = 0
@@ -49,7 +49,7 @@ class RecordOptions(NamedTuple):
 
     @property
     def follows_master(self) -> bool:
-        """Return whether topics may be added during the recording; if so, the master is queried every second."""
+        """Return whether to query the master every second for topics to add."""
         return self.all_topics or self.regex or bool(self.node)
 
     @property
@@ -59,7 +59,7 @@ class RecordOptions(NamedTuple):
 
 
 def parse_duration(text: str) -> int:
-    """Return the nanoseconds in a duration such as ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError for other text."""
+    """Parse a duration such as ``30``, ``30s``, ``5m`` or ``1.5h`` to nanoseconds. Raise UsageError for other text."""
     number = _NUMBER.match(text)
     if not number:
         raise UsageError("Duration must start with a floating point number.")
@@ -73,7 +73,7 @@ def parse_duration(text: str) -> int:
 
 
 def parse_size(text: str) -> int:
-    """Return the bytes in a size such as ``1G``, ``500M``, ``20k`` or ``1000``; units are powers of 1024.
+    """Parse a size such as ``1G``, ``500M``, ``20k`` or ``1000`` to bytes; units are powers of 1024.
 
     Raise UsageError if the size is invalid.
     """
@@ -85,7 +85,7 @@ def parse_size(text: str) -> int:
 
 
 def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
-    """Return a predicate that returns whether to record a topic, given the topic's global name.
+    """Return a predicate that takes a topic's global name and returns whether to record the topic.
 
     Expressions must match the whole name. If ``subscribed_by_node``, topics found by ``--node`` need not match any
     expression. Raise UsageError if an expression is invalid.

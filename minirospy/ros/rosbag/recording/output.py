@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 __all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
-# GIL switch interval in seconds: the maximum time for which the reading thread can delay a due message
+# GIL switch interval in seconds: the longest time by which the reading thread can delay a due message.
 _SWITCH_SECONDS = 0.00005
 
-_STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the time stamp
+_STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then timestamp
 
-CLOCK = struct.Struct("<II")  # a serialized rosgraph_msgs/Clock: secs, nsecs
+CLOCK = struct.Struct("<II")  # serialized rosgraph_msgs/Clock: secs, nsecs
 
 
 class Controls(Protocol):
-    """The player's methods that an output calls. Thread-safe."""
+    """The player's methods that outputs call. Thread-safe."""
 
     def end(self) -> None:
         """Stop playing."""
@@ -42,20 +42,20 @@ class Controls(Protocol):
         """Pause or resume; return whether the state has changed."""
 
     def control_rate(self, stamp: int) -> None:
-        """Store the time stamp of the last message on the rate control topic."""
+        """Store the timestamp of the last message on the rate control topic."""
 
 
 class Output(Protocol):
-    """The destination of a player's messages. All methods are called in the player's thread."""
+    """Where a player sends its messages. All methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
-        """Prepare the output, and end the player when the connection to the graph is shut down.
+        """Prepare the output. End the player when the connection to the graph shuts down.
 
         This method is called first.
         """
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """Advertise the topics of these connections. Each connection comes with its bag's number."""
+        """Advertise these connections' topics. Each connection comes with its bag's index."""
 
     def offer(self, player: Controls) -> None:
         """Offer controls for the player, such as a service."""
@@ -64,10 +64,10 @@ class Output(Protocol):
         """Return whether each topic has a subscriber."""
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """Return a context manager within which messages are played. Inside it, ``on_key`` is called with each typed key."""
+        """Return a context manager for playing, inside which each typed key is passed to ``on_key``."""
 
     def publish(self, number: int, message: StoredMessage) -> None:
-        """Publish a message from the bag with this number."""
+        """Publish a message from the bag with this index."""
 
     def publish_clock(self, time: int) -> None:
         """Publish the bag time on /clock."""
@@ -80,7 +80,7 @@ class Output(Protocol):
 
 
 class _Outlet:
-    """A recorded publisher. All recorded publishers of a topic share one actual publisher."""
+    """A recorded publisher. All recorded publishers of a topic share one real publisher."""
 
     def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
         self.publisher = publisher
@@ -96,7 +96,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Sends each latched publisher's last message to late subscribers, because a topic itself stores only one message."""
+    """Sends each latched publisher's last message to late subscribers, because a topic stores only one message."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []
@@ -114,7 +114,7 @@ class _LateSubscribers(client.SubscribeListener):
 
 
 class NodeOutput:
-    """An output that publishes with this process's node and prints to the terminal; init_node() must have been called."""
+    """Publishes with this process's node and prints to the terminal. Call init_node() first."""
 
     def __init__(self, options: PlayOptions) -> None:
         self._options = options
@@ -134,7 +134,7 @@ class NodeOutput:
             self._advertise(number, connection)
 
     def offer(self, player: Controls) -> None:
-        """Offer the service ~pause_playback, and subscribe to the rate control topic."""
+        """Offer the service ~pause_playback and subscribe to the rate control topic."""
         from std_srvs.srv import SetBool, SetBoolResponse
 
         def pause(request: SetBoolRequest) -> SetBoolResponse:
@@ -156,10 +156,10 @@ class NodeOutput:
 
     @contextlib.contextmanager
     def running(self, on_key: Callable[[str], object]) -> Iterator[None]:
-        """Read keys while the block runs, and shorten the GIL switch interval."""
+        """Return a context manager that reads keys and shortens the GIL switch interval."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
-        # Exclude existing objects from garbage collection: traversing all imported modules takes milliseconds.
+        # Exclude existing objects from garbage collection: traversing the imported modules takes milliseconds.
         gc.freeze()
         try:
             with read_keys(on_key):

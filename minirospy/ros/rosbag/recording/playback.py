@@ -26,12 +26,12 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, Statu
 
 __all__ = ["Phase", "Playback", "PlayerState"]
 
-# delay in ns before the first message, which would otherwise be late because threads are still starting
+# Delay in ns before the first message, which would otherwise be late because threads are still starting.
 _LEAD = 10**9 // 500
 
 
 class Phase(enum.Enum):
-    """The phase of a playback; the module's docstring describes the transitions."""
+    """A playback's phase; the module's docstring describes the transitions."""
 
     OPENING = enum.auto()
     READY = enum.auto()
@@ -40,7 +40,7 @@ class Phase(enum.Enum):
 
 
 class PlayerState(NamedTuple):
-    """The state of a player: the bag time in nanoseconds, and the rate at which it advances."""
+    """A player's state: the bag time in nanoseconds, and the rate at which it advances."""
 
     time: int
     rate: float
@@ -49,18 +49,18 @@ class PlayerState(NamedTuple):
 
 
 class Playback:
-    """The rules for a playback. Only :meth:`end` is thread-safe: callers of other methods must hold a lock."""
+    """The playback's state machine. Only :meth:`end` is thread-safe; hold a lock when calling other methods."""
 
     def __init__(self, options: PlayOptions) -> None:
         self.phase = Phase.OPENING
-        self.is_fresh = True  # True if no message has been published since the start or the last seek
-        # set without the lock if a shutdown was requested; possible in any phase
+        self.is_fresh = True  # whether no message has been published since the start or the last seek
+        # set, without the lock, when a shutdown is requested; possible in any phase
         self.is_ended = False
         self.options = options  # control() changes the settings for looping and /clock
-        self.seek_to: int | None = None  # the requested bag time, until the reader takes it
+        self.seek_to: int | None = None  # requested bag time, until the reader takes it
         self._span = (0, 0)  # bag times of the first and last message; set in OPENING
         self._starts_paused = options.paused  # used before PLAYING
-        self._schedule: Schedule | None = None  # None while OPENING
+        self._schedule: Schedule | None = None  # None in OPENING
 
     # --- transitions
 
@@ -69,9 +69,9 @@ class Playback:
         self._span = first, last
 
     def accept_control(self, wall: int) -> None:
-        """Enter READY. From now on, seeks and other requests have an effect."""
+        """Enter READY, in which seeks and other requests take effect."""
         self.phase = Phase.READY
-        # Start with a paused schedule, whose clock does not advance until playing starts.
+        # Start paused: the schedule's clock must not advance until playing starts.
         self._schedule = Schedule(self.options._replace(paused=True), *self._span, wall)
 
     def start(self, wall: int) -> None:
@@ -91,7 +91,7 @@ class Playback:
             self._schedule = Schedule(self.options, *self._span, wall + _LEAD)
 
     def reach_end(self) -> None:
-        """Enter AT_END, unless a seek is requested."""
+        """Enter AT_END, unless a seek has been requested."""
         if self.seek_to is None:
             self.phase = Phase.AT_END
 
@@ -100,7 +100,7 @@ class Playback:
         self.phase = Phase.PLAYING
 
     def end(self) -> None:
-        """Stop playing. Safe in any thread and in signal handlers."""
+        """Stop playing. Safe to call from any thread or signal handler."""
         self.is_ended = True
 
     # --- requests
@@ -131,7 +131,7 @@ class Playback:
         if seek is not None:
             self.seek_to = min(max(seek, self._span[0]), self._span[1])
             self.is_fresh = True
-            # state() reports this time until the reader has reached that position in the files.
+            # state() reports the requested time until the reader has reached it in the files.
             schedule.seek(self.seek_to, wall)
         if is_paused is not None:
             self.set_paused(is_paused, wall)
@@ -150,7 +150,7 @@ class Playback:
         return changed
 
     def press(self, key: str, wall: int) -> None:
-        """Perform the command for a key: space toggles paused, s steps, t toggles the topics to pause at."""
+        """Perform a key's command: space toggles pausing, s steps, t toggles pausing at the selected topics."""
         if not (schedule := self._schedule):
             return
         if key == " ":
@@ -166,21 +166,21 @@ class Playback:
             self._running.step()
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message on the rate control topic."""
+        """Store the timestamp of the last message on the rate control topic."""
         if self._schedule:
             self._schedule.control_rate(stamp)
 
     # --- messages
 
     def take_seek(self) -> int | None:
-        """Return the requested bag time and clear the request, or return None if no seek is requested."""
+        """Return and clear the requested bag time; return None if no seek is requested."""
         start, self.seek_to = self.seek_to, None
         return start
 
     def arrive(self, start: int, wall: int) -> None:
         """Continue at ``start``, which the reader has reached, unless another seek has been requested since."""
         if self.seek_to is None:
-            # Keep the steps that were requested in the meantime.
+            # Keep the steps requested in the meantime.
             self._running.seek(start, wall, keeps_steps=True)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
@@ -195,7 +195,7 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Set is_fresh together with the new time: a client that sees the time counts its steps from there.
+            # Update is_fresh together with the time: clients that see the time count their steps from it.
             self.is_fresh = False
         return wait
 

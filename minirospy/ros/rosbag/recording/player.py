@@ -21,14 +21,14 @@ from minirospy.ros.rosbag.recording.sources import Bags, ReadAhead, Selection
 __all__ = ["Player"]
 
 _SECOND = 10**9
-_TICK = _SECOND // 10  # interval in ns between status lines and between shutdown checks
+_TICK = _SECOND // 10  # ns between status lines, and between shutdown checks
 
-# at the end, seconds to wait for a subscriber that is not reading
+# Seconds to wait at the end for a subscriber that is not reading.
 _STALLED_SECONDS = 5.0
 
 
 class Player:
-    """Plays bags through this process's node, or through another ``output``; init_node() must have been called for a node.
+    """Plays bags through this process's node (call init_node() first), or through another ``output``.
 
     A :class:`Playback` decides what requests do; this class provides the lock, the time and the messages.
     """
@@ -40,7 +40,7 @@ class Player:
         on_ready: Callable[[int, int], object] | None = None,
         output: Output | None = None,
     ) -> None:
-        """``on_ready(first, last)`` is called before playing starts, with the times of the first and last message.
+        """Create a player. It calls ``on_ready`` with the first and last message's times before playing starts.
 
         From then on the player can be controlled with :meth:`control`, so it waits at the end of the bags instead of
         returning.
@@ -57,7 +57,7 @@ class Player:
         self._next_line = 0  # wall time of the next status line
 
     def run(self) -> int:
-        """Play until the end, or until the node shuts down; return the exit status. Raise BagFormatError if a bag is damaged."""
+        """Play until the end or until the node shuts down; return the exit status. Raise BagFormatError if a bag is damaged."""
         self._output.open(self)
         options = self._options
         times = self._bags.times()
@@ -89,7 +89,7 @@ class Player:
         return 0
 
     def state(self) -> PlayerState:
-        """Return the state of the player. Thread-safe."""
+        """Return the player's state. Thread-safe."""
         with self._lock:
             return self._playback.state(time.perf_counter_ns())
 
@@ -102,7 +102,7 @@ class Player:
         is_looping: bool | None = None,
         has_clock: bool | None = None,
     ) -> None:
-        """Pause or resume, set the rate, seek to a time in the bag, loop, or publish /clock. None leaves a setting unchanged.
+        """Pause or resume, set the rate, seek to a bag time, loop, or publish /clock. None leaves a setting unchanged.
 
         Thread-safe.
         """
@@ -141,18 +141,18 @@ class Player:
         return changed
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message on the rate control topic. Thread-safe."""
+        """Store the timestamp of the last message on the rate control topic. Thread-safe."""
         with self._lock:
             self._playback.control_rate(stamp)
         self._wait.wake()
 
     def end(self) -> None:
-        """Make :meth:`run` return. Safe in any thread and in signal handlers."""
+        """Make :meth:`run` return. Safe to call from any thread or signal handler."""
         self._playback.end()
         self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
-        """Wait for the delay and for subscribers, according to the options; publish messages latched before the start."""
+        """Wait for the delay and the subscribers that the options request; publish the messages latched before the start."""
         options = self._options
         self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
         self._sleep(options.delay)
@@ -165,9 +165,9 @@ class Player:
             self._wait_for_subscribers()
 
     def _play_precisely(self, messages: ReadAhead, selection: Selection) -> None:
-        """Play all messages in the output's context."""
+        """Play all messages inside the output's context manager."""
         messages.wait()
-        # Start the schedule before the keys are read, so that the first keys have an effect.
+        # Start the schedule before reading keys, so that the first keys have an effect.
         with self._lock:
             self._playback.start(time.perf_counter_ns())
         with self._output.running(self._on_key):
@@ -190,7 +190,7 @@ class Player:
                         break
                     self._publish(number, message)
             if not self._playback.is_ended and not self._options.quiet:
-                # Show the final state, even if a status line has just been printed.
+                # Show the final state, even right after another status line.
                 self._show_status(time.perf_counter_ns())
             if self._on_ready and not self.is_looping:
                 self._wait_at_end()
@@ -226,7 +226,7 @@ class Player:
             self._sleep(_TICK // 10)
 
     def _wait_at_end(self) -> None:
-        """Wait at the end for a seek or looping; keys and /clock keep working."""
+        """At the end, wait for a seek or looping, while keys and /clock keep working."""
         with self._lock:
             self._playback.reach_end()
         self.on_change()
@@ -238,7 +238,7 @@ class Player:
             self._playback.leave_end()
 
     def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
-        """Publish the messages latched before ``start``; return those from ``start`` on."""
+        """Publish the messages latched before ``start``; return the messages from ``start`` on."""
         messages.join()
         selection = selection._replace(start=start)
         for number, message in self._bags.last_latched(selection):
@@ -251,7 +251,7 @@ class Player:
         return found
 
     def _play(self, message: StoredMessage) -> bool:
-        """Wait until a message is due and return True; return False at shutdown or if a seek is requested."""
+        """Wait until a message is due and return True, or return False at shutdown or on a seek request."""
         playback = self._playback
         now = time.perf_counter_ns()
         with self._lock:
@@ -265,7 +265,7 @@ class Player:
                     return False
                 wait = playback.poll(now)
             if wait is None:
-                # When stepping, publish the message's time on /clock before the message.
+                # When stepping, publish the message's time on /clock first.
                 self._tick(now)
                 return True
             now = self._wait.until(min(wait, self._next_line) if not self._options.quiet else wait)

@@ -10,21 +10,21 @@ from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
-# SignalSafeEvent.wait() is imprecise, so sleep instead for the last N ns before the deadline.
+# SignalSafeEvent.wait() is imprecise, so sleep during the last N ns before the deadline.
 _EVENT_NS = 5_000_000
 
-# Linux's PR_SET_TIMERSLACK: how long the kernel may delay a thread's wake-up, 50 us by default
+# Linux's PR_SET_TIMERSLACK: how much later the kernel may wake a thread, 50 us by default
 _TIMER_SLACK = 29
 
 
 class PreciseWait:
-    """Waits until a time of ``time.perf_counter_ns()``, a clock that is precise on every OS.
+    """Waits until a deadline on ``time.perf_counter_ns()``, which is precise on every OS.
 
     Only the thread that creates it may wait; any thread, and a signal handler, may call ``wake``.
     """
 
     def __init__(self) -> None:
-        # Use an event that a signal handler can set in the thread that is waiting on it.
+        # This event can be set by a signal handler in the waiting thread.
         self._event = SignalSafeEvent()
         self._spin_ns = 150_000
         if sys.platform.startswith("linux"):
@@ -35,11 +35,11 @@ class PreciseWait:
                     self._spin_ns = 40_000
 
     def wake(self) -> None:
-        """Interrupt the current wait; if it ends within 5 ms, interrupt the next long wait instead."""
+        """Interrupt the current wait, or the next one if this wait is in its last 5 ms."""
         self._event.set()
 
     def until(self, wall: int) -> int:
-        """Wait until time ``wall``, or until :meth:`wake` is called; return the current time."""
+        """Wait until ``wall`` or until :meth:`wake` is called; return the current time."""
         while True:
             now = time.perf_counter_ns()
             rest = wall - now
@@ -52,5 +52,5 @@ class PreciseWait:
             elif rest > self._spin_ns:
                 time.sleep((rest - self._spin_ns) / 1e9)
             else:
-                # Busy-poll, but release the GIL so that other threads can send messages.
+                # Busy-poll, releasing the GIL so that other threads can send messages.
                 time.sleep(0)

@@ -41,7 +41,7 @@ _PATIENCE_SECONDS = 2.0
 
 
 class _Topic:
-    """A recorded topic: its subscriber, and the number of messages left to record (-1: no limit)."""
+    """A recorded topic: its subscriber and the number of messages still to record (-1: no limit)."""
 
     def __init__(self, name: str, left: int) -> None:
         self.name = name
@@ -50,15 +50,15 @@ class _Topic:
 
 
 class Recorder:
-    """Records topics in :meth:`run`, using this process's node; init_node() must have been called.
+    """Records topics in :meth:`run` with this process's node. Call init_node() first.
 
     Raise UsageError if an expression in ``options`` is invalid.
     """
 
     def __init__(self, options: RecordOptions) -> None:
         self.options = options
-        self.status = 0  # exit status: 1 after a failure, such as a disk error
-        self.dropped: Counter[str] = Counter()  # messages dropped per topic because the disk was too slow
+        self.status = 0  # 1 after a failure such as a disk error
+        self.dropped: Counter[str] = Counter()  # messages per topic dropped because the disk was too slow
         self._matches = topic_filter(options)
         self._matches_node = topic_filter(options, subscribed_by_node=True)
         self._topics: dict[str, _Topic] = {}
@@ -77,7 +77,7 @@ class Recorder:
         self._stop.set()
 
     def run(self) -> int:
-        """Record until the node shuts down or one of the limits in the options is reached; return the exit status."""
+        """Record until the node shuts down or a limit from the options is reached; return the exit status."""
         client.on_shutdown(self.stop)
         if self.options.publish:
             from std_msgs.msg import String
@@ -92,7 +92,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # Complete the file in a thread, so that Ctrl-C does not interrupt it and the process does not exit before it is done.
+        # Complete the file in a thread, which Ctrl-C does not interrupt and for which the process waits.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -102,7 +102,7 @@ class Recorder:
             if self._file and self._check_space():
                 self._record()
         except KeyboardInterrupt:
-            # This is a second Ctrl-C, or a shutdown that interrupted a registration.
+            # A second Ctrl-C, or a shutdown that interrupted a registration.
             is_interrupted = True
         finally:
             self._stop.set()
@@ -166,7 +166,7 @@ class Recorder:
         )
 
     def _follow_master(self) -> None:
-        """Subscribe to topics that are new at the master."""
+        """Subscribe to topics that are new in the master's list."""
         master = current_session().master
         try:
             state = master.get_system_state()
@@ -183,7 +183,7 @@ class Recorder:
                     self._subscribe(name)
 
     def _check_space(self) -> bool:
-        """Return whether there is enough disk space left.
+        """Return whether enough disk space is left.
 
         Warn if there is little, and stop recording if there is less than the minimum.
         """
@@ -218,7 +218,7 @@ class Recorder:
             client.logwarn("rosbag record buffer exceeded.  Dropped messages: %s", _counts(new))
 
     def _end_finished(self) -> None:
-        """Unsubscribe from topics that have reached their message limit. Stop when all topics have reached it."""
+        """Unsubscribe from topics that have reached their message limit, and stop once all have."""
         for topic in self._topics.values():
             if not topic.left and topic.subscriber:
                 topic.subscriber.unregister()
@@ -227,15 +227,15 @@ class Recorder:
             self._stop.set()
 
     def _wait_until_complete(self, is_interrupted: bool) -> None:
-        """Wait until the file is complete. A second Ctrl-C does not interrupt the wait; a third terminates the process.
+        """Wait until the file is complete. A second Ctrl-C does not interrupt the wait; a third one ends the process.
 
         Log how much is still to be written: on each Ctrl-C, and once if the wait is long.
         """
         patience = time.monotonic() + _PATIENCE_SECONDS
-        # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks the thread as finished.
+        # Do not join() the thread: on Python 3.10 and 3.11, an interrupted join() marks it as finished.
         while not self._finished.is_set():
             try:
-                # Call is_shutdown(), which marks this wait as clean-up that the shutdown must not interrupt.
+                # is_shutdown() marks this wait as clean-up, which the shutdown must not interrupt.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf
@@ -247,7 +247,7 @@ class Recorder:
     # --- called in the finisher thread
 
     def _finish(self) -> None:
-        """Wait for the recording to stop, and complete the file."""
+        """Wait for the recording to stop, then complete the file."""
         try:
             self._stop.wait()
             self._complete()
@@ -284,7 +284,7 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Give latched messages the time of the file's first message, because they precede it.
+        # Latched messages precede the file's first message, so give them its time.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
@@ -315,7 +315,7 @@ class Recorder:
                 self._disk.submit(partial(_remove, surplus))
             self._open(now)
 
-    # --- called in the workers that receive messages
+    # --- called in the worker threads that receive messages
 
     def _receive(self, message: ReceivedFrame, topic: _Topic) -> None:
         now = self._clock()
@@ -336,7 +336,7 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Write compressed chunks now to free memory; otherwise they would stay until the next message arrives.
+                # Write compressed chunks now to free memory, instead of when the next message arrives.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1
@@ -373,7 +373,7 @@ class Recorder:
 
 
 def _reason(error: Exception) -> str:
-    """Return the reason for a write failure, in one line."""
+    """Return a write failure's reason in one line."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 

@@ -16,7 +16,7 @@ _SECOND = 10**9
 
 
 class PlayOptions(NamedTuple):
-    """The options for `rosbag play`. Times are in nanoseconds; those that refer to the bag are in bag time."""
+    """The options of `rosbag play`. Times are in nanoseconds; positions in the bag are in bag time."""
 
     prefix: str = ""
     immediate: bool = False
@@ -44,17 +44,17 @@ class State(enum.Enum):
 
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
-    DELAYED = "DELAYED"  # waiting for the rate control topic
+    DELAYED = "DELAYED"  # wait for the rate control topic
 
 
 class Status(NamedTuple):
-    """The contents of the status line: the bag time, and how much of the bag has been played."""
+    """The contents of the status line: the bag time and how much of the bag has been played."""
 
     state: State
     time: int
     played: int
     length: int
-    delay: int  # how far the rate control topic lags; used in state DELAYED
+    delay: int  # lag of the rate control topic, in state DELAYED
 
 
 class Schedule:
@@ -64,18 +64,18 @@ class Schedule:
     """
 
     def __init__(self, options: PlayOptions, first: int, last: int, wall: int) -> None:
-        """Create a schedule. ``first`` and ``last`` are the bag times of the first and last message.
+        """Create a schedule. ``first`` and ``last`` are the first and last message's bag times.
 
         ``wall`` is the wall time when the first message is due.
         """
         self._options = options
         self._first = first
         self._last = last
-        self._origin = wall  # wall time that corresponds to bag time ``first``; shifted by each pause
+        self._origin = wall  # wall time of bag time ``first``; each pause shifts it
         self._message = first
         self._is_due = False
         self._clock = first
-        self._since = wall  # wall time when the current pause or delay started
+        self._since = wall  # wall time at the start of the current pause or delay
         self._paused = options.paused
         self._steps = 0
         self._delayed = False
@@ -92,7 +92,7 @@ class Schedule:
 
     @property
     def rate(self) -> float:
-        """Return the ratio of bag time to wall time."""
+        """Return how fast bag time advances relative to wall time."""
         return self._rate
 
     def set_rate(self, rate: float, wall: int) -> None:
@@ -107,7 +107,7 @@ class Schedule:
         self._next_tick = wall
 
     def seek(self, time: int, wall: int, *, keeps_steps: bool = False) -> None:
-        """Continue at another bag time; the next message must be offered again. Drop pending steps unless ``keeps_steps``."""
+        """Continue at another bag time. Offer the next message again. Pending steps are dropped unless ``keeps_steps``."""
         self._clock = self._message = time
         self._is_due = False
         self._delayed = False
@@ -116,7 +116,7 @@ class Schedule:
         self._start_from(time, wall)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
-        """Schedule the next message, given its bag time, its topic, and the current wall time."""
+        """Schedule the next message, given its bag time and topic, and the current wall time."""
         self._advance(wall)
         self._message = time
         options = self._options
@@ -136,7 +136,7 @@ class Schedule:
                 self._delayed = True
 
     def poll(self, wall: int) -> int | None:
-        """Return None if the message is due now, otherwise the wall time at which to poll again.
+        """Return None if the message is due; otherwise return the wall time of the next poll.
 
         Poll earlier if another method is called before that.
         """
@@ -180,19 +180,19 @@ class Schedule:
             self._steps += 1
 
     def toggle_pause_topics(self) -> None:
-        """Switch between ignoring and respecting the topics to pause at."""
+        """Toggle whether to pause at the selected topics."""
         self._pauses_at = () if self._pauses_at else self._options.pause_topics
 
     def control_rate(self, stamp: int) -> None:
-        """Store the time stamp of the last message on the rate control topic."""
+        """Store the timestamp of the last message on the rate control topic."""
         self._controlled = stamp
 
     def tick(self, wall: int) -> int | None:
-        """Return the time to publish on /clock, or None if no message is due."""
+        """Return the time to publish on /clock, or None if no /clock message is due."""
         if not self._period or wall < self._next_tick:
             return None
         self._advance(wall)
-        # Skip messages that were due while the process was suspended instead of publishing them in a burst.
+        # Skip messages that became due while the process was suspended, to avoid a burst.
         self._next_tick = max(self._next_tick + self._period, wall)
         return self._clock
 
@@ -204,14 +204,14 @@ class Schedule:
         return Status(state, self._clock, self._clock - self._first, self._last - self._first, behind)
 
     def run_on(self, wall: int) -> int:
-        """Advance the clock past the last message, for ``--keep-alive``; return the wall time of the next call."""
+        """For ``--keep-alive``, advance the clock past the last message; return the wall time of the next call."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, self._bag_time(wall))
         wait = wall + _SECOND // 10
         return min(wait, self._next_tick) if self._period else wait
 
     def _due(self) -> int:
-        """Return the wall time when the message is due."""
+        """Return the wall time at which the message is due."""
         return self._origin + self._scaled(self._message - self._first, 1 / self._rate)
 
     def _bag_time(self, wall: int) -> int:
@@ -226,7 +226,7 @@ class Schedule:
         self._since = wall
 
     def _advance(self, wall: int) -> None:
-        """Advance bag time, but not past the current message."""
+        """Advance bag time, but at most to the current message."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, min(self._message, self._bag_time(wall)))
 
@@ -239,7 +239,7 @@ class Schedule:
         self._since = wall
 
     def _tick_now(self, wall: int) -> None:
-        """Set bag time to the message's time, and make a /clock message due now."""
+        """Set bag time to the message's time and make a /clock message due now."""
         self._clock = self._message
         self._next_tick = wall
 

@@ -24,7 +24,7 @@ _BATCHES = 8
 
 
 class Selection(NamedTuple):
-    """The messages to play: the topics (empty: all), and the times ``start`` and ``end`` (None: no limit)."""
+    """Which messages to play: the topics (empty: all), and the times ``start`` and ``end`` (None: no limit)."""
 
     topics: Collection[str] = ()
     start: int | None = None
@@ -32,7 +32,7 @@ class Selection(NamedTuple):
 
 
 class Bags:
-    """Several bags, opened for reading; a context manager.
+    """Several bags opened for reading, as a context manager.
 
     Raise NotFoundError if a file does not exist, BagError with the file's name if a file cannot be read.
     """
@@ -59,7 +59,7 @@ class Bags:
         self._files.close()
 
     def connections(self, selection: Selection) -> list[tuple[int, Connection]]:
-        """Return the connections with messages to play, each with its bag's number."""
+        """Return the connections with messages to play, each with its bag's index."""
         return [
             (number, connection)
             for number, reader in enumerate(self.readers)
@@ -68,23 +68,23 @@ class Bags:
         ]
 
     def times(self) -> tuple[int, int] | None:
-        """Return the times of the first and the last message in all bags, or None if there are no messages."""
+        """Return the first and last message's times across all bags, or None if there are no messages."""
         spans = [span for reader in self.readers if (span := _span(reader))]
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
 
     def last_time(self, selection: Selection) -> int:
-        """Return the time of the last message in a non-empty selection. Reads only a few chunks."""
+        """Return the last message's time in a non-empty selection, reading only a few chunks."""
         return max(_last_time(reader, selection) for reader in self.readers)
 
     def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
-        """Yield the messages in time order, each with its bag's number. Raise BagFormatError if a bag is damaged."""
+        """Yield the messages in time order, each with its bag's index. Raise BagFormatError if a bag is damaged."""
         return heapq.merge(
             *(_numbered(number, reader, selection) for number, reader in enumerate(self.readers)),
             key=_time,
         )
 
     def last_latched(self, selection: Selection) -> list[tuple[int, StoredMessage]]:
-        """Return each latched connection's last message before the start of the selection."""
+        """Return each latched connection's last message before the selection starts."""
         found: list[tuple[int, StoredMessage]] = []
         for number, connection in self.connections(selection):
             if not connection.latching or not selection.start:
@@ -96,7 +96,7 @@ class Bags:
 
 
 def open_reader(path: Path, opened: ExitStack) -> BagReader:
-    """Return a reader for a bag or an MCAP file; ``opened`` closes the reader.
+    """Return a reader for a bag or an MCAP file. Closing ``opened`` closes the reader.
 
     Raise OSError if the file cannot be read, BagError if the file is invalid.
     """
@@ -108,7 +108,7 @@ def open_reader(path: Path, opened: ExitStack) -> BagReader:
 
 
 class ReadAhead:
-    """Iterates over messages that a thread reads ahead, up to a few thousand. Iterate once, then close."""
+    """An iterator over messages that a thread reads ahead, up to a few thousand. Iterate once, then close."""
 
     def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
@@ -120,22 +120,22 @@ class ReadAhead:
         self._thread.start()
 
     def __iter__(self) -> Iterator[tuple[int, StoredMessage]]:
-        """Yield the messages; re-raise any exception that occurred while reading them."""
+        """Yield the messages. Re-raise any exception that occurred while reading them."""
         while (item := self._ready.get()) is not None:
             if isinstance(item, Exception):
                 raise item
             yield from item
 
     def wait(self) -> None:
-        """Wait until the first messages have been read, or the end has been reached."""
+        """Wait until the first messages have been read or the end is reached."""
         self._first.wait()
 
     def close(self) -> None:
-        """Ask the thread to stop."""
+        """Request the thread to stop."""
         self._stop.set()
 
     def join(self) -> None:
-        """After :meth:`close`, wait until the thread has stopped. The caller may then use the files again."""
+        """After :meth:`close`, wait until the thread has stopped and no longer uses the files."""
         self._thread.join()
 
     def _read(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
@@ -179,7 +179,7 @@ def _span(reader: BagReader) -> tuple[int, int] | None:
 
 
 def _last_time(reader: BagReader, selection: Selection) -> int:
-    """Return the time of the last message in a selection, or 0 if there are no messages."""
+    """Return the last message's time in a selection, or 0 if there are no messages."""
     wanted = _wanted(reader, selection)
     end = selection.end
     found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}
@@ -194,7 +194,7 @@ def _last_time(reader: BagReader, selection: Selection) -> int:
 
 
 def _wanted(reader: BagReader, selection: Selection) -> list[int]:
-    """Return the connection IDs for the selected topics."""
+    """Return the selected topics' connection IDs."""
     return [
         connection.id
         for connection in reader.connections.values()

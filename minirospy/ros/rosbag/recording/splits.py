@@ -10,19 +10,19 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MAX_EMPTY = 100  # maximum number of empty files to write after a long time without messages, as in ROS
+_MAX_EMPTY = 100  # maximum number of empty files to write after a long gap without messages, as in ROS
 
 
 class Next(enum.Enum):
-    """The action to take before a message is recorded."""
+    """What to do before recording a message."""
 
     CONTINUE = enum.auto()
-    SPLIT = enum.auto()  # close the file, and continue in the next
+    SPLIT = enum.auto()  # close the file and continue in the next one
     END = enum.auto()
 
 
 class Splits:
-    """The files in a recording that started at ``start``. Times are ROS times in nanoseconds."""
+    """Decides when to split a recording, which started at ``start``. Times are ROS times in nanoseconds."""
 
     def __init__(self, options: RecordOptions, start: int) -> None:
         self._options = options
@@ -40,7 +40,7 @@ class Splits:
             return self._full()
         if options.max_duration and now - self._start > options.max_duration:
             if now - self._start > _MAX_EMPTY * options.max_duration:
-                # The clock has jumped, because a simulator was restarted or the system time was set.
+                # The clock has jumped: a simulator was restarted or the system time was set.
                 self._start = now - options.max_duration
             self._start += options.max_duration
             return self._full()
@@ -52,7 +52,7 @@ class Splits:
         if not self._options.max_splits:
             return []
         self._kept.append(name)
-        # The list does not include the file that is currently being written.
+        # The list omits the file being written.
         surplus = len(self._kept) - self._options.max_splits
         removed, self._kept = self._kept[: max(0, surplus)], self._kept[max(0, surplus) :]
         return removed
@@ -62,7 +62,7 @@ class Splits:
 
 
 def file_name(options: RecordOptions, count: int, now: float) -> str:
-    """Return the name of file number ``count``. ``now`` (seconds since 1970) is when it is opened."""
+    """Return the name of file number ``count``. ``now`` is its opening time in seconds since 1970."""
     parts = [options.prefix.removesuffix(options.extension)] if options.prefix else []
     if options.append_date:
         parts.append(time.strftime("%Y-%m-%d-%H-%M-%S", time.localtime(now)))

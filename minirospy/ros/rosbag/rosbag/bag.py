@@ -120,11 +120,11 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True  # set if LZ4 is available; programs check this name
+found_lz4 = True  # set if LZ4 is available; programs check for this name
 
 
 class Compression:
-    """The chunk compressions that bags support."""
+    """The chunk compression types that bags support."""
 
     NONE = compressions.NONE
     BZ2 = compressions.BZ2
@@ -137,21 +137,21 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[bytes]):
-    """A buffer for a message's ``serialize`` to write to."""
+    """A write-only buffer for a message's ``serialize``."""
 
     __slots__ = ()
     write = list.append
 
 
 class Options(TypedDict, total=False):
-    """The compression and size of the chunks that will be written."""
+    """The compression and size of chunks to be written."""
 
     compression: str
     chunk_threshold: int
 
 
 class Bag(OpenedBag):
-    """A bag that is open for reading, writing or appending.
+    """A bag open for reading, writing or appending.
 
     ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` is in bytes.
     ``allow_unindexed``: open a bag that was not closed, so that reindex() can be called. ``options`` may contain compression
@@ -178,7 +178,7 @@ class Bag(OpenedBag):
         self._skip_index = skip_index
         self._written: dict[
             tuple[str, str], int
-        ] = {}  # connection numbers of written messages, keyed by topic and md5sum
+        ] = {}  # connection numbers of written messages, by topic and md5sum
         self._pieces = _Pieces()
 
         if not f:
@@ -186,7 +186,7 @@ class Bag(OpenedBag):
         self._open(f, mode, allow_unindexed)
 
     def _open(self, f: FileArgument, mode: str, allow_unindexed: bool) -> None:
-        """Open the bag, also again after close()."""
+        """Open the bag; called again after close()."""
         opening = {"r": self._open_read, "w": self._open_write, "a": self._open_append}
         if mode not in opening:
             raise ValueError(f'mode "{mode}" is invalid')
@@ -198,7 +198,7 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy reads the index on demand, but a program's subclass may do it here to show the progress.
+            # minirospy reads the index on demand; a subclass may read it here to show the progress.
             if mode == "r" and not self._skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not self._skip_index
@@ -220,12 +220,12 @@ class Bag(OpenedBag):
 
     @property
     def options(self) -> Options:
-        """Return the compression and the chunk threshold."""
+        """Return the compression and the chunk threshold as a dict."""
         return {"compression": self._compression, "chunk_threshold": self._chunk_threshold}
 
     @property
     def filename(self) -> str | os.PathLike[str] | None:
-        """Return the path that was given, or None for a file object."""
+        """Return the given path, or None for a file object."""
         return self._filename
 
     @property
@@ -235,7 +235,7 @@ class Bag(OpenedBag):
 
     @property
     def mode(self) -> str:
-        """Return the mode in which the bag was opened: r, w or a."""
+        """Return the bag's mode: r, w or a."""
         return self._mode
 
     @property
@@ -249,7 +249,7 @@ class Bag(OpenedBag):
 
     @property
     def compression(self) -> str:
-        """Return the compression for later chunks. Assigning an unknown compression raises ValueError."""
+        """Return the compression of later chunks. Assigning an unknown compression raises ValueError."""
         return self._compression
 
     @compression.setter
@@ -262,7 +262,7 @@ class Bag(OpenedBag):
 
     @property
     def chunk_threshold(self) -> int:
-        """Return the size in bytes, before compression, at which a chunk is complete.
+        """Return the uncompressed size in bytes at which a chunk is complete.
 
         Assigning a negative size raises ValueError.
         """
@@ -314,7 +314,7 @@ class Bag(OpenedBag):
         raw: bool = False,
         connection_header: Mapping[str, str | bytes] | None = None,
     ) -> None:
-        """Write a message received at ``t``, by default now.
+        """Write a message received at time ``t`` (default: now).
 
         ``raw``: the message is a tuple of type, bytes, md5sum, (position,) and class. ``connection_header`` is stored
         with the first message for a topic and type. Raise ValueError if the bag is closed or an argument is invalid,
@@ -344,7 +344,7 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # Convert the body first, so that an invalid body raises an error before anything is written to the chunk.
+            # Serialize the body first: an invalid body must raise an error before anything is written to the chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
@@ -356,14 +356,14 @@ class Bag(OpenedBag):
                 number = writer.add_connection(topic, header)
                 self._written[topic, md5sum] = number
             if self._is_read:
-                # A read since the last write may have moved the position.
+                # A read since the last write may have moved the file position.
                 self._file.seek(0, os.SEEK_END)
             writer.write(number, nanoseconds, body)
         except BagError as error:
             raise_as_ros(error)
 
     def _write_connection_record(self, connection_info: _ConnectionInfo, encrypt: bool = False) -> None:
-        """Add a connection, used for later messages with its topic and type."""
+        """Add a connection for later messages with its topic and type."""
         if self._file is None:
             raise ValueError(CLOSED)
         if self._writer is None:
@@ -373,7 +373,7 @@ class Bag(OpenedBag):
         self._written[connection_info.topic, connection_info.md5sum] = number
 
     def reindex(self) -> Iterator[int]:
-        """Rebuild the index. Yield the file positions while reading, so that the caller can show the progress.
+        """Rebuild the index. Yield the file position while reading, so that the caller can show the progress.
 
         If the bag was opened to append, data that cannot be recovered is cut off.
         """
@@ -395,7 +395,7 @@ class Bag(OpenedBag):
                 self._start_appending(repair.connections, repair.chunks, repair.end)
 
     def close(self) -> None:
-        """Close the bag. Closing it again has no effect. Raise OSError if writing the end of the file fails."""
+        """Close the bag. Idempotent. Raise OSError if writing the end of the file fails."""
         if self._file is None:
             return
         try:
@@ -407,7 +407,7 @@ class Bag(OpenedBag):
             self._close_file()
 
     def get_compression_info(self) -> CompressionTuple:
-        """Return (compression, uncompressed, compressed): the most frequent compression, and the chunks' total sizes."""
+        """Return (compression, uncompressed, compressed): the most frequent compression and the total chunk sizes."""
         with as_ros_errors():
             stored = info.compression_of(self._current())
         name = stored[0].compression if stored else self.compression
@@ -416,22 +416,22 @@ class Bag(OpenedBag):
         )
 
     def get_message_count(self, topic_filters: str | list[str] | None = None) -> int:
-        """Return the number of messages on all topics, or on the given ones."""
+        """Return the number of messages on all topics or on the given ones."""
         if topic_filters is not None:
             topics = self.get_type_and_topic_info(topic_filters).topics.values()
             return sum(topic.message_count for topic in topics)
         return self._summary(frequencies=False).messages
 
     def get_start_time(self) -> float:
-        """Return the time of the first message in seconds. Raise ROSBagException if there are no messages."""
+        """Return the first message's time in seconds. Raise ROSBagException if there are no messages."""
         return self._times()[0]
 
     def get_end_time(self) -> float:
-        """Return the time of the last message in seconds. Raise ROSBagException if there are no messages."""
+        """Return the last message's time in seconds. Raise ROSBagException if there are no messages."""
         return self._times()[1]
 
     def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
-        """Return (msg_types, topics).
+        """Return (msg_types, topics) for all topics, or for the given ones.
 
         ``msg_types`` maps types to md5sums, ``topics`` maps topics to (msg_type, message_count, connections, frequency).
         """
@@ -450,7 +450,7 @@ class Bag(OpenedBag):
         return TypesAndTopicsTuple(dict(summary.types), topics)
 
     def set_encryptor(self, encryptor: str | None = None, param: str | None = None) -> None:
-        """Accept None, for no encryption. Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
+        """Accept None (no encryption). Raise ROSBagEncryptNotSupportedException for ``rosbag/AesCbcEncryptor``.
 
         Like the real module, raise ROSBagException if the bag already has chunks.
         """
@@ -474,7 +474,7 @@ class Bag(OpenedBag):
             return None
 
     def _create_reader(self) -> None:
-        """Create ``_reader``. Programs use it to access the bag's internals, and subclasses may set a different one."""
+        """Create ``_reader``, through which programs access the bag's internals. Subclasses may replace it."""
         self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
 
     # -- internal -------------------------------------------------------------------------------------------------
@@ -488,7 +488,7 @@ class Bag(OpenedBag):
         raw: bool,
         with_header: bool,
     ) -> Iterator[Any]:
-        """Yield the messages on these connections."""
+        """Yield these connections' messages."""
         from minirospy.client.time import Time
 
         kinds: list[type[Message] | None] = [None] * len(connections)
@@ -501,7 +501,7 @@ class Bag(OpenedBag):
                     kind = kinds[rank]
                     if kind is None:
                         kind = kinds[rank] = _get_message_type(connection)
-                    # Create the message without its constructor, which is slow; deserialize() sets every field.
+                    # Create the message without its slow constructor; deserialize() sets every field.
                     if raw:
                         position = at if chunk is None else (chunk, at)
                         message = connection.datatype, data[body:after], connection.md5sum, position, kind
@@ -520,7 +520,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
-        # The real module still has the data in memory after close(), so reopen the bag here.
+        # The real module keeps data in memory after close(), so reopen the bag here.
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=True) as bag:
                 return bag._summary(frequencies=frequencies)

@@ -20,7 +20,7 @@ __all__ = [
 
 
 class ROSBagException(Exception):
-    """The base class of rosbag's errors; ``value`` is the message."""
+    """Base class of rosbag's errors; ``value`` is the message."""
 
     def __init__(self, value: str | None = None) -> None:
         super().__init__(value)
@@ -31,21 +31,21 @@ class ROSBagException(Exception):
 
 
 class ROSBagFormatException(ROSBagException):
-    """Raised if the bag's bytes violate the format."""
+    """Raised if a bag's bytes violate the format."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
 
 
 class ROSBagUnindexedException(ROSBagException):
-    """Raised if the bag was not closed, or its index is damaged."""
+    """Raised if a bag was not closed or its index is damaged."""
 
     def __init__(self, *args: object) -> None:
         super().__init__("Unindexed bag")
 
 
 class ROSBagEncryptNotSupportedException(ROSBagException):
-    """Raised if the bag is encrypted or encryption was requested. Neither is supported."""
+    """Raised if a bag is encrypted or encryption was requested; neither is supported."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
@@ -60,7 +60,7 @@ class ROSBagEncryptException(ROSBagException):
 
 @contextmanager
 def as_ros_errors() -> Iterator[None]:
-    """Convert minirospy's bag errors to rosbag's exceptions, because programs catch those."""
+    """Convert minirospy's bag errors to rosbag's exceptions, which programs catch."""
     try:
         yield
     except BagError as error:

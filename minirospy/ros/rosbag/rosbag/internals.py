@@ -37,7 +37,7 @@ def make_time() -> Callable[[int], Time]:
 
 
 class _ConnectionInfo:
-    """A connection: ``id``, ``topic``, the header's fields, and the ``header``."""
+    """A connection: ``id``, ``topic``, the fields of its header, and the ``header`` itself."""
 
     def __init__(self, id: int, topic: str, header: Header) -> None:
         fields = {
@@ -64,7 +64,7 @@ class _ConnectionInfo:
 
 
 class _ChunkInfo:
-    """A chunk: its position ``pos``, start and end time, and message counts by connection."""
+    """A chunk: its position ``pos``, start and end time, and message counts per connection."""
 
     def __init__(self, pos: int, start_time: Time, end_time: Time) -> None:
         self.pos = pos
@@ -92,7 +92,7 @@ class _ChunkInfo:
 
 
 class _ChunkHeader:
-    """A chunk's header, and the position of the chunk's data."""
+    """A chunk's header, with the position of its data."""
 
     def __init__(
         self, compression: str, compressed_size: int, uncompressed_size: int, data_pos: int = 0
@@ -117,7 +117,7 @@ class _ChunkHeader:
 
 
 class _IndexEntry:
-    """A message's time and position. Entries compare by time. ``chunk_pos`` is None for version 1.2 bags."""
+    """A message's time and position. Entries compare by time. ``chunk_pos`` is None in version 1.2 bags."""
 
     __slots__ = ["chunk_pos", "offset", "time"]
 
@@ -155,7 +155,7 @@ class _IndexEntry:
 
 
 class _IndexEntry102(_IndexEntry):
-    """The index entry of a version 1.2 bag: a message's time and position in the file."""
+    """An index entry in a version 1.2 bag: a message's time and file position."""
 
     __slots__ = ()
 
@@ -164,7 +164,7 @@ class _IndexEntry102(_IndexEntry):
 
 
 class _IndexEntry200(_IndexEntry):
-    """The index entry of a version 2.0 bag: a message's time, and its position in a chunk."""
+    """An index entry in a version 2.0 bag: a message's time and its position in a chunk."""
 
     __slots__ = ()
 
@@ -173,7 +173,7 @@ class _IndexEntry200(_IndexEntry):
 
 
 class _Index(Sequence[_IndexEntry]):
-    """A connection's index entries as objects, created on access."""
+    """A connection's index entries, created as objects on access."""
 
     def __init__(self, index: ConnectionIndex) -> None:
         self.source = index
@@ -199,7 +199,7 @@ _message_types: dict[str, type[Message]] = {}
 
 
 def _get_message_type(info: _ConnectionInfo) -> type[Message]:
-    """Return the class for a connection's messages, built from the definition in the bag.
+    """Return the class for a connection's messages, built from the bag's definition.
 
     Raise ROSBagException if the definition is invalid.
     """

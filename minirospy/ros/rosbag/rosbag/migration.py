@@ -43,7 +43,7 @@ __all__ = [
 
 
 def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
-    """Return the migration path and the missing rules for each of a bag's types that needs migration.
+    """Return the migration path and missing rules for each type in a bag that needs migration.
 
     Raise ROSBagException if the bag cannot be read.
     """
@@ -52,12 +52,12 @@ def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
 
 
 def checkmessages(migrator: MessageMigrator, messages: Iterable[type[Message]]) -> list[Migration]:
-    """Return the migration path and the missing rules for each message class that needs migration."""
+    """Return the migration path and missing rules for each message class that needs migration."""
     return check_classes(migrator, messages)
 
 
 def fixbag(migrator: MessageMigrator, inbag: str, outbag: str) -> bool:
-    """Migrate a bag's messages into a new bag; return whether all of them could be migrated.
+    """Migrate a bag's messages into a new bag; return whether all could be migrated.
 
     Raise ROSBagException if the bag cannot be read.
     """
@@ -65,7 +65,7 @@ def fixbag(migrator: MessageMigrator, inbag: str, outbag: str) -> bool:
 
 
 def fixbag2(migrator: MessageMigrator, inbag: str, outbag: str, force: bool = False) -> list[Migration]:
-    """Migrate a bag's messages into a new bag; return the migrations without a rule.
+    """Migrate a bag's messages into a new bag; return the migrations that lack a rule.
 
     Raise ROSBagException if the bag cannot be read.
     """

@@ -22,11 +22,11 @@ FileArgument: TypeAlias = str | os.PathLike[str] | BinaryIO
 """A bag's source or target: a path or an open file."""
 
 CLOSED = "I/O operation on closed bag"
-FIRST_RECORD = len("#ROSBAG V2.0\n")  # position of the file header's record
+FIRST_RECORD = len("#ROSBAG V2.0\n")  # position of the file header record
 
 
 class OpenedBag(PrivateBag):
-    """A bag's state: its file, and its reader or writer."""
+    """An open bag: its file, and its reader or writer."""
 
     def __init__(self, mode: str, compression: str, chunk_threshold: int) -> None:
         self._compression = compression
@@ -39,11 +39,11 @@ class OpenedBag(PrivateBag):
         """The file's reader. It is not named ``_reader``, because programs may replace an attribute of that name."""
         self._writer: BagWriter | None = None
         self._file_header_pos = FIRST_RECORD
-        self._is_read = False  # set if a read may have moved the file's position since the last write
+        self._is_read = False  # whether a read may have moved the file position since the last write
 
     @property
     def _index_data_pos(self) -> int:
-        """Return the position of the connection records and chunk infos; 0 if the bag is being written or has no index."""
+        """Return the position of the connection and chunk info records, or 0 if the bag is being written or has no index."""
         return (
             self._source.index_position
             if isinstance(self._source, ChunkedReader) and self._mode == "r"
@@ -52,11 +52,11 @@ class OpenedBag(PrivateBag):
 
     @property
     def _output_file(self) -> BinaryIO | None:
-        """Return the file to write to. In the real module, this attribute is the file if no chunk is open."""
+        """Return the output file. In the real module, this attribute is the file only if no chunk is open."""
         return self._file
 
     def _current(self) -> BagReader:
-        """Return the reader, with the connections and chunks written so far."""
+        """Return a reader that includes the connections and chunks written so far."""
         stream = self._open_file()
         reader = self._source
         if reader is None:
@@ -119,7 +119,7 @@ class OpenedBag(PrivateBag):
         self._source = None
 
     def _take(self, f: Any, mode: str) -> BinaryIO:
-        """Return ``f`` if it is an open file; otherwise, open it as a path."""
+        """Return ``f`` if it is an open file; otherwise open it as a path."""
         if not self._is_file(f):
             self._filename = f
             return cast("BinaryIO", open(f, mode))
@@ -129,7 +129,7 @@ class OpenedBag(PrivateBag):
 
     @staticmethod
     def _is_file(f: object) -> bool:
-        """Return whether ``f`` is an open file as opposed to a path."""
+        """Return whether ``f`` is an open file, not a path."""
         return isinstance(f, io.IOBase)
 
     def _open_file(self) -> BinaryIO:

@@ -34,7 +34,7 @@ ConnectionFilter = Callable[[str, str, str, str, Header], object]
 
 
 class BagMessage(NamedTuple):
-    """A message with its topic and time. If ``raw``, the message is a tuple: type, bytes, md5sum, position and class."""
+    """A message with its topic and time. If ``raw``, the message is (type, bytes, md5sum, position, class)."""
 
     topic: str
     message: object
@@ -42,7 +42,7 @@ class BagMessage(NamedTuple):
 
 
 class BagMessageWithConnectionHeader(NamedTuple):
-    """A message together with its publisher's connection header."""
+    """A message with its publisher's connection header."""
 
     topic: str
     message: object
@@ -51,16 +51,16 @@ class BagMessageWithConnectionHeader(NamedTuple):
 
 
 class PrivateBag(ABC):
-    """Provides the private attributes of rosbag.Bag."""
+    """Provides rosbag.Bag's private attributes."""
 
     _file: BinaryIO | None
-    _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
+    _connection_indexes_read = False  # whether the index has been read, or is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
     """The chunks that a program has assigned to replace the bag's own, or None."""
 
     @abstractmethod
     def _current(self) -> BagReader:
-        """Return the reader, with the connections and chunks written so far."""
+        """Return a reader that includes the connections and chunks written so far."""
 
     @abstractmethod
     def flush(self) -> None:
@@ -107,16 +107,16 @@ class PrivateBag(ABC):
 
     @property
     def _topic_connections(self) -> dict[str, _ConnectionInfo]:
-        """Return each topic's newest connection, for writing."""
+        """Return each topic's newest connection, for use when writing."""
         return {connection.topic: connection for connection in self._connections.values()}
 
     def _clear_index(self) -> None:
-        """Forget the chunks that a program has assigned."""
+        """Discard the chunks that a program has assigned."""
         self._chunks_of_program = None
 
     @contextlib.contextmanager
     def _position_kept(self) -> Iterator[None]:
-        """Restore the file's position after the block.
+        """Restore the file position after the block.
 
         The program may be reading records there; the real module has this data in memory.
         """
@@ -148,7 +148,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position, given in the format that index entries and raw messages use."""
+        """Return the message at a position, given in the format of index entries and raw messages."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)
@@ -170,7 +170,7 @@ class PrivateBag(ABC):
         topics: str | Iterable[str] | None = None,
         connection_filter: ConnectionFilter | None = None,
     ) -> Iterator[_ConnectionInfo]:
-        """Yield the connections on these topics that the filter accepts."""
+        """Yield the connections on these topics that pass the filter."""
         wanted = {topics} - {""} if isinstance(topics, str) else set(topics or ())
         canonical = {canonicalize(topic) for topic in wanted if topic}
         for each in self._connections.values():
@@ -188,7 +188,7 @@ class PrivateBag(ABC):
         start_time: Time | None = None,
         end_time: Time | None = None,
     ) -> Iterator[_IndexEntry]:
-        """Yield the index entries of these connections in time order."""
+        """Yield these connections' index entries in time order."""
         return self._merged(connections, start_time, end_time, backwards=False)
 
     def _get_entries_reverse(
@@ -197,7 +197,7 @@ class PrivateBag(ABC):
         start_time: Time | None = None,
         end_time: Time | None = None,
     ) -> Iterator[_IndexEntry]:
-        """Yield the index entries of these connections in reverse time order."""
+        """Yield these connections' index entries in reverse time order."""
         return self._merged(connections, start_time, end_time, backwards=True)
 
     def _get_entry(self, t: Time, connections: Iterable[_ConnectionInfo] | None = None) -> _IndexEntry | None:

@@ -22,7 +22,7 @@ __all__: list[str] = []
 
 
 class _BagReader:
-    """The reader for ``bag``, for any format version."""
+    """Reads ``bag``, in any format version."""
 
     def __init__(self, bag: OpenedBag) -> None:
         self.bag = bag
@@ -30,7 +30,7 @@ class _BagReader:
     def seek_and_read_message_data_record(
         self, position: Position, raw: bool, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at an index entry's position. Raise ROSBagException if the message cannot be read."""
+        """Return the message at an index entry's position. Raise ROSBagException if it cannot be read."""
         return self.bag._read_message(position, raw, return_connection_header)
 
     def read_messages(
@@ -49,27 +49,27 @@ class _BagReader:
 
 
 class _BagReader200(_BagReader):
-    """The reader for a version 2.0 bag."""
+    """Reads a version 2.0 bag."""
 
     def prepare(self) -> None:
-        """Read the index now if a subclass overrides the method that reads it."""
+        """Read the index now if a subclass overrides the method for it."""
         if type(self)._read_connection_index_records is not _BagReader200._read_connection_index_records:
             self._read_connection_index_records()
 
     def _read_connection_index_records(self) -> None:
-        """Read the index. Before that, a subclass may replace the bag's ``_chunks`` with an iterable that counts the chunks."""
+        """Read the index. A subclass may first replace the bag's ``_chunks`` with an iterable that counts them."""
         for _ in self.bag._chunks:
-            # The first iteration reads the whole index in one pass through the file.
+            # The first iteration reads the whole index in one pass over the file.
             if not self.bag._connection_indexes_read:
                 self.bag._connection_indexes_read = self.bag._connection_indexes is not None
 
     def read_file_header_record(self) -> None:
-        """Read the file header's record at the file's position."""
+        """Read the file header record at the file position."""
         records._read_header(self.bag._open_file(), records._OP_FILE_HEADER)
         records._skip_sized(self.bag._open_file())
 
     def read_chunk_header(self) -> _ChunkHeader:
-        """Return the chunk header at the file's position. Raise ROSBagFormatException if there is no chunk header."""
+        """Return the chunk header at the file position. Raise ROSBagFormatException if there is none."""
         file = self.bag._open_file()
         header = records._read_header(file, records._OP_CHUNK)
         compression = records._read_str_field(header, "compression")
@@ -78,7 +78,7 @@ class _BagReader200(_BagReader):
         return _ChunkHeader(compression, compressed_size, size, file.tell())
 
     def read_connection_record(self, f: BinaryIO, encrypt: bool = False) -> _ConnectionInfo:
-        """Return the connection whose record is next in ``f``.
+        """Return the connection in the next record of ``f``.
 
         Raise ROSBagFormatException if the next record is not a connection.
         """
@@ -91,7 +91,7 @@ class _BagReader200(_BagReader):
         )
 
     def read_chunk_info_record(self) -> _ChunkInfo:
-        """Return the chunk info at the file's position. Raise ROSBagFormatException if there is no chunk info."""
+        """Return the chunk info at the file position. Raise ROSBagFormatException if there is none."""
         file = self.bag._open_file()
         header = records._read_header(file, records._OP_CHUNK_INFO)
         info = _ChunkInfo(
@@ -99,7 +99,7 @@ class _BagReader200(_BagReader):
             records._read_time_field(header, "start_time"),
             records._read_time_field(header, "end_time"),
         )
-        records._read_uint32(file)  # the message's length is part of the size
+        records._read_uint32(file)  # skip the message length, already included in the size
         for _ in range(records._read_uint32_field(header, "count")):
             number = records._read_uint32(file)
             info.connection_counts[number] = records._read_uint32(file)

@@ -89,7 +89,7 @@ _OP_CODES = {
 _VERSION = "#ROSBAG V2.0"
 _INDEX_VERSION = 1
 _CHUNK_INDEX_VERSION = 1
-_FILE_HEADER_LENGTH = 4096  # bytes of the file header's fields and padding
+_FILE_HEADER_LENGTH = 4096  # bytes of the file header's fields and padding together
 
 Header = dict[str, bytes]
 _T = TypeVar("_T")
@@ -143,7 +143,7 @@ def _decode_str(v: str | bytes) -> str:
 
 
 def _median(values: Sequence[float]) -> float:
-    """Return the median; NaN if there are no values."""
+    """Return the median, or NaN if there are no values."""
     if not values:
         return math.nan
     ordered, middle = sorted(values), len(values) // 2
@@ -151,7 +151,7 @@ def _median(values: Sequence[float]) -> float:
 
 
 def _time_to_str(secs: float) -> str:
-    """Return a time as `rosbag info` prints it."""
+    """Format a time like `rosbag info`."""
     hundredths = f"{secs % 1:.2f}"[1:]
     return time.strftime("%b %d %Y %H:%M:%S", time.localtime(secs)) + hundredths
 
@@ -210,7 +210,7 @@ def _skip_record(f: BinaryIO) -> None:
 
 
 def _read_record_data(f: BinaryIO) -> bytes:
-    """Return a record's data, after its header has been read. Raise ROSBagFormatException if the data is incomplete."""
+    """Return a record's data after its header was read. Raise ROSBagFormatException if the data is incomplete."""
     try:
         return _read_sized(f)
     except ROSBagException as error:
@@ -218,7 +218,7 @@ def _read_record_data(f: BinaryIO) -> bytes:
 
 
 def _read_header(f: BinaryIO, req_op: int | None = None) -> Header:
-    """Return a record's header. Raise ROSBagFormatException if the header is invalid, or its operation is not ``req_op``."""
+    """Return a record's header. Raise ROSBagFormatException if it is invalid or its operation is not ``req_op``."""
     try:
         data = _read_sized(f)
     except ROSBagException as error:
@@ -248,7 +248,7 @@ def _build_header_from_str(header_str: bytes, req_op: int | None) -> Header:
 
 
 def _peek_next_header_op(f: BinaryIO) -> int:
-    """Return the operation of the next record without advancing the file's position."""
+    """Return the next record's operation without moving the file position."""
     position = f.tell()
     header = _read_header(f)
     op = _read_uint8_field(header, "op")
@@ -294,14 +294,14 @@ def _read_time_field(header: Mapping[str, bytes], field: str) -> Time:
 
 
 def _write_sized(f: BinaryIO, v: bytes | str) -> None:
-    """Write the bytes with a length prefix."""
+    """Write bytes with a length prefix."""
     data = v.encode() if isinstance(v, str) else v
     f.write(_pack_uint32(len(data)))
     f.write(data)
 
 
 def _write_header(f: BinaryIO, header: Mapping[str, bytes | str]) -> bytes:
-    """Write a record's header with its length; return the fields' bytes."""
+    """Write a record's header with its length; return the header's bytes."""
     buffer = io.BytesIO()
     for name, value in header.items():
         _write_sized(buffer, f"{name}=".encode() + (value.encode() if isinstance(value, str) else value))
@@ -313,7 +313,7 @@ def _write_header(f: BinaryIO, header: Mapping[str, bytes | str]) -> bytes:
 def _write_record(
     f: BinaryIO, header: Mapping[str, bytes | str], data: bytes | str = "", padded_size: int | None = None
 ) -> None:
-    """Write a record. If ``padded_size`` is given, pad the data with spaces so that header and data take that many bytes."""
+    """Write a record. If ``padded_size`` is given, pad the data with spaces to give header and data that total size."""
     written = _write_header(f, header)
     if padded_size is not None:
         data = " " * max(0, padded_size - len(written))

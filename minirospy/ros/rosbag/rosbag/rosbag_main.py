@@ -20,7 +20,7 @@ __all__ = [
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command, and exit if it fails."""
+    """Run the command and exit if it fails."""
     _run(list(sys.argv if argv is None else argv)[1:])
 
 

@@ -38,16 +38,16 @@ _NO_EXECUTABLE = 3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the program's exit status, or one from minirospy.command.command if it cannot be run."""
+    """Run the command; return the program's exit status, or one from minirospy.command.command if it cannot start."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # Leave interrupts alone, because the program decides how to handle signals.
+    # Do not handle interrupts: the program decides how to handle signals.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
 def _rosrun(words: list[str]) -> int:
     prefix: list[str] = []
     debug = False
-    # Parse by hand: words after EXECUTABLE belong to the program, even if they look like rosrun's options.
+    # Parse by hand: words after EXECUTABLE belong to the program, even if they look like rosrun options.
     while words and words[0].startswith("-"):
         option, equals, value = words.pop(0).partition("=")
         if option in ("-h", "--help"):
@@ -86,7 +86,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return a hint for a missing program or package. Raise NotFoundError if no similar name is found."""
+    """Return a hint about a missing program or package. Raise NotFoundError if no similar name exists."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -108,7 +108,7 @@ def _has(packages: Packages, package: str, program: str) -> bool:
 
 
 def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
-    """Return the commands that run a program.
+    """Return the possible commands for running a program.
 
     Raise WordedError, with the exit status of ROS's rosrun, if the program does not exist.
     """
@@ -139,7 +139,7 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """Prompt the user to choose one of several programs with the same name, and return its command.
+    """Prompt the user to choose between programs with the same name; return the command for the chosen one.
 
     Raise UsageError at end of input.
     """
@@ -158,9 +158,9 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 
 
 def become(command: list[str]) -> int:
-    """Replace this process with the program, which then receives its signals and determines its exit status."""
+    """Replace this process with the program, which then receives all signals and sets the exit status."""
     if sys.platform == "win32":
-        # On Windows, exec detaches the program from the console, so wait for it instead, and let it handle Ctrl-C.
+        # On Windows, exec detaches the program from the console: wait for it instead, and let it handle Ctrl-C.
         try:
             with guard_children(), subprocess.Popen(command) as popen:
                 while True:
@@ -175,7 +175,7 @@ def become(command: list[str]) -> int:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
-            # Like a shell, run a script that has no `#!` line with sh.
+            # Like a shell, run a script without a `#!` line with sh.
             os.execv("/bin/sh", ["/bin/sh", *command])
 
         why = error.strerror or str(error)

@@ -79,7 +79,7 @@ def _purge_oldest(logs: _Logs, megabytes: int, *, yes: bool) -> None:
 
 
 def _places() -> list[_Logs]:
-    """Return the log folders that exist."""
+    """Return the existing log folders."""
     from minirospy.workspace.folders import log_dir, ros_home
 
     places = (
@@ -90,7 +90,7 @@ def _places() -> list[_Logs]:
 
 
 def _agreed(command: str) -> bool:
-    """Prompt for confirmation of ``command`` until y or n is typed; return whether it was y."""
+    """Prompt for confirmation of ``command`` until the user types y or n; return whether it was y."""
     question = f"PLEASE BE CAREFUL TO VERIFY THE COMMAND BELOW!\nOkay to perform:\n\n{command}\n(y/n)?"
     while True:
         print(question, flush=True)
@@ -103,7 +103,7 @@ def _agreed(command: str) -> bool:
 
 
 def _remove_oldest(folder: Path, excess: int) -> None:
-    """Remove entries from a folder, oldest first, until ``excess`` bytes have been removed."""
+    """Remove a folder's entries, oldest first, until ``excess`` bytes are removed."""
     entries = [path for path in folder.iterdir() if not path.is_symlink()]
     for path in sorted(entries, key=lambda path: path.stat().st_mtime):
         if excess <= 0:
@@ -111,7 +111,7 @@ def _remove_oldest(folder: Path, excess: int) -> None:
         excess -= _size(path)
         _remove(path)
     for link in folder.iterdir():
-        # Remove the link `latest` if its target has been removed.
+        # Remove the link `latest` if its target is gone.
         if link.is_symlink() and not link.exists():
             link.unlink()
 
@@ -127,7 +127,7 @@ def _remove(path: Path) -> None:
 
 
 def _statuses(path: Path) -> Iterator[os.stat_result]:
-    """Yield the stat results for a path and everything below it. Skip entries that disappear in the meantime."""
+    """Yield the stat results of a path and everything below it. Skip entries that disappear meanwhile."""
     for each in (path, *path.rglob("*")):
         try:
             yield each.lstat()
@@ -140,7 +140,7 @@ def _size(path: Path) -> int:
 
 
 def disk_usage(folder: Path) -> int:
-    """Return a folder's size on disk in bytes, rounded up to blocks. On Windows, assume a block size."""
+    """Return a folder's disk usage in bytes, rounded up to blocks (on Windows, to an assumed block size)."""
     return sum(
         status.st_blocks * 512
         if hasattr(status, "st_blocks")

@@ -12,7 +12,7 @@ __all__ = ["CleanupException", "get_disk_usage", "get_human_readable_disk_usage"
 
 
 class CleanupException(Exception):
-    """Raised if the size of a folder cannot be determined."""
+    """Raised if a folder's size cannot be determined."""
 
 
 def get_disk_usage(d: str) -> int:
@@ -23,7 +23,7 @@ def get_disk_usage(d: str) -> int:
 
 
 def get_human_readable_disk_usage(d: str) -> str:
-    """Return a folder's disk usage in the format of `du -h`. Raise CleanupException if the folder does not exist."""
+    """Return a folder's disk usage, formatted like `du -h`. Raise CleanupException if the folder does not exist."""
     return human_size(get_disk_usage(d))
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAMILY", "main"]
 
-# Levels in rosgraph_msgs/Log, keyed by lowercase name.
+# Levels of rosgraph_msgs/Log, by lowercase name.
 _LEVELS = {name.lower(): level for level, name in LEVEL_NAMES.items()}
 
 _COLOURS = {"debug": 92, "info": 97, "warn": 93, "error": 91, "fatal": 95}

@@ -52,7 +52,7 @@ _TOOLS = frozenset(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status, 1 if a dependency is missing."""
+    """Run the command; return 1 if a dependency is missing, else 0."""
     return FAMILY.main(argv)
 
 
@@ -98,7 +98,7 @@ def _parser(verb: str, description: str) -> Parser:
 def _missing(
     packages: Sequence[str], from_paths: Sequence[Path], skip_keys: Sequence[str], *, everything: bool
 ) -> dict[str, list[str]]:
-    """Return the missing keys, each with the packages that depend on it.
+    """Return the missing keys with the packages that depend on them.
 
     Raise NotFoundError if a package does not exist, ManifestError if its manifest is invalid, UsageError if no package is
     given or a folder does not exist.
@@ -130,7 +130,7 @@ def _missing(
 
 
 def _module(key: str) -> tuple[str, str] | None:
-    """Return the module and the PyPI name for a rosdep key, or None if the key is not for a Python package."""
+    """Return the module and PyPI name for a rosdep key, or None if the key is not for a Python package."""
     match = _PYTHON_KEY.match(key)
     if match is None:
         return None
@@ -147,7 +147,7 @@ def _is_installed(key: str) -> bool:
 
 
 def _says(keys: dict[str, list[str]]) -> Iterator[str]:
-    """Yield a line for each key, with the packages that depend on it and how to install it."""
+    """Yield a line for each key: the packages that depend on it and how to install it."""
     for key, packages in keys.items():
         module = _module(key)
         how = install_command(module[1]) if module else "no package of Python or of ROS here"
@@ -229,7 +229,7 @@ class _IgnoringParser(Parser):
     """Accepts and ignores any arguments."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return no arguments, ignoring the words."""
+        """Ignore the words and return no arguments."""
         return {}
 
 

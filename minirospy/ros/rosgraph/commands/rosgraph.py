@@ -43,7 +43,7 @@ class _RosgraphParser(Parser):
         return _ROS_HELP + super().format_help()
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Print ROS's help to stdout, and raise CommandLineError with ``message``."""
+        """Print ROS's help to stdout and raise CommandLineError with ``message``."""
         sys.stdout.write(_ROS_HELP)
         super().error(message, ros)
 

@@ -37,7 +37,7 @@ __all__ = [
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without the arguments that contain ``:=``.
+    """Return the command line without arguments that contain ``:=``.
 
     Unlike this function, `rospy.myargv` keeps arguments that do not start with a name.
     """

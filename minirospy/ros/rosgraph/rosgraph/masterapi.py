@@ -1,8 +1,8 @@
 """The Master API for Python programs: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 # mypy: disable-error-code="no-any-return"
-# The annotations state what a master should return.
-# Values are returned unchanged, because a program may replace the master.
+# The annotations state what a master should return;
+# values are returned unchecked, because a program may replace the master.
 
 from __future__ import annotations
 
@@ -38,26 +38,26 @@ ROSMasterException = MasterException  # an older name for MasterException
 
 
 class MasterFailure(MasterException):
-    """Raised if the call failed on the master."""
+    """Raised if a call failed on the master."""
 
 
 class MasterError(MasterException):
-    """Raised if the master rejected the call, because of an unknown name or a bad argument."""
+    """Raised if the master rejected a call because of an unknown name or a bad argument."""
 
 
 Error, Failure = MasterError, MasterFailure
 
 
 class Master:
-    """A proxy for the master at ``master_uri`` (default: from the environment); calls are made as node ``caller_id``."""
+    """Calls the master at ``master_uri`` (default: from the environment) as node ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
-        # Remove the trailing slash, like ROS's rosgraph.
+        # Like ROS's rosgraph, remove the trailing slash.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._reinit(master_uri or get_master_uri())
 
     def _reinit(self, master_uri: str) -> None:
-        """Use the master at another URI for all later calls."""
+        """Use the master at this URI for all later calls."""
         self.master_uri = master_uri
         try:
             parse_http_host_and_port(master_uri)
@@ -65,12 +65,12 @@ class Master:
             raise ValueError(f"invalid master URI: {master_uri}") from error
         self.__dict__.pop("handle", None)
         self._proxy = MasterProxy(master_uri, self.caller_id)
-        # Close the connections when the object is garbage-collected, because ROS's Master has no close().
+        # Close the connections on garbage collection, because ROS's Master has no close().
         weakref.finalize(self, self._proxy.close)
 
     @cached_property
     def handle(self) -> Any:
-        """Return the master as an `xmlrpc.client.ServerProxy`, with methods that return (code, text, value).
+        """Return the master as an `xmlrpc.client.ServerProxy`, whose methods return (code, text, value).
 
         From then on, all calls use this proxy, because a program may replace the proxy or one of its methods.
         """
@@ -96,7 +96,7 @@ class Master:
             raise MasterException(str(error)) from error
 
     def _succeed(self, args: tuple[int, str, Any]) -> Any:
-        """Return the value from a response. Raise MasterError or MasterFailure if the call failed."""
+        """Return a response's value. Raise MasterError or MasterFailure if the call failed."""
         code, text, value = args
         if code == 1:
             return value
@@ -155,7 +155,7 @@ class Master:
         return self._call("deleteParam", key)
 
     def searchParam(self, key: str) -> str:
-        """Search upwards from the caller's namespace for a parameter called ``key``; return its full name."""
+        """Search upwards from the caller's namespace for the parameter ``key``; return its full name."""
         return self._call("searchParam", key)
 
     def getParamNames(self) -> list[str]:

@@ -65,7 +65,7 @@ REMAP_PATTERN = re.compile(r"^([\~\/A-Za-z]|_|__)[\w\/]*:=.*")
 
 
 def is_legal_remap(arg: str | None) -> bool:
-    """Return whether a command-line argument is a remapping."""
+    """Return whether a command-line argument is a name remapping."""
     return arg is not None and REMAP_PATTERN.match(arg) is not None
 
 
@@ -75,15 +75,15 @@ def is_legal_name(name: str | None) -> bool:
 
 
 def is_legal_base_name(name: str | None) -> bool:
-    """Return whether a string is a legal graph name without namespaces."""
+    """Return whether a string is a legal graph name without a namespace."""
     return name is not None and _names.is_legal_base_name(name)
 
 
 def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return the global name for ``name`` in the node ``namespace_``, after remapping."""
+    """Resolve ``name`` in the node ``namespace_`` to a global name, after remapping."""
     name = canonicalize_name(name)
     if not is_global(name) and not is_private(name):
-        # Raise ValueError if ``namespace_`` is not a name.
+        # Raise ValueError if ``namespace_`` is invalid.
         namespace(namespace_)
     return _names.resolve(name, namespace_, remappings)
 
@@ -99,7 +99,7 @@ def make_caller_id(name: str) -> str:
 
 
 def script_resolve_name(script_name: str, name: str) -> str:
-    """Return the global name for an argument given to the command ``script_name``."""
+    """Resolve a name given to the command ``script_name`` to a global name."""
     if not name:
         return get_ros_namespace()
     if is_global(name):

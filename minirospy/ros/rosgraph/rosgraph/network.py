@@ -43,11 +43,11 @@ __all__ = [
 
 
 class ROSHandshakeException(Exception):
-    """Raised if the connection header is incomplete or cannot be parsed."""
+    """Raised if a connection header is incomplete or cannot be parsed."""
 
 
 def get_address_override() -> str | None:
-    """Return the value of ``__hostname:=``, ``__ip:=``, ROS_HOSTNAME or ROS_IP, or None if none of these is set.
+    """Return the value of ``__hostname:=``, ``__ip:=``, ROS_HOSTNAME or ROS_IP, or None if none is set.
 
     With MINIROSPY_LOCAL=1, return localhost. Programs may change sys.argv and the environment at any time, so both are read
     at each call. Raise ValueError if the argument contains a second ``:=``.
@@ -63,7 +63,7 @@ def get_address_override() -> str | None:
 
 
 def get_host_name() -> str:
-    """Return the host name under which other nodes reach this machine."""
+    """Return the host name that other nodes use for this machine."""
     return _environment().host
 
 
@@ -72,7 +72,7 @@ def _environment() -> Environment:
 
 
 def get_local_address() -> str:
-    """Return the address at which other nodes reach this machine."""
+    """Return the address that other nodes use for this machine."""
     host = get_address_override()
     if host:
         return host
@@ -107,7 +107,7 @@ def use_ipv6() -> bool:
 
 
 def get_bind_address(address: str | None = None) -> str:
-    """Return the address that servers should bind to."""
+    """Return the address for servers to bind to."""
     return (Environment.read(host=address) if address else _environment()).bind_host
 
 
@@ -148,7 +148,7 @@ def _as_bytes(text: object) -> bytes:
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
-    """Return the fields in a connection header with a length prefix.
+    """Return the fields in a connection header, given with its length prefix.
 
     Raise ROSHandshakeException or struct.error if the header cannot be parsed.
     """
@@ -165,7 +165,7 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
 
 
 def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -> dict[str, str]:
-    """Read a connection header from a socket; bytes received after the header remain in the buffer ``b``.
+    """Read a connection header from a socket; bytes received after it remain in the buffer ``b``.
 
     Raise ROSHandshakeException if the peer closes the connection before the end of the header.
     """

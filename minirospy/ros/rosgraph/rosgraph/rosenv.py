@@ -28,7 +28,7 @@ DEFAULT_MASTER_URI = f"http://localhost:{DEFAULT_MASTER_PORT}/"
 
 
 def get_master_uri(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the master URI from the first ``__master:=`` on the command line, or from the environment.
+    """Return the master URI from the command line's first ``__master:=``, or from the environment.
 
     Raise ValueError if the argument is empty or contains another ``:=``.
     """

@@ -4,7 +4,7 @@ __all__ = ["fullusage", "rosgraph_main"]
 
 
 def rosgraph_main() -> None:
-    """Run the command with this process's arguments, and exit."""
+    """Run the command with this process's arguments and exit."""
     import sys
 
     from minirospy.ros.rosgraph.commands.rosgraph import main

@@ -21,8 +21,8 @@ __all__ = [
     "renew_latest_logdir",
 ]
 
-_FILE_BYTES = 50_000_000  # size in bytes above which a new log file is started
-_FILE_BACKUPS = 4  # number of earlier log files to keep
+_FILE_BYTES = 50_000_000  # bytes after which a new log file is started
+_FILE_BACKUPS = 4  # number of old log files to keep
 _FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 
 
@@ -31,13 +31,13 @@ class LoggingException(Exception):
 
 
 class RospyLogger(logging.Logger):
-    """rospy's logger class. minirospy does not need it, but programs patch it."""
+    """rospy's logger class, which minirospy does not need but programs patch."""
 
 
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder; log `rosout` records to the terminal too. Return the file's path.
+    """Log to a file in the log folder, and `rosout` records also to the terminal. Return the file's path.
 
     Replace the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file
     (ROS_PYTHON_LOG_CONFIG_FILE, or a file in ROS_HOME) takes precedence over these settings. Set ROS_LOG_FILENAME to the path.
@@ -73,7 +73,7 @@ def configure_logging(
         return path
 
     class RotatingFileHandler(LogFileHandler):
-        """A log file handler under the class name that ROS programs expect among the root logger's handlers."""
+        """Writes log files, under the class name that programs look for among the root logger's handlers."""
 
     try:
         file = RotatingFileHandler(Path(path), _FILE_BYTES, _FILE_BACKUPS)
@@ -90,7 +90,7 @@ def configure_logging(
 
 
 def makedirs_with_parent_perms(p: str) -> None:
-    """Create a folder and its parents with the owner and the permissions of the nearest existing parent."""
+    """Create a folder and its parents with the owner and permissions of the nearest existing parent."""
     path = os.path.abspath(p)
     parent = os.path.dirname(path)
     if os.path.exists(path) or parent == path:
@@ -101,7 +101,7 @@ def makedirs_with_parent_perms(p: str) -> None:
     except FileExistsError:
         return  # another process has created the folder in the meantime
     wanted, made = os.stat(parent), os.stat(path)
-    # Only root may change a folder's owner. Without root, a folder in /tmp, which root owns, keeps the user as its owner.
+    # Only root may change a folder's owner; otherwise the user owns it, even in /tmp, which root owns.
     with contextlib.suppress(PermissionError):
         if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
             os.chown(path, wanted.st_uid, wanted.st_gid)
@@ -110,7 +110,7 @@ def makedirs_with_parent_perms(p: str) -> None:
 
 
 def renew_latest_logdir(logfile_dir: str) -> bool:
-    """Create a link `latest` next to a run's folder, pointing to that folder. Return False if `latest` is not a link."""
+    """Create a link `latest` to a run's folder, next to that folder. Return False if a `latest` exists that is not a link."""
     latest = os.path.join(os.path.dirname(logfile_dir), "latest")
     if os.path.lexists(latest):
         if not os.path.islink(latest):
@@ -120,7 +120,7 @@ def renew_latest_logdir(logfile_dir: str) -> bool:
     return True
 
 
-# Programs read and change these private names of ROS's module.
+# Programs use these private names of ROS's module.
 _color_reset = "\033[0m"
 _logging_to_rospy_names = {
     "DEBUG": ("DEBUG", "\033[32m"),

@@ -28,7 +28,7 @@ _log = logging.getLogger("xmlrpc")
 
 
 class SilenceableXMLRPCRequestHandler(SimpleXMLRPCRequestHandler):
-    """Handles HTTP/1.1 requests, and logs them only if the server's ``logRequests`` is set."""
+    """Handles HTTP/1.1 requests and logs them only if the server's ``logRequests`` is set."""
 
     protocol_version = "HTTP/1.1"
     rpc_paths = ()
@@ -48,12 +48,12 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
     def __init__(self, addr: tuple[str, int], log_requests: int = 1) -> None:
         super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
         self._serving = threading.Lock()
-        # set because shutdown() would wait forever if serve_forever() was never called
+        # without this flag, shutdown() would wait forever if serve_forever() was never called
         self._is_serving = False
         self._is_closed = False
 
     def serve_forever(self, poll_interval: float = 0.5) -> None:
-        """Handle requests until :meth:`close` is called. Return immediately if it was called before."""
+        """Handle requests until :meth:`close` is called; return immediately if it already was."""
         with self._serving:
             if self._is_closed:
                 return
@@ -69,22 +69,22 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         self.server_close()
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """Log an error, such as a disconnected peer, at debug level only."""
+        """Log an error, such as a disconnected peer, only at debug level."""
         _log.debug("connection from %s", client_address, exc_info=True)
 
 
 class XmlRpcHandler:
-    """The base class of objects served by an :class:`XmlRpcNode`: all methods without a leading underscore."""
+    """Base class of objects served by an :class:`XmlRpcNode`, which serves all methods without a leading underscore."""
 
     def _ready(self, uri: str) -> None:
-        """Respond to the server's start at ``uri``; subclasses override this method."""
+        """Do nothing. Called when the server has started at ``uri``; subclasses may override this method."""
 
     def _shutdown(self, reason: str) -> None:
-        """Respond to the server's shutdown; subclasses override this method."""
+        """Do nothing. Called when the server shuts down; subclasses may override this method."""
 
 
 class XmlRpcNode:
-    """Serves the methods of ``rpc_handler`` in a thread after :meth:`start`; ``uri`` is the server's address.
+    """Serves the methods of ``rpc_handler`` in a thread after :meth:`start`. ``uri`` is the server's address.
 
     If the server's thread fails, ``on_run_error`` is called with the exception.
     """
@@ -131,13 +131,13 @@ class XmlRpcNode:
             self.on_run_error(error)
 
     def _run(self) -> None:
-        """Start the server and handle requests; subclasses override this method to add steps before or after."""
+        """Start the server and handle requests. Subclasses may override this method to add steps."""
         self._run_init()
         if self.server is not None:
             self.server.serve_forever(poll_interval=0.1)
 
     def _run_init(self) -> None:
-        """Start the server and set ``uri``, without handling requests. Raise OSError if the port is not available."""
+        """Start the server and set ``uri`` without handling requests. Raise OSError if the port is unavailable."""
         address, port = get_bind_address(), int(self.port or 0)
         _log.info("XML-RPC server binding to %s:%d", address, port)
         try:

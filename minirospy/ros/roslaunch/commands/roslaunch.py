@@ -70,7 +70,7 @@ class LaunchOptions(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 1 if a required node failed, otherwise an exit status as in minirospy.command.command."""
+    """Run the command; return 1 if a required node failed, else an exit status as in minirospy.command.command."""
     return COMMAND.main(argv)
 
 
@@ -297,7 +297,7 @@ def _seconds(text: str) -> float:
 
 
 def _warn_of_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
-    """Warn about arguments that no file declares. Real roslaunch ignores them, but most are typos."""
+    """Warn about arguments that no file declares: real roslaunch ignores them, but most are typos."""
     for name in args:
         if name not in spec.args:
             warn(_unknown(name, spec))

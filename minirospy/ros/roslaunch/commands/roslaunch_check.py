@@ -86,7 +86,7 @@ def _faults(file: Path, *, ignore_unset_args: bool) -> list[str]:
 
 
 def _test_name(path: Path) -> str:
-    """Return the test's name, ``package_launch_file_launch``."""
+    """Return the test name ``package_launch_file_launch``."""
     for folder in (path, *path.parents):
         name = package_name(folder) if folder.is_dir() else None
         if name:

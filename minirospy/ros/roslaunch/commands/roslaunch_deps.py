@@ -48,7 +48,7 @@ def _deps(files: Sequence[str], verbose: bool, warn: bool) -> int:
         _print_files(needs)
     own = package_of(files[0])
     wanted = {package for what in needs.values() for package in what.packages}
-    # Print the package that contains the files only if they depend on no other.
+    # Omit the files' own package, unless it is the only one.
     print(" ".join(sorted(wanted - {own} or wanted)))
     if warn:
         print("\nMissing declarations:")

@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def get_run_id() -> str | None:
-    """Return the current run's id, or None if no master responds or the master has no run id."""
+    """Return the current run id, or None if no master responds or it has no run id."""
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
     try:
         return str(master.get_param("/run_id"))

@@ -16,7 +16,7 @@ __all__ = ["describe_args", "resolved_arg_docs"]
 
 
 def describe_args(file: str) -> list[ArgDoc]:
-    """Return the arguments that a file declares, without loading the files that it includes.
+    """Return the arguments that a file declares, without loading its includes.
 
     Raise LaunchError if the file cannot be read or parsed.
     """

@@ -14,7 +14,7 @@ __all__ = ["faults_of", "find_problems", "problem_line"]
 
 
 def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[LaunchSpec, Problems]:
-    """Return the files' spec and all problems: errors in the files, missing programs, and undeclared machines."""
+    """Return the files' spec and all problems: errors in the files, missing programs and undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for node in spec.runnables():
@@ -37,6 +37,6 @@ def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False)
 
 
 def problem_line(problem: LaunchError, kind: str = "error") -> str:
-    """Format an error as editors expect: FILE:LINE: KIND: TEXT."""
+    """Format an error for editors: FILE:LINE: KIND: TEXT."""
     where = f"{problem.file}:{problem.line}" if problem.line else problem.file
     return f"{where}: {kind}: {problem.text}"

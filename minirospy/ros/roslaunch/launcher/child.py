@@ -28,7 +28,7 @@ _MAX_MISSED = 3
 def run_child(
     name: str, parent: str, run_id: str, environment: Environment, packages: Packages, options: RunOptions
 ) -> int:
-    """Run as the child ``name`` of the roslaunch at the URI ``parent``; return the exit status.
+    """Run as child ``name`` of the roslaunch at the URI ``parent``; return the exit status.
 
     Run until the parent or a signal stops it. Raise MinirospyError if the parent does not respond.
     """
@@ -75,7 +75,7 @@ class _Child(Launcher):
         }
 
     def look_after_parent(self, done: threading.Event) -> None:
-        """Poll the parent regularly; stop the run if the parent no longer responds."""
+        """Poll the parent regularly; stop the run if it no longer responds."""
         missed = 0
         while not done.wait(_HEARTBEAT_SECONDS):
             try:

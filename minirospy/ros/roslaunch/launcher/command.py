@@ -16,7 +16,7 @@ __all__ = ["node_command", "node_environment", "node_folder", "node_program", "s
 
 
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
-    """Return the command that runs a node's program, without the node's arguments; the program's path is last.
+    """Return the command that runs a node's program, without node arguments; the program's path is last.
 
     Raise MinirospyError if the package or the program is not found, or if the program is not executable.
     """
@@ -56,12 +56,12 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the working folder for a node's process. If cwd is "node", raise the same MinirospyError as node_program."""
+    """Return a node's working folder. If cwd is "node", raise the same MinirospyError as node_program."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """Format a node's command like `roslaunch --args`, with the environment variables that it sets.
+    """Format a node's command like `roslaunch --args`, with its environment variables.
 
     Raise MinirospyError like node_command.
     """
@@ -74,6 +74,6 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
 
 
 def _fault(node: NodeSpec, text: str) -> MinirospyError:
-    """Return an error about a node. Include the file and line if a launch file declares the node."""
+    """Return an error about a node, with the file and line if a launch file declares the node."""
     message = f"node [{node.base_name}]: {text}"
     return LaunchError(node.file, node.line, message) if node.file else MinirospyError(message)

@@ -19,7 +19,7 @@ __all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
 
 
 class FileNeeds(NamedTuple):
-    """One launch file's dependencies: its nodes as (package, program), the files that it includes, all packages it names."""
+    """A launch file's dependencies: its nodes (package, program), the files it includes, and all packages it names."""
 
     nodes: tuple[tuple[str, str], ...]
     includes: tuple[str, ...]
@@ -29,7 +29,7 @@ class FileNeeds(NamedTuple):
 def file_needs(
     files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
 ) -> dict[str, FileNeeds]:
-    """Return the dependencies of each launch file, and of each file that it includes. Raise LaunchError if a file is invalid.
+    """Return the dependencies of each launch file and each file it includes. Raise LaunchError if a file is invalid.
 
     An arg without a value or a missing parameter file is not an error, because it may be supplied later. ``warn``
     is called for each file that cannot be included.

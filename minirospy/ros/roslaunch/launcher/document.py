@@ -59,7 +59,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An XML element. Resolves substitutions in its attributes, and adds its line number to errors."""
+    """An XML element. Resolves substitutions in its attributes and adds its line number to errors."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element
@@ -100,7 +100,7 @@ class Tag:
         return None if text is None else self.resolve(text)
 
     def required(self, key: str, *, may_be_empty: bool = False) -> str:
-        """Return a required attribute. Raise LaunchError if it is missing, or if it is empty and ``may_be_empty`` is False."""
+        """Return a required attribute. Raise LaunchError if it is missing, or empty unless ``may_be_empty``."""
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
@@ -147,7 +147,7 @@ class Tag:
             raise self.error(f"'{key}' must be a number: [{text}]") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Return an attribute that is one of ``choices``, or the first choice if the tag does not have it.
+        """Return an attribute that is one of ``choices``; the default is the first choice.
 
         Raise LaunchError for any other value.
         """
@@ -157,7 +157,7 @@ class Tag:
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return whether the tag applies, according to its ``if`` or ``unless`` attribute.
+        """Return whether the tag's ``if`` or ``unless`` attribute lets it apply.
 
         Raise LaunchError if the tag has both attributes, or one with an invalid value.
         """
@@ -175,7 +175,7 @@ class Tag:
         return True
 
     def unknown_attributes(self) -> Iterator[tuple[LaunchError, str]]:
-        """Yield (warning, attribute name) for each attribute that this tag does not support. Most are typos."""
+        """Yield (warning, attribute name) for each unsupported attribute; most are typos."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:
@@ -184,5 +184,5 @@ class Tag:
                 yield self.error(f"unknown <{self.name}> attribute '{key}'{hint}"), key
 
     def error(self, text: str) -> LaunchError:
-        """Return an error for this tag, for the caller to raise."""
+        """Return an error about this tag, to be raised by the caller."""
         return LaunchError(self.file, self.line, text)

@@ -25,7 +25,7 @@ _MAX_LAUNCH_FILE = 16 * 1024 * 1024
 
 
 class LaunchFileNotFoundError(MinirospyError):
-    """Raised if a launch file named on the command line does not exist.
+    """Raised if a launch file on the command line does not exist.
 
     ``ros_text`` is ROS's message, ``hint`` a suggestion.
     """
@@ -40,7 +40,7 @@ class LaunchFileNotFoundError(MinirospyError):
 
 
 def find_files(what: list[str], packages: Packages) -> list[str]:
-    """Return the launch files that a command line specifies: PACKAGE FILE, or paths.
+    """Return the launch files that a command line specifies as PACKAGE FILE or as paths.
 
     Raise LaunchFileNotFoundError if a file is not found, MinirospyError if an argument is malformed.
     """
@@ -95,14 +95,14 @@ def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
 
 
 def near_files(file: str) -> str:
-    """Return the hint for a missing launch file: files with similar names in the same folder, else in the same package."""
+    """Return a hint for a missing launch file: similar names in its folder, otherwise in its package."""
     wanted = Path(file)
     with suppress(OSError, ValueError):
         if wanted.exists():
             return ""
         folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Compare names without suffixes, because all launch files have the same one.
+            # Compare names without suffixes, because all launch files have the same suffix.
             known: dict[str, Path] = {}
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
@@ -115,7 +115,7 @@ def near_files(file: str) -> str:
 
 
 def hidden_hint(file: str, packages: Packages) -> str:
-    """Return the hint for a file that is missing from its package but exists in another package with the same name."""
+    """Return a hint for a file missing from its package but present in another package of the same name."""
     with suppress(OSError, ValueError):
         folder = _package_of(Path(file))
         if folder:
@@ -124,7 +124,7 @@ def hidden_hint(file: str, packages: Packages) -> str:
 
 
 def wrong_substitution(file: str) -> str:
-    """Return the hint for a file whose name has a substitution with the $ outside of the parentheses."""
+    """Return a hint for a file name with the $ of a substitution outside the parentheses."""
     found = re.search(r"\$(find|arg|dirname|env|optenv|anon|eval)\(([^)]*)\)", file)
     return f": {found[0]} is written $({found[1]} {found[2]})" if found else ""
 
@@ -134,7 +134,7 @@ def _package_of(file: Path) -> Path | None:
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
-    """Return the hint for a file missing from its package: a list of the package's launch files."""
+    """Return a hint for a file missing from its package: the list of the package's launch files."""
     try:
         files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
     except NotFoundError:
@@ -143,13 +143,13 @@ def _launch_files_of(package: str, packages: Packages) -> str:
 
 
 def _in_one_word(word: str, packages: Packages) -> str:
-    """Return the hint for a package and a file that are written as one path."""
+    """Return a hint for a package and a file written as one path."""
     package, _, file = word.partition("/")
     return _command_hint(package, file.rpartition("/")[2], packages)
 
 
 def _hint_for_package_and_file(package: str, file: str, packages: Packages, *, has_hint: bool) -> str:
-    """Return the hint for a file that the package does not have; ``has_hint``: similar names have been suggested."""
+    """Return a hint for a file missing from its package. ``has_hint``: similar names were already suggested."""
     return (
         _command_hint(file, package, packages)
         or _package_with(file, packages)
@@ -158,7 +158,7 @@ def _hint_for_package_and_file(package: str, file: str, packages: Packages, *, h
 
 
 def _command_hint(package: str, file: str, packages: Packages) -> str:
-    """Return the command that launches a file of a package as a hint, or an empty string if there is no such file."""
+    """Return the command that launches a package's file as a hint, or an empty string if the file does not exist."""
     try:
         packages.find_resource(package, file)
     except (MinirospyError, OSError, ValueError):
@@ -167,19 +167,19 @@ def _command_hint(package: str, file: str, packages: Packages) -> str:
 
 
 def _near_file_of(package: str, file: str, packages: Packages) -> str:
-    """Return a hint that lists similarly named launch files of a package, or an empty string if there are none."""
+    """Return a hint with a package's similarly named launch files, or an empty string if there are none."""
     try:
         folder = packages.find(package)
     except NotFoundError:
         return ""
-    # Compare names without suffixes, because all launch files have the same one.
+    # Compare names without suffixes, because all launch files have the same suffix.
     known = {path.stem: path.name for path in folder.rglob("*.launch")}
     near = [known[name] for name in nearest(file.partition(".")[0], known)]
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def _package_with(file: str, packages: Packages) -> str:
-    """Return the hint for a launch file that was given without its package, or with the wrong package."""
+    """Return a hint for a launch file given without its package or with the wrong one."""
     for package, folder in sorted(packages.folders().items()):
         if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
             return f"; did you mean `roslaunch {package} {file}`?"

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""The last command-line argument on a system that itself terminates the processes of a killed roslaunch, such as Windows."""
+"""Last command-line argument on systems that kill a dead roslaunch's processes themselves, such as Windows."""
 
 
 def watch(
@@ -29,7 +29,7 @@ def watch(
     master_uri: str,
     end: Callable[[list[int], float, float], object],
 ) -> None:
-    """Track the process groups until ``lines`` are exhausted; then call ``end`` with the remaining groups."""
+    """Track the process groups listed in ``lines``; at the end of the input, call ``end`` with the remaining groups."""
     nodes: dict[int, str] = {}
     masters: dict[int, str] = {}
     for line in lines:
@@ -60,7 +60,7 @@ def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: fl
             time.sleep(0.02)
             left = [pid for pid in left if is_running(pid)]
     for pid in group:
-        # Also kills the processes that a node has left running in its group.
+        # This also kills processes that a node left running in its group.
         send(pid, "SIGKILL")
 
 
@@ -69,7 +69,7 @@ def send(pid: int, name: str) -> bool:
     if sys.platform == "win32":
         import subprocess
 
-        # Processes in another console receive no signals, so kill the process and all of its descendants.
+        # Processes in another console receive no signals, so kill the process and all its descendants.
         subprocess.run(["taskkill", "/F", "/T", "/PID", str(pid)], capture_output=True, check=False)
         return False
     try:
@@ -80,7 +80,7 @@ def send(pid: int, name: str) -> bool:
 
 
 def is_running(pid: int) -> bool:
-    """Return whether a group's first process is running; a zombie counts as exited."""
+    """Return whether a group's first process is running; zombies count as exited."""
     try:
         os.kill(pid, 0)
         with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
@@ -99,6 +99,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Leave the processes alone: their ids may already have been reused.
+        # Leave the processes alone: their ids may have been reused.
         (lambda *_: None) if leaves_them else end_groups,
     )

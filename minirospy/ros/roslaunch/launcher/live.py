@@ -28,7 +28,7 @@ _MEGABYTE = 1024 * 1024
 
 
 class Row(NamedTuple):
-    """A node's row in the table: CPU in percent of one core and memory in bytes, both including its child processes."""
+    """A node's table row: CPU in percent of one core, memory in bytes, both including child processes."""
 
     name: str
     state: str
@@ -41,7 +41,7 @@ class Row(NamedTuple):
 
 
 class LiveTable:
-    """A context manager that shows a launcher's nodes as a table on the terminal."""
+    """Shows a launcher's nodes as a table on the terminal, as a context manager."""
 
     def __init__(self, launcher: Launcher, console: Console | None = None) -> None:
         self._launcher = launcher
@@ -86,7 +86,7 @@ class LiveTable:
         with contextlib.suppress(psutil.Error):
             top = psutil.Process(pid)
             for each in (top, *top.children(recursive=True)):
-                # Reuse the object: psutil reports the CPU load since the previous call on the same object.
+                # Reuse psutil's object: it reports the CPU load since its previous call.
                 known = self._known.setdefault(each.pid, each)
                 with contextlib.suppress(psutil.Error):
                     cpu += known.cpu_percent()
@@ -125,5 +125,5 @@ def last_line(file: Path | None) -> str:
 
 
 def _plain(text: str) -> str:
-    """Remove control characters from a string, and escape rich's markup."""
+    """Remove control characters from a string and escape rich's markup."""
     return "".join(each for each in text if each.isprintable()).replace("[", r"\[")

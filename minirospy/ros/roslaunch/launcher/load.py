@@ -45,19 +45,19 @@ __all__ = [
 
 STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
-# maximum number of files per launch;
-# a chain of 26 files that each include the next one twice would mean reading 67,108,863 files
+# Maximum number of files per launch:
+# in a chain of 26 files, each including the next one twice, 67,108,863 files would be read.
 MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
 
 
 class _TooManyIncludesError(LaunchError):
-    """Raised if a launch includes more files than allowed."""
+    """Raised if a launch includes more than the maximum number of files."""
 
 
 class LaunchSource(NamedTuple):
-    """A launch file, its content (None: read it from the file), and the values of its args."""
+    """A launch file, its content (None: read the file) and the values of its args."""
 
     file: str
     text: bytes | None
@@ -66,7 +66,7 @@ class LaunchSource(NamedTuple):
 
 @dataclass(frozen=True)
 class _Scope:
-    """The settings that a tag inherits from its enclosing tags. ``private``: parameters set for all following nodes.
+    """The settings that a tag inherits from enclosing tags. ``private`` holds parameters set for all following nodes.
 
     ``machine`` is the default machine. Unlike other settings, it still applies after the end of the group or include that
     declares it.
@@ -81,7 +81,7 @@ class _Scope:
 
 @dataclass
 class _Args:
-    """Values of a file's args: ``given`` by name, or ``passed`` by an including file with ``pass_all_args``."""
+    """The values of a file's args: ``given`` by name, or ``passed`` by an including file with ``pass_all_args``."""
 
     given: dict[str, str]
     passed: dict[str, str] = field(default_factory=dict)
@@ -92,14 +92,14 @@ class _Args:
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load launch files in order, with ``args`` from the command line. Raise LaunchError if a file is invalid."""
+    """Load launch files in order with the command line's ``args``. Raise LaunchError if a file is invalid."""
     return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load one launch file from a string, for example from standard input. Raise LaunchError if the file is invalid."""
+    """Load one launch file from a string, for example from stdin. Raise LaunchError if the text is invalid."""
     return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
 
 
@@ -110,7 +110,7 @@ def load_sources(
     problems: Problems | None = None,
     spec: LaunchSpec | None = None,
 ) -> LaunchSpec:
-    """Load launch files in order. Raise LaunchError on an error, or append all errors to ``problems`` if given.
+    """Load launch files in order. Raise LaunchError on an error, or append all errors to ``problems`` if it is given.
 
     If ``spec`` is given, add the content to it, without checking that its nodes' names are unique.
     """
@@ -129,7 +129,7 @@ def load_sources(
             reader.report(error)
 
     for name in used:
-        # An arg that is used counts as known, even if no <arg> declares it.
+        # A used arg counts as known even if no <arg> declares it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
 
     if is_checked:
@@ -139,7 +139,7 @@ def load_sources(
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
     seen: dict[str, NodeSpec] = {}
-    # A <test> may have the same name as a node. They conflict only if the test's program registers under that name.
+    # A <test> and a node may share a name; they conflict only if the test's program registers under that name.
     for node in spec.nodes:
         other = seen.setdefault(node.name, node)
         if other is not node:
@@ -155,7 +155,7 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
 
 
 class _File:
-    """Reads one file into the shared spec. Errors are appended to ``problems``, or raised if it is None."""
+    """Reads a file into the shared spec. Errors are appended to ``problems``, or raised if it is None."""
 
     def __init__(
         self,
@@ -187,7 +187,7 @@ class _File:
         }
 
     def read(self, text: bytes, scope: _Scope) -> _Scope:
-        """Read the file; return the scope at its end. Raise LaunchError on an error, unless errors are collected."""
+        """Read the file; return the scope at its end. Raise LaunchError on an error unless errors are collected."""
         path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
         self._spec.add_file(path, self._file)
         root = Tag(parse_document(text, self._file), self._file, self._substitution)
@@ -205,7 +205,7 @@ class _File:
         self._problems.append(error)
 
     def _read(self, tag: Tag, scope: _Scope, allowed: tuple[str, ...] | None = None) -> _Scope:
-        """Read a tag; return the scope for the following tags."""
+        """Read a tag; return the scope for the tags that follow."""
         reader = self._tags.get(tag.name)
         if reader is None or (allowed is not None and tag.name not in allowed):
             near = [] if reader else nearest(tag.name, allowed or self._tags)
@@ -219,11 +219,11 @@ class _File:
         self._warn_of_attributes(tag)
         try:
             if tag.name == "arg" and not self._depth:
-                # The arg counts as known even if its `if` excludes the tag.
+                # The arg counts as known even if its `if` attribute excludes the tag.
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
-            # Abort loading. Otherwise every open file would report the error again for each of its includes.
+            # Abort loading: otherwise every open file would report the error for each of its includes.
             raise
         except LaunchError as error:
             self.report(error)
@@ -257,7 +257,7 @@ class _File:
     def _group(self, tag: Tag, scope: _Scope) -> _Scope:
         inner = self._below(tag, scope)
         self._clear(tag, inner)
-        # An arg that is declared in a group is valid only inside that group.
+        # An arg declared in a group is valid only inside that group.
         declared, args = set(self._args.declared), dict(self._substitution.args)
         for child in tag.children():
             inner = self._read(child, inner)
@@ -321,7 +321,7 @@ class _File:
         for key, name in zip(("from", "to"), pair, strict=True):
             if not names.is_legal_name(names.canonicalize(name)):
                 raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
-        # If a name is remapped twice, the later remapping wins and takes the last place.
+        # If a name is remapped twice, the later remapping wins and moves to the end.
         others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
         return replace(scope, remaps=(*others, pair))
 
@@ -383,7 +383,7 @@ class _File:
         return param_value(tag, self._spec.add_warning)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Store a parameter set inside a ``<node>`` as private, even if the name starts with a slash or tilde."""
+        """Set a parameter from inside a ``<node>`` as private, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", self._value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -451,7 +451,7 @@ class _File:
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
-        """Read the attributes that ``<node>`` and ``<test>`` have in common."""
+        """Read the attributes common to ``<node>`` and ``<test>``."""
         required, respawn = tag.flag("required"), tag.flag("respawn")
         if required and respawn:
             raise tag.error(f"node [{name}]: respawn and required cannot both be set to true")
@@ -469,7 +469,7 @@ class _File:
                 params.append(child)
             else:
                 inner = self._read(child, inner, ("param", "rosparam", "remap", "env"))
-        # As in ROS, a <param> takes precedence over a <rosparam>, in the node as well as in an enclosing group.
+        # As in ROS, a <param> takes precedence over a <rosparam>, both in the node and in an enclosing group.
         for private, value in scope.private:
             self._set(tag, f"{full_name}/{private}", value)
         for child in params:
@@ -523,7 +523,7 @@ class _File:
 
 
 def _folder(tag: Tag) -> str:
-    """Return a node's ``cwd``, or "" if it is not set. Raise LaunchError if the value is invalid."""
+    """Return a node's ``cwd``, or "" if it is not set. Raise LaunchError if it is invalid."""
     text = tag.optional("cwd")
     if text is None:
         return ""
@@ -532,7 +532,7 @@ def _folder(tag: Tag) -> str:
 
 
 def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:
-    """Return an ``<arg>``'s name, value and default. Raise LaunchError if it has no name, or both a value and a default."""
+    """Return an ``<arg>``'s name, value and default. Raise LaunchError without a name, or with both value and default."""
     name, value, default = tag.required("name"), tag.optional("value"), tag.optional("default")
     if value is not None and default is not None:
         raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")

@@ -26,7 +26,7 @@ _START_SECONDS = 60.0
 
 
 class LaunchMaster:
-    """The master that a launch's nodes use.
+    """Finds or starts the master for a launch.
 
     ``pause(seconds)`` must sleep, and raise KeyboardInterrupt if the run is stopped meanwhile.
     """
@@ -38,11 +38,11 @@ class LaunchMaster:
         self._proxy = MasterProxy(environment.master_uri, "/roslaunch")
         self.run_id = ""
         """The name of the run's log folder, and the master's /run_id."""
-        self.has_logs = True  # set if log files can be written
+        self.has_logs = True  # whether log files can be written
 
     @property
     def log_folder(self) -> Path:
-        """Return the folder for the run's log files."""
+        """Return the folder for this run's log files."""
         return self._environment.log_dir / self.run_id
 
     def is_online(self) -> bool:
@@ -66,7 +66,7 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # Call the master for its error, which states the reason, such as an unknown host name or a suspended master.
+            # Call the master to get an error with the reason, such as an unknown host name or a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")
@@ -83,7 +83,7 @@ class LaunchMaster:
         return start_process("master", command, environ=os.environ)
 
     def wait_for_start(self, process: Process) -> None:
-        """Wait until the started master responds, then set its /run_id. Raise MinirospyError if it exits or does not respond."""
+        """Wait until the started master responds, then set /run_id. Raise MinirospyError if it exits or does not respond."""
         end = time.monotonic() + _START_SECONDS
         while not self.is_online():
             if not process.is_running:
@@ -93,13 +93,13 @@ class LaunchMaster:
             self._pause(0.02)
 
         if self.run_id:
-            # Set the run id explicitly: the launching program may have chosen its own, which names the log folder.
+            # Set the run id explicitly: the launching program may have chosen it, and it names the log folder.
             self._proxy.set_param("/run_id", self.run_id)
-        # Do not warn again: a master that cannot write its log has already printed a warning.
+        # Do not warn again: a master that cannot write its log has already warned.
         self.find_run_id(warns=False)
 
     def find_run_id(self, *, warns: bool = True) -> None:
-        """Use the master's /run_id, or set a new one, and open roslaunch's log file."""
+        """Use the master's /run_id or set a new one, and open roslaunch's log file."""
         try:
             found = self._proxy.get_param("/run_id")
         except RpcError:

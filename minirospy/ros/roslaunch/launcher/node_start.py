@@ -35,12 +35,12 @@ class NodeStarter:
         self._preload = Preload()
 
     def prepare(self, nodes: Sequence[NodeSpec]) -> None:
-        """Start the preloaded processes from which similar ones of ``nodes`` will be forked."""
+        """Start the preloaded processes that will fork similar ``nodes``."""
         if len(nodes) < MIN_NODES:
             return
         starts = []
         for node in nodes:
-            # start() reports the error.
+            # start() will report this error.
             with contextlib.suppress(MinirospyError):
                 command = node_command(node, self._packages)
                 folder = node_folder(node, self._packages, self._environment)
@@ -48,11 +48,11 @@ class NodeStarter:
         self._preload.prepare(starts)
 
     def close(self) -> None:
-        """End the preloaded processes. Later starts do not use them. Idempotent."""
+        """End the preloaded processes, so that later starts do not use them. Idempotent."""
         self._preload.close()
 
     def start(self, node: NodeSpec, name: str) -> Process:
-        """Start a node as the process ``name``. Raise MinirospyError if the process or its folder cannot be created."""
+        """Start a node as process ``name``. Raise MinirospyError if its process or folder cannot be created."""
         command = node_command(node, self._packages)
         folder = node_folder(node, self._packages, self._environment)
         environ = self._variables(node)
@@ -77,13 +77,13 @@ class NodeStarter:
         """Return the environment variables for a node's process."""
         environ = node_environment(node, self._environment)
         if not self._uses_screen(node) or not sys.stdout.isatty():
-            # Show a node's output immediately.
-            # On a terminal, Python flushes each line anyway, and writes whole lines, so that the nodes' lines do not mix.
+            # Show a node's output immediately. On a terminal, Python flushes each line in any case,
+            # and writes whole lines, so that lines from different nodes do not mix.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         return environ
 
     def _made(self, folder: Path) -> Path:
-        """Create a node's working folder and return it. If ROS_HOME is not writable, return the temporary folder."""
+        """Create a node's working folder and return it, or the temporary folder if ROS_HOME is not writable."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -99,7 +99,7 @@ class NodeStarter:
         return folder
 
     def _uses_screen(self, node: NodeSpec) -> bool:
-        """Return whether a node's output is printed on the terminal instead of written to a file."""
+        """Return whether a node's output goes to the terminal instead of a file."""
         if not self._master.has_logs:
             return True
         return (self._options.screen or node.output == "screen") and not self._options.log

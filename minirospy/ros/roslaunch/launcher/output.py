@@ -18,11 +18,11 @@ __all__ = ["ERROR", "INFO", "Output", "warn_of_large_logs"]
 
 _BOLD, _RED, _PLAIN = "\033[1m", "\033[31m", "\033[0m"
 _LARGE = 1024**3
-INFO, ERROR = 2, 8  # levels of rosgraph_msgs/Log
+INFO, ERROR = 2, 8  # rosgraph_msgs/Log levels
 
 
 class Output:
-    """Prints lines to stdout and stderr; adds colours and titles on a terminal.
+    """Prints lines to stdout and stderr, with colours and titles on a terminal.
 
     ``listener`` also receives (level, text) for each line; a child roslaunch uses it to send the lines to its parent. If
     ``title`` is False, the terminal's title is not set. ``has_color`` is determined when a line is printed.
@@ -42,7 +42,7 @@ class Output:
         self._write(text, _BOLD if bold else "", INFO)
 
     def warn(self, text: str) -> None:
-        """Print a line to stderr, in red."""
+        """Print a line to stderr, in red on a terminal."""
         self._write(text, _RED, ERROR)
 
     def title(self, text: str) -> None:
@@ -67,9 +67,9 @@ class Output:
 
     def _write(self, text: str, colour: str, level: int) -> None:
         stream = sys.stderr if level == ERROR else sys.stdout
-        # Write each line in one call, because nodes write to the same terminal.
+        # Write each line in one call: nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # Even if the reader of the output (`| head`) has exited, terminate the nodes in the right order.
+        # If the output's reader (`| head`) has exited, still terminate the nodes in the right order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()
@@ -89,7 +89,7 @@ class Output:
 
 
 def warn_of_large_logs(folder: Path, output: Output) -> None:
-    """Warn if the log folder exceeds one gigabyte. Measures its size in the background."""
+    """Warn if the log folder exceeds one gigabyte, measuring its size in the background."""
 
     def look() -> None:
         size = 0

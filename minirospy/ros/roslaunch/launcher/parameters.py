@@ -30,16 +30,16 @@ __all__ = ["param_value", "rosparam_values"]
 _XACRO = ("xacro", "xacro.py")
 _STYLE = re.compile(r"\x1b\[[0-9;]*m")  # matches terminal colours
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-# number of bytes at the end of a command's stderr in which to search for the reason for a failure
+# Bytes at the end of a command's stderr to search for the reason of a failure.
 _ERRORS_KEPT = 65_536
 _ERRORS_SECONDS = 1.0
-# maximum size in bytes of a file or of a command's output; the master rejects larger requests
+# Maximum bytes of a file or a command's output; the master rejects larger requests.
 _MAX_VALUE = 64 * 1024 * 1024
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
 def param_value(tag: Tag, warn: Callable[[LaunchError], object]) -> object:
-    """Return a ``<param>``'s value; call ``warn`` if it was read in spite of a fault.
+    """Return a ``<param>``'s value; call ``warn`` if it could be read despite a fault.
 
     Raise LaunchError if the tag is invalid, or its file or command fails.
     """
@@ -68,7 +68,7 @@ def param_value(tag: Tag, warn: Callable[[LaunchError], object]) -> object:
 
 
 def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, object]]:
-    """Yield each parameter that a ``<rosparam>`` loads, with its value. Raise LaunchError if the YAML or the file is invalid."""
+    """Yield each parameter and value that a ``<rosparam>`` loads. Raise LaunchError if the YAML or the file is invalid."""
     file = tag.optional("file")
     text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))
     if tag.flag("subst_value"):
@@ -110,7 +110,7 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 
 
 def _description(tag: Tag, origin: str, data: bytes, warn: Callable[[LaunchError], object]) -> str:
-    """Return the text of a file or a command. A robot description, or other XML, may have an encoding other than UTF-8."""
+    """Decode a file or a command's output. XML, such as a robot description, may have an encoding other than UTF-8."""
     if not data.lstrip().startswith(b"<"):
         return _decoded(tag, origin, data)
     text, encoding = decode_xml(data)
@@ -136,7 +136,7 @@ def _output_of(tag: Tag, command: str) -> bytes:
 
 
 def _run(words: list[str]) -> tuple[int, bytes, str]:
-    """Run a command; return its exit status, its output, and the line of stderr that states the reason for a failure.
+    """Run a command; return its exit status, its output, and the stderr line that gives the reason for a failure.
 
     The command's stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
     """
@@ -154,28 +154,28 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
                 process.kill()
             status = process.wait()
         except BaseException:
-            # Kill the command, which may ignore Ctrl-C.
+            # Kill the command, because it may ignore Ctrl-C.
             process.kill()
             process.wait()
             raise
         finally:
-            # Close the pipe, so that processes left running by the command get a broken pipe.
+            # Close the pipe, so that processes left behind by the command get a broken pipe.
             process.stdout.close()
     finally:
         os.close(writing)
-        # Wait only briefly, because processes left running by the command may hold the pipe open.
+        # Wait only briefly: processes left behind by the command may hold the pipe open.
         reader.join(_ERRORS_SECONDS)
     return status, output, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
 
 
 def _reason(errors: str) -> str:
-    """Return the first line that contains "error", as in xacro's output; else the last line, which ends a traceback."""
+    """Return the first line that contains "error", as in xacro's output, else the last line, as in a traceback."""
     lines = [line.strip() for line in errors.splitlines() if line.strip()]
     return next((line for line in lines if _ERROR.search(line)), lines[-1] if lines else "")
 
 
 def _pass_on(reading: int, end: bytearray) -> None:
-    """Copy the pipe to stderr until it is closed; keep the last bytes in ``end``."""
+    """Copy the pipe to stderr until it is closed; keep its last bytes in ``end``."""
     with open(reading, "rb", buffering=0) as pipe:
         while chunk := pipe.read(_ERRORS_KEPT):
             end += chunk
@@ -187,7 +187,7 @@ def _pass_on(reading: int, end: bytearray) -> None:
 
 
 def _command_words(words: list[str]) -> list[str]:
-    """Return the command to run. As for nodes, Python programs run with this interpreter; `xacro` runs minirospy's xacro.
+    """Return the command to run. Like nodes, Python programs use this interpreter; `xacro` is minirospy's.
 
     Thus, launch files find xacro even if no virtual environment is active, and never use ROS 2's xacro.
     """

@@ -23,13 +23,13 @@ from typing import IO
 
 __all__ = ["MIN_NODES", "ForkedProcess", "Preload", "Start"]
 
-MIN_NODES = 3  # number of similar nodes from which a preloaded process pays off
-REPLY_SECONDS = 30.0  # timeout for an answer of a preloaded process, on a busy machine
-POLL_SECONDS = 0.01  # between checks whether a process has exited
+MIN_NODES = 3  # minimum number of similar nodes for which preloading pays off
+REPLY_SECONDS = 30.0  # seconds to wait for a reply from a preloaded process on a busy machine
+POLL_SECONDS = 0.01  # seconds between checks whether a process has exited
 
 _PR_SET_CHILD_SUBREAPER, _PR_GET_CHILD_SUBREAPER = 36, 37
 _FORKING = threading.Lock()
-"""Held while this process is a subreaper for a fork: being a subreaper is a setting of the whole process."""
+"""Held while this process is a subreaper during a fork, because that setting applies to the whole process."""
 
 _MIRRORED = frozenset(
     ("PYTHONPATH", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING", "PYTHONUTF8")
@@ -39,7 +39,7 @@ _MIRRORED = frozenset(
 
 @dataclass(frozen=True)
 class Start:
-    """How to start a process: its command line, environment and working folder."""
+    """The inputs for starting a process: its command line, environment and working folder."""
 
     command: tuple[str, ...]
     environ: Mapping[str, str]
@@ -47,7 +47,7 @@ class Start:
 
     @property
     def is_plain_python(self) -> bool:
-        """Return whether it is a Python program without interpreter options, a debugger or a profiler."""
+        """Return whether the program is Python without interpreter options, a debugger or a profiler."""
         return (
             len(self.command) > 1
             and self.command[0] == sys.executable
@@ -62,23 +62,23 @@ class Start:
 
     @property
     def kind(self) -> _Kind:
-        """Return the properties that processes must share to be forked from the same process."""
+        """Return the properties that processes forked from the same preloaded process must share."""
         shared = frozenset((name, value) for name, value in self.environ.items() if name != "ROS_NAMESPACE")
         return _Kind(shared, self.folder)
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """The environment without ROS_NAMESPACE, and the working folder."""
+    """The properties that processes must share: the environment without ROS_NAMESPACE, and the working folder."""
 
     environ: frozenset[tuple[str, str]]
     folder: Path
 
 
 class ForkedProcess:
-    """A child of this process that was forked by a preloaded process. Has the interface of subprocess.Popen. Thread-safe."""
+    """A child of this process, forked by a preloaded process. Has the interface of subprocess.Popen. Thread-safe."""
 
-    # The streams are files, not pipes to this process.
+    # The standard streams are files, not pipes to this process.
     stdin: IO[bytes] | None = None
     stdout: IO[bytes] | None = None
     stderr: IO[bytes] | None = None
@@ -91,7 +91,7 @@ class ForkedProcess:
         self._lock = threading.Lock()
 
     def poll(self) -> int | None:
-        """Return the exit status as in subprocess, or None while the process is running."""
+        """Return the exit status as in subprocess, or None if the process is still running."""
         with self._lock:
             if self.returncode is None:
                 try:
@@ -107,7 +107,7 @@ class ForkedProcess:
             return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait until the process has exited, and return its exit status.
+        """Wait until the process has exited and return its exit status.
 
         Raise subprocess.TimeoutExpired after ``timeout`` seconds.
         """
@@ -140,18 +140,18 @@ def _start_time(pid: int) -> bytes | None:
         fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
     except (FileNotFoundError, ProcessLookupError):
         return None
-    # proc(5): the state is field 3 and the start time field 22. A zombie has exited.
+    # proc(5): field 3 is the state, field 22 the start time. A zombie has exited.
     return None if fields[0] in b"ZX" else fields[19]
 
 
 class Preload:
-    """The preloaded processes of a launch: one for each kind of node that occurs often enough."""
+    """A launch's preloaded processes: one for each kind of node that occurs often enough."""
 
     def __init__(self) -> None:
         self._parents: dict[_Kind, _Parent] = {}
 
     def prepare(self, starts: Sequence[Start]) -> None:
-        """Start the processes that will fork ``starts``. They import rospy while the launch continues.
+        """Start the preloaded processes that will fork ``starts``. They import rospy while the launch continues.
 
         Do nothing if the environment variable MINIROSPY_PRELOAD is 0.
         """
@@ -163,12 +163,12 @@ class Preload:
                 similar.setdefault(start.kind, []).append(start)
         for kind, members in similar.items():
             if len(members) >= MIN_NODES:
-                # A Python without libffi has no ctypes.
+                # Python without libffi has no ctypes.
                 with contextlib.suppress(OSError, ImportError):
                     self._parents[kind] = _Parent(members[0])
 
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
-        """Fork a process with the standard streams ``fds``. Return None if it must be started as usual."""
+        """Fork a process with the standard streams ``fds``, or return None if it must be started normally."""
         parent = self._parents.get(start.kind) if self._parents and start.is_plain_python else None
         if parent is None:
             return None
@@ -185,10 +185,10 @@ class Preload:
 
 
 class _Parent:
-    """A preloaded process, and the socket connected to it."""
+    """A preloaded process and the socket to it."""
 
     def __init__(self, start: Start) -> None:
-        # Import it here, because it imports ctypes, which few launches need.
+        # Imported here, because it imports ctypes, which few launches need.
         from minirospy.ros.roslaunch.launcher import preloaded
 
         self._protocol = preloaded
@@ -214,7 +214,7 @@ class _Parent:
             theirs.close()
 
     def fork(self, start: Start, fds: tuple[int, int, int]) -> ForkedProcess | None:
-        """Fork a process; return None if its program must be started as usual. Raise OSError if there is no answer."""
+        """Fork a process, or return None if its program must be started normally. Raise OSError if there is no reply."""
         if not self._is_ready:
             if self._socket.recv(len(self._protocol.READY)) != self._protocol.READY:
                 raise ConnectionError("the process exited, or cannot fork nodes")
@@ -238,7 +238,7 @@ class _Parent:
             if not answer:
                 raise ConnectionError("the process exited")
             process = ForkedProcess(start.command, int(answer))
-            # If this process exits before it writes to the pipe, the node exits without running its program.
+            # If this process exits before this write, the node exits without running its program.
             starter.write(b"1")
         return process
 
@@ -254,7 +254,7 @@ class _Parent:
 
 @contextlib.contextmanager
 def _subreaper() -> Iterator[None]:
-    """Make this process the parent of orphaned descendants. Raise OSError if the system refuses."""
+    """Make this process the parent of orphaned descendants. Raise OSError if the kernel refuses."""
     import ctypes
 
     library = ctypes.CDLL(None, use_errno=True)
@@ -265,7 +265,7 @@ def _subreaper() -> Iterator[None]:
             raise OSError(ctypes.get_errno(), "prctl")
 
     with _FORKING:
-        # Restore the setting afterwards: the program may use it for its own processes.
+        # Restore the setting afterwards: the program may use it for other processes.
         before = ctypes.c_int()
         call(_PR_GET_CHILD_SUBREAPER, ctypes.addressof(before))
         call(_PR_SET_CHILD_SUBREAPER, 1)

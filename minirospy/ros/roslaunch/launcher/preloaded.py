@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import sys
 
-# A node's module search path contains its program's folder, not this script's.
+# A node's module search path contains its program's folder instead of this script's.
 if __name__ == "__main__" and not getattr(sys.flags, "safe_path", False):
     del sys.path[0]
 
@@ -49,16 +49,16 @@ PRELOADED = (
 )
 """The modules that are loaded in a node after it has created publishers, subscribers and services."""
 
-LENGTH_SIZE = 8  # bytes of the length that precedes a request
-FDS = 4  # file descriptors per request: stdin, stdout, stderr, and a pipe to which roslaunch writes when the node may start
-READY, REFUSED = b"ready", b"refused"  # responses in place of a process id
+LENGTH_SIZE = 8  # bytes of a request's length prefix
+FDS = 4  # file descriptors per request: stdin, stdout, stderr, and a pipe that signals the node to start
+READY, REFUSED = b"ready", b"refused"  # replies other than a process id
 
-_SUFFIXES = (".py", ".pyc", ".so")  # suffixes of files that Python can import
+_SUFFIXES = (".py", ".pyc", ".so")  # suffixes of importable files
 _PR_SET_MM, _PR_SET_MM_MAP = 35, 14
 
 
 class Order(NamedTuple):
-    """A node to fork: its command line, and the value of ROS_NAMESPACE (None: unset). ``environ``: the complete environment."""
+    """A node to fork: its command line, ROS_NAMESPACE (None: unset) and the complete environment ``environ``."""
 
     arguments: list[str]
     environ: dict[str, str]
@@ -70,7 +70,7 @@ class Order(NamedTuple):
 
 
 class _MemoryMap(ctypes.Structure):
-    """The kernel's struct prctl_mm_map. The fields up to ``env_end`` are addresses."""
+    """The kernel's struct prctl_mm_map; the fields up to ``env_end`` are addresses."""
 
     _fields_ = [
         *((name, ctypes.c_uint64) for name in ("start_code", "end_code", "start_data", "end_data")),
@@ -87,7 +87,7 @@ _kept: list[mmap.mmap] = []
 
 
 def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
-    """Change the command line and environment that /proc shows for this process. Raise OSError if the kernel refuses."""
+    """Change this process's command line and environment in /proc. Raise OSError if the kernel refuses."""
     words = b"".join(os.fsencode(word) + b"\0" for word in arguments)
     variables = b"".join(os.fsencode(f"{name}={value}") + b"\0" for name, value in environ.items())
     area = mmap.mmap(-1, len(words) + len(variables) + 1, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
@@ -99,7 +99,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
     library = ctypes.CDLL(None, use_errno=True)
     library.sbrk.restype = ctypes.c_void_p
     library.sbrk.argtypes = [ctypes.c_ssize_t]
-    # proc(5) counts the fields from 1.
+    # proc(5) numbers fields from 1.
     code_start, code_end, stack, data_start, data_end, heap = (
         int(fields[n - 1]) for n in (26, 27, 28, 45, 46, 47)
     )
@@ -117,7 +117,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
 
 
 def hides_module(folder: str, loaded: set[str]) -> bool:
-    """Return whether a file in ``folder`` would be imported in place of one of the top-level modules in ``loaded``."""
+    """Return whether an import of a top-level module in ``loaded`` could find a file in ``folder`` first."""
     with os.scandir(folder) as entries:
         for entry in entries:
             stem, _, suffix = entry.name.partition(".")
@@ -157,12 +157,12 @@ def serve(control: socket.socket) -> Order | None:
 
 
 def _fork(order: Order, control: socket.socket, fds: list[int]) -> int:
-    """Fork a node; return its process id, or 0 in the node. Raise OSError if the fork fails."""
+    """Fork a node; return its process id, or 0 inside the node. Raise OSError if the fork fails."""
     reader, writer = os.pipe()
     with open(reader, "rb") as report:
         middle = os.fork()
         if middle == 0:
-            # The intermediate process exits, so that roslaunch becomes the node's parent.
+            # The intermediate process exits, making roslaunch the node's parent.
             try:
                 pid = os.fork()
             except OSError:
@@ -182,7 +182,7 @@ def _fork(order: Order, control: socket.socket, fds: list[int]) -> int:
 
 
 def _prepare(order: Order, fds: list[int], report: int) -> None:
-    """Set up the node as the kernel sees it, report its process id, and wait until roslaunch lets it start."""
+    """Set up the node's kernel attributes, report its process id, and wait until roslaunch lets it start."""
     try:
         os.setsid()
         for number, fd in enumerate(fds[:3]):
@@ -199,12 +199,12 @@ def _prepare(order: Order, fds: list[int], report: int) -> None:
 
 
 def folder_of(program: str) -> str:
-    """Return the program's folder that Python searches first."""
+    """Return the program's folder, which Python searches first."""
     return os.path.dirname(os.path.realpath(program))
 
 
 def become(order: Order, main: dict[str, Any]) -> None:
-    """Set up the node's interpreter. ``main``: the initial attributes of a ``__main__`` module."""
+    """Set up the node's interpreter. ``main`` holds a ``__main__`` module's initial attributes."""
     namespace = order.environ.get("ROS_NAMESPACE")
     if namespace is None:
         os.environ.pop("ROS_NAMESPACE", None)
@@ -213,7 +213,7 @@ def become(order: Order, main: dict[str, Any]) -> None:
     sys.argv = order.arguments[1:]
     sys.orig_argv[:] = order.arguments
     sys.path.insert(0, folder_of(order.program))
-    # Python 3.13 and older keep the thread id from before the fork.
+    # Python up to 3.13 keeps the thread id from before the fork.
     threading.main_thread()._set_native_id()  # type: ignore[attr-defined]
 
     sys.stdin = sys.__stdin__ = _stream(0, "<stdin>", "r", sys.stdin)  # type: ignore[misc]
@@ -223,7 +223,7 @@ def become(order: Order, main: dict[str, Any]) -> None:
     module = ModuleType("__main__")
     module.__dict__.update(main)
     sys.modules["__main__"] = module
-    # In a started node, importing rospy does this with the program's __main__.
+    # In a normally started node, importing rospy does this for the program's __main__.
     from minirospy.base.script_names import find_packages_named_like_scripts
 
     module.__file__ = order.program
@@ -233,7 +233,7 @@ def become(order: Order, main: dict[str, Any]) -> None:
 
 
 class _FirstImport:
-    """Hides the imported rospy until the program imports it, and then enables the loggers of the imported modules.
+    """Hides the preloaded rospy until the program imports it, then enables the loggers of the preloaded modules.
 
     A program that configures logging earlier disables all existing loggers. In a started node, these loggers would not exist yet.
     The class is a finder and a loader, but without the base classes, because importlib.abc imports large modules.
@@ -257,7 +257,7 @@ class _FirstImport:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return a spec for rospy with this loader."""
+        """Return a spec for rospy that uses this loader."""
         if fullname != "rospy":
             return None
         loader: Any = self
@@ -266,11 +266,11 @@ class _FirstImport:
         return spec
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return the module that is already imported."""
+        """Return the preloaded module."""
         return self._modules["rospy"]
 
     def exec_module(self, module: ModuleType) -> None:
-        """Make the modules visible again, as after an import, and enable their loggers."""
+        """Make the modules visible, as after a normal import, and enable their loggers."""
         module.__spec__ = self._spec
         sys.modules.update(self._modules)
         sys.meta_path.remove(self)
@@ -279,7 +279,7 @@ class _FirstImport:
 
 
 def _stream(fd: int, name: str, mode: str, like: TextIO) -> io.TextIOWrapper:
-    """Return a standard stream as Python creates it at start-up, with the encoding of ``like``."""
+    """Return a standard stream like those that Python creates at start-up, with the encoding of ``like``."""
     assert isinstance(like, io.TextIOWrapper)
     unbuffered = sys.stdout.write_through  # type: ignore[union-attr]
     buffer: Any = open(fd, f"{mode}b", 0 if unbuffered and mode == "w" else -1, closefd=False)  # noqa: SIM115
@@ -298,7 +298,7 @@ def _stream(fd: int, name: str, mode: str, like: TextIO) -> io.TextIOWrapper:
 
 
 def open_program(path: str) -> int | None:
-    """Open a file for C code; return its FILE*, or None if that fails."""
+    """Open a file for C code; return its FILE*, or None on failure."""
     library = ctypes.CDLL(None)
     library.fopen.restype = ctypes.c_void_p
     file: int | None = library.fopen(os.fsencode(path), b"rbe")
@@ -306,14 +306,14 @@ def open_program(path: str) -> int | None:
 
 
 def main(fd: int) -> Order | None:
-    """Import the modules, and serve the socket ``fd`` until it is closed. In a forked node, return its order."""
+    """Import the modules and serve the socket ``fd`` until it is closed. In a forked node, return its order."""
     control = socket.socket(fileno=fd)
-    # If the kernel cannot show the nodes' command lines, refuse before any node waits.
+    # If the kernel cannot change command lines, refuse before any node waits.
     set_command_line(sys.orig_argv, dict(os.environ))
     for name in PRELOADED:
         import_module(name)
     if len(os.listdir("/proc/self/task")) > 1 or "minirospy.client" not in sys.modules:
-        # A module has started a thread, or this is the real rospy.
+        # a module has started a thread, or this is real rospy
         return None
     gc.collect()
     gc.freeze()
@@ -337,8 +337,8 @@ if __name__ == "__main__":
     _file = open_program(_order.program)
     _run = ctypes.pythonapi.PyRun_SimpleFileExFlags
     _run.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_void_p]
-    # Call this at module level, so that only one frame is below the program's own frames on the stack.
+    # Call this at module level, so that only one frame is below the program's frames.
     _has_failed = _file is None or _run(_file, os.fsencode(_order.program), 1, None)
-    # After Ctrl-C, Python itself ends this process with SIGINT at the end of the script.
+    # After Ctrl-C, Python itself ends this process with SIGINT when the script ends.
     if _has_failed and getattr(sys, "last_type", None) is not KeyboardInterrupt:
         sys.exit(1)

@@ -36,7 +36,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A started process. ``node`` is None for the master; ``starts`` counts the starts."""
+    """A started process. ``node`` is None for the master; ``starts`` counts its starts."""
 
     name: str
     command: Sequence[str]
@@ -46,9 +46,9 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # set once the process has been told to exit; its exit is then not reported
+    is_ending: bool = False  # whether the process has been told to exit, so that its exit is not reported
 
-    # set if the process is to be restarted after its exit because its file has changed
+    # Whether the process will restart after its exit, because its file has changed.
     is_restarting: bool = False
 
     @property
@@ -75,7 +75,7 @@ class _Group(TypedDict, total=False):
 
 
 class Guardian:
-    """Tracks the running processes, and terminates them if roslaunch is killed.
+    """Tracks the running processes and terminates them if roslaunch is killed.
 
     On Windows the system terminates them (`minirospy.base.child_lifetime`). There the guardian only unregisters nodes from a
     master that this launch did not start; otherwise its process is not started.
@@ -90,7 +90,7 @@ class Guardian:
         self._popen = None if self._children.is_guarded else self._start()
 
     def add(self, process: Process) -> None:
-        """Report the start of a process."""
+        """Report a process's start to the guardian."""
         if process.node is None:
             self._has_master = True
         elif self._popen is None and not self._has_master:
@@ -98,7 +98,7 @@ class Guardian:
         self._write(f"+{process.pid} {process.node.name}\n" if process.node else f"*{process.pid}\n")
 
     def remove(self, process: Process) -> None:
-        """Report the exit of a process."""
+        """Report a process's exit to the guardian."""
         self._write(f"-{process.pid}\n")
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # A process that is started outside the job would remain, suspended, if its parent were killed while starting it.
+        # If this process is killed while it starts the guardian outside its job, the guardian remains suspended.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -142,7 +142,7 @@ def start_process(
     stdout: int | None = None,
     preload: Preload | None = None,
 ) -> Process:
-    """Start a process. Its stdout (if ``log_errors``, also its stderr) is written to ``stdout_file``, or is inherited.
+    """Start a process. Its stdout (and stderr if ``log_errors``) goes to ``stdout_file``, or is inherited.
 
     ``preload``: fork the process from a preloaded one if possible; its stdin is empty then.
 
@@ -185,7 +185,7 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # send_signal fails if the process has exited or, on Windows, has no console. There is nothing to wait for then.
+            # send_signal fails, with nothing to wait for, if the process has exited or, on Windows, has no console.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)
@@ -196,14 +196,14 @@ def end_processes(
 
     if not _WINDOWS:
         for process in processes:
-            # Also kill the processes that a node has left running in its group.
+            # Also kill processes that a node has left running in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed
 
 
 def _own_group() -> _Group:
-    """Return the options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in the right order."""
+    """Return options that shield a process from Ctrl-C, so that roslaunch can terminate nodes in the right order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}
@@ -217,7 +217,7 @@ def _forked(
     output: IO[str] | None,
     log_errors: bool,
 ) -> ForkedProcess | None:
-    """Fork a process from a preloaded one. Return None if it must be started as usual."""
+    """Fork a process from a preloaded one, or return None if it must be started normally."""
     if folder is None:
         return None
     stdout = output.fileno() if output else 1
@@ -255,7 +255,7 @@ def _terminate(popen: subprocess.Popen[bytes] | ForkedProcess) -> None:
 
 
 def _kill(popen: subprocess.Popen[bytes] | ForkedProcess) -> None:
-    """Kill the process and its descendants."""
+    """Kill a process and its descendants."""
     import psutil
 
     with contextlib.suppress(psutil.Error):

@@ -21,14 +21,14 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-# seconds to wait for a node; only a hanging process takes this long, because the port of an exited one refuses connections
+# seconds to wait for a node; only hanging processes need it, because exited ones refuse connections
 _ANSWER_SECONDS = 5.0
 
 _MAX_CONCURRENT = 16
 
 
 class DeadNodes:
-    """Unregisters exited nodes in a thread. One pass handles all exits since the previous one."""
+    """Unregisters exited nodes in a thread; each pass handles all exits since the previous one."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -43,7 +43,7 @@ class DeadNodes:
         self._exited.put(node)
 
     def close(self) -> None:
-        """Wait until the added nodes are unregistered, or give up if the master does not respond. Idempotent."""
+        """Wait until all added nodes are unregistered, or give up if the master does not respond. Idempotent."""
         if self._thread:
             self._exited.put(None)
             self._thread.join()
@@ -61,7 +61,7 @@ class DeadNodes:
 
 
 def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
-    """Unregister those of ``nodes`` (global names) that have exited; return their names.
+    """Unregister the ``nodes`` (global names) that have exited; return their names.
 
     A node that is running or hangs stays registered, and so does a new node with one of these names. If the master does not
     respond, nothing is changed.
@@ -80,7 +80,7 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Unregister nodes; ``argv`` contains the master's URI and the nodes' names."""
+    """Unregister nodes. ``argv`` holds the master's URI and the nodes' names."""
     unregister_dead(argv[0], argv[1:])
     return 0
 

@@ -36,7 +36,7 @@ _SHUTDOWN_SECONDS = 5.0
 
 
 class Monitor(Protocol):
-    """The part of the launcher that RemoteMachines uses."""
+    """The launcher's methods that RemoteMachines calls."""
 
     def guard(self, process: Process) -> None:
         """Ensure that the process is terminated even if roslaunch is killed."""
@@ -49,7 +49,7 @@ Method = Callable[..., object]
 
 
 class Api:
-    """Serves XML-RPC methods (``{name: function}``) in a thread. They run in workers; results are wrapped as in ROS."""
+    """Serves XML-RPC methods (``{name: function}``), run in worker threads, with results wrapped as in ROS."""
 
     def __init__(self, environment: Environment, methods: Mapping[str, Method]) -> None:
         self._methods = dict(methods)
@@ -250,7 +250,7 @@ class RemoteMachines:
                 child.ssh.popen.wait(_SHUTDOWN_SECONDS)
         end_processes([child.ssh], Timeouts(1.0, 1.0), lambda _: None)
 
-    # --- XML-RPC methods that the children call
+    # --- XML-RPC methods for the children
 
     def _register(self, name: str, uri: str) -> int:
         child = self._children.get(name)
@@ -277,5 +277,5 @@ class RemoteMachines:
 
 
 def launch_text(nodes: Sequence[NodeSpec]) -> str:
-    """Return a launch file with these nodes, for the remote roslaunch process that runs them."""
+    """Return a launch file with these nodes for the remote roslaunch that runs them."""
     return "\n".join(["<launch>", *(node.to_xml() for node in nodes), "</launch>", ""])

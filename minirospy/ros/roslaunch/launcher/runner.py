@@ -40,7 +40,7 @@ __all__ = ["Launcher", "RunOptions"]
 
 
 class Launcher:
-    """Runs a spec's nodes until all have exited or a caller stops them."""
+    """Runs a spec's nodes until all exit or a caller stops them."""
 
     _numbers: ClassVar[Iterator[int]] = itertools.count(1)
     """A counter shared by all launches in this program, to make process names and log files unique."""
@@ -81,12 +81,12 @@ class Launcher:
 
     @property
     def processes(self) -> list[Process]:
-        """Return the processes being watched, including those that will be restarted."""
+        """Return the watched processes, including those that will be restarted."""
         return self.supervisor.processes
 
     @property
     def run_id(self) -> str:
-        """Return the name of the run's log folder, which is the master's /run_id."""
+        """Return the run id, which names the log folder and is the master's /run_id."""
         return self._master.run_id
 
     @run_id.setter
@@ -94,7 +94,7 @@ class Launcher:
         self._master.run_id = run_id
 
     def run(self, *, wait: bool = False) -> int:
-        """Run until the launch is over; return the exit status: 0, or 1 if a required node failed.
+        """Run until the launch is over; return 1 if a required node failed, else 0.
 
         ``wait``: wait for a master instead of starting one. Raise MasterUnreachableError if the master cannot be started here,
         LaunchError if a node cannot be run.
@@ -111,7 +111,7 @@ class Launcher:
     # --- starting
 
     def start(self, *, wait: bool = False) -> None:
-        """Print the summary, find or start a master, set the parameters, and start the nodes.
+        """Print the summary, find or start a master, set the parameters and start the nodes.
 
         Raise LaunchError if a node cannot be run, MasterUnreachableError if the master cannot be started here, MinirospyError
         for other failures, KeyboardInterrupt if the run is stopped in the meantime.
@@ -136,7 +136,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # Skip the first number: if a roslaunch starts the master, ROS uses that number for /rosout.
+            # Skip the first number, which ROS uses for /rosout if roslaunch starts the master.
             next(self._numbers)
 
         self.set_parameters()
@@ -154,11 +154,11 @@ class Launcher:
         self._master.set_parameters(self._spec)
 
     def process_name(self, node: NodeSpec) -> str:
-        """Return a new process name for a node: the node's name and a number."""
+        """Return a new process name for a node: its name and a number."""
         return f"{node.name.lstrip('/')}-{next(self._numbers)}"
 
     def start_node(self, node: NodeSpec, name: str = "") -> Process | None:
-        """Start a node as the process ``name`` ("": a new name). If it cannot be started, warn and return None."""
+        """Start a node as process ``name`` ("": a new name). If that fails, warn and return None."""
         self._has_run = True
         try:
             process = self._start_process(node, name or self.process_name(node))
@@ -172,7 +172,7 @@ class Launcher:
         return process
 
     def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
-        """Return the nodes on this machine and those on other machines. Raise LaunchError if a machine is unknown."""
+        """Return the nodes on this machine and those on others. Raise LaunchError if a machine is unknown."""
         here: list[NodeSpec] = []
         elsewhere: list[NodeSpec] = []
         for node in self._spec.nodes:
@@ -217,13 +217,13 @@ class Launcher:
             self._output.warn(f"WARNING: {text}")
 
     def _folders(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the folders of the nodes' packages, without those that do not exist."""
+        """Yield the folders of the nodes' packages, skipping missing ones."""
         for package in dict.fromkeys(node.package for node in nodes):
             with contextlib.suppress(MinirospyError):
                 yield self._packages.find(package)
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the nodes' programs. Skip missing ones, which are reported when the node is started."""
+        """Yield the nodes' programs, skipping missing ones, which are reported when their node starts."""
         for node in nodes:
             with contextlib.suppress(MinirospyError):
                 yield Path(node_program(node, self._packages)[-1])
@@ -272,11 +272,11 @@ class Launcher:
 
     @property
     def stopped_by(self) -> str:
-        """Return the signal or stop() caller that stopped the run, or "" if the nodes exited by themselves."""
+        """Return the signal or stop() caller that stopped the run, or "" if the nodes exited on their own."""
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
-        """Watch the nodes until all nodes or a required one have exited, or stop() was called; return the exit status.
+        """Watch the nodes until all of them or a required one have exited, or stop() is called; return the exit status.
 
         ``forever``: continue even if no node is left.
         """
@@ -305,7 +305,7 @@ class Launcher:
             self._on_end(process)
 
     def _on_end(self, process: Process) -> None:
-        """Handle a node's exit. A hook for subclasses."""
+        """Do nothing. Called when a node exits; subclasses may override this method."""
 
     # --- shutdown
 
@@ -351,7 +351,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Remove exited nodes' registrations from the master, unless the master is about to exit, too."""
+        """Unregister exited nodes from the master, unless it is about to exit too."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)
@@ -374,7 +374,7 @@ class Launcher:
 
 
 def _is_here(machine: MachineSpec) -> bool:
-    """Return whether a machine is this one and its user is the current one."""
+    """Return whether a machine is this one, with the current user."""
     if machine.user:
         import getpass
 

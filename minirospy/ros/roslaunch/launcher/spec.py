@@ -13,7 +13,7 @@ __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand"
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` include those of the enclosing groups.
+    """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` include those of enclosing groups.
 
     If a ``<test>`` has no name, ``name`` is a namespace that ends with a slash. The test's parameters are set in that
     namespace, and ``named()`` generates a name before the test runs. ``output`` and ``cwd`` are empty if the file does not set
@@ -47,15 +47,15 @@ class NodeSpec:
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
-        """Return the node; if the node has no name, return a copy with a unique generated name."""
+        """Return the node, or a copy with a unique generated name if it has no name."""
         if self.base_name:
             return self
         base = "".join(c if c.isalnum() else "_" for c in self.type)
         return replace(self, name=f"{self.namespace}{anonymous_name(base)}")
 
     def to_xml(self) -> str:
-        """Return the equivalent launch-file ``<node>``, without its machine."""
-        # Import this module here: its import takes longer than those of all other roslaunch modules together.
+        """Return the node in launch-file syntax, without its machine."""
+        # Imported here, because this import takes longer than all other roslaunch modules together.
         from xml.sax.saxutils import quoteattr
 
         attributes = {
@@ -80,7 +80,7 @@ class NodeSpec:
 
 @dataclass(frozen=True)
 class TestSpec:
-    """A ``<test>`` for rostest: its name in the results, its node, its time limit in seconds, and its number of retries."""
+    """A ``<test>`` for rostest: the name in its results, its node, time limit in seconds, and number of retries."""
 
     test_name: str
     node: NodeSpec
@@ -90,7 +90,7 @@ class TestSpec:
 
 @dataclass(frozen=True)
 class MachineSpec:
-    """A ``<machine>`` that runs nodes: its address for ssh, and the script that sets up ROS there (``env_loader``)."""
+    """A ``<machine>`` that runs nodes: its ssh address, and the script ``env_loader`` that sets up ROS there."""
 
     name: str
     address: str
@@ -105,7 +105,7 @@ class MachineSpec:
 
 @dataclass(frozen=True)
 class ParameterCommand:
-    """A ``<rosparam>`` that deletes the namespace ``name`` at the master, or dumps it to ``file``."""
+    """A ``<rosparam>`` that deletes the namespace ``name`` on the master or dumps it to ``file``."""
 
     name: str
     file: str | None = None
@@ -113,7 +113,7 @@ class ParameterCommand:
 
 @dataclass(frozen=True)
 class ArgDoc:
-    """An ``<arg>`` in the first file, with its default (None if the arg is required) and its doc."""
+    """An ``<arg>`` of the first file, with its default (None: required) and doc."""
 
     name: str
     default: str | None
@@ -122,7 +122,7 @@ class ArgDoc:
 
 @dataclass
 class LaunchSpec:
-    """The combined content of all files.
+    """The combined content of all launch files.
 
     ``params``: values by name; ``clear``: namespaces to delete; ``commands``: <rosparam> commands to run before the
     parameters are set; ``files``: all files read, without duplicates; ``includes``: (file, included file); ``args``:
@@ -140,15 +140,15 @@ class LaunchSpec:
     machines: dict[str, MachineSpec] = field(default_factory=dict)
     warnings: list[LaunchError] = field(default_factory=list)
 
-    # --- adding: the loader calls these methods in the order of the tags
+    # --- adding: called by the loader in the order of the tags
 
     def add_file(self, path: str, name: str) -> None:
-        """Record that a file is being read; ``name`` is its path as written."""
+        """Record a file that is being read; ``name`` is its path as written."""
         if path not in self.files:
             self.files.append(path)
 
     def end_include(self, name: str) -> None:
-        """Handle the end of an included file."""
+        """Do nothing. Called at the end of an included file; subclasses may override this method."""
 
     def add_node(self, node: NodeSpec) -> None:
         """Add a node."""
@@ -180,18 +180,18 @@ class LaunchSpec:
         self.commands.append(command)
 
     def add_machine(self, machine: MachineSpec) -> None:
-        """Add a machine. Raise LaunchError if a different machine has the same name."""
+        """Add a machine. Raise LaunchError if a different one has the same name."""
         other = self.machines.setdefault(machine.name, machine)
         if replace(other, file=machine.file, line=machine.line) != machine:
             text = f"machine [{machine.name}] is declared otherwise at {other.file}:{other.line}"
             raise LaunchError(machine.file, machine.line, text)
 
     def add_warning(self, warning: LaunchError, ros_text: str = "") -> None:
-        """Add a warning about content that is ignored; ``ros_text`` is the wording of ROS's roslaunch, if it differs."""
+        """Add a warning about ignored content; ``ros_text`` is roslaunch's wording, if it differs."""
         self.warnings.append(warning)
 
     def runs_command(self, text: str) -> None:
-        """Handle the start of a ``<param>``'s command."""
+        """Do nothing. Called when a ``<param>``'s command starts; subclasses may override this method."""
 
     # --- reading
 
@@ -201,11 +201,11 @@ class LaunchSpec:
         yield from (test.node for test in self.tests)
 
     def named_runnables(self) -> Iterator[NodeSpec]:
-        """Yield the runnables that already have a name."""
+        """Yield the nodes and test nodes that already have a name."""
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine that runs a node, or None for this machine. Raise LaunchError if the machine is unknown."""
+        """Return a node's machine, or None for this machine. Raise LaunchError if the machine is unknown."""
         name = node.machine
         if name in ("", "localhost"):
             return None

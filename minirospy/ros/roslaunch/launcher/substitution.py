@@ -26,7 +26,7 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-# maximum number of characters produced per load, because each level of args that repeat other args can double the size
+# Maximum characters produced per load: each level of args that repeat other args can double the size.
 _MAX_SUBSTITUTED = 64 * 1024 * 1024
 _MAX_SHOWN = 200  # maximum length of a string quoted in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
@@ -38,7 +38,7 @@ class SubstitutionError(ValueError):
 
 @dataclass
 class Substitution:
-    """The values for one file's substitutions.
+    """The values for the substitutions in one file.
 
     ``used`` contains every arg that was used, in any file. ``unset`` maps each arg declared without a value to the error
     message for using it.
@@ -55,7 +55,7 @@ class Substitution:
     """The number of characters that substitutions have produced in all files of a load."""
 
     def apply(self, text: str) -> str:
-        """Return ``text`` with every substitution resolved.
+        """Resolve all substitutions in ``text`` and return the result.
 
         Raise SubstitutionError if a substitution is invalid or has no value, NotFoundError if a package is not found.
         """
@@ -119,7 +119,7 @@ class Substitution:
         return self.environ.get(name, " ".join(default))
 
     def _optenv_value(self, name: str, default: object = "") -> object:
-        """Evaluate ``optenv()`` in an expression: return the variable's value, else the default, which may be a number."""
+        """Evaluate ``optenv()`` in an expression: return the variable's value, else the default (possibly a number)."""
         return self.environ.get(name, default)
 
     def _anon(self, name: str) -> str:
@@ -129,7 +129,7 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """Evaluate a Python expression; return the value as a string. Raise SubstitutionError if the expression is invalid.
+        """Evaluate a Python expression; return its value as a string. Raise SubstitutionError if it is invalid.
 
         The expression can run any Python code, as ``<param command=...>`` can run any program.
         """
@@ -158,13 +158,13 @@ class Substitution:
 
 
 def _shown(text: str) -> str:
-    """Return a string for an error message, on one line and truncated to ``_MAX_SHOWN`` characters."""
+    """Format a string for an error message: on one line, with at most ``_MAX_SHOWN`` characters."""
     text = " ".join(text[: _MAX_SHOWN + 1].split()) if "\n" in text else text
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
 
 
 class _Names(dict[str, object]):
-    """The names available in an expression: Python's, those from ``math``, and the args' values."""
+    """The names available in an expression: Python's built-ins, those from ``math``, and the args."""
 
     def __init__(self, substitution: Substitution, known: dict[str, object]) -> None:
         super().__init__(known)
@@ -177,7 +177,7 @@ class _Names(dict[str, object]):
 
 
 def convert(text: str, type_: str) -> object:
-    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto.
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml or auto.
 
     Raise ValueError if the type is unknown or the text does not match it.
     """
@@ -203,7 +203,7 @@ def convert(text: str, type_: str) -> object:
             try:
                 loaded: object = load(text, fast_loader())
             except yaml.scanner.ScannerError:
-                # Like ROS's loader, which is written in Python, also accept a colon directly before a bracket.
+                # Like ROS's pure-Python loader, also accept a colon directly before a bracket.
                 loaded = load(text, yaml.SafeLoader)
         except yaml.YAMLError as error:
             why = " ".join(str(getattr(error, "problem", None) or error).split())
@@ -216,7 +216,7 @@ def _guess(text: str) -> object:
     try:
         if "." in text:
             return float(text)
-        # ROS rejects underscores in an int, although Python accepts them.
+        # ROS, unlike Python, rejects underscores in an int.
         if "_" not in text:
             return int(text)
     except ValueError:

@@ -16,10 +16,10 @@ from minirospy.ros.roslaunch.launcher.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_RESPAWN_SECONDS = 0.1  # minimum seconds between starts of a node that exits right away
+_RESPAWN_SECONDS = 0.1  # minimum seconds between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds per wait of the main thread, which receives signals.
+"""Maximum seconds of each wait in the main thread, which receives signals.
 
 A signal just before a wait (on Windows, any signal) is handled only after that wait. Changed files and remote processes
 are checked between waits.
@@ -29,13 +29,13 @@ _BAR = "=" * 80
 
 
 class _Exited(NamedTuple):
-    """A process has exited."""
+    """Event: a process has exited."""
 
     process: Process
 
 
 class _RemoteExited(NamedTuple):
-    """A process on another machine has exited."""
+    """Event: a process on another machine has exited."""
 
     node: NodeSpec | None
     name: str
@@ -43,26 +43,26 @@ class _RemoteExited(NamedTuple):
 
 
 class _Ended(NamedTuple):
-    """A process was terminated by :meth:`Supervisor.end_process`."""
+    """Event: :meth:`Supervisor.end_process` has terminated a process."""
 
     process: Process
 
 
 class _Stop(NamedTuple):
-    """A signal or a caller stops the run."""
+    """Event: a signal or a caller stops the run."""
 
     why: str
 
 
 class _NoMoreNodes(NamedTuple):
-    """No more nodes will be started, so the run is over once the current ones have exited."""
+    """Event: no more nodes will be started, so the run is over once the current ones have exited."""
 
 
 _Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
 
 
 class Supervisor:
-    """Watches processes. ``start(node, name)`` restarts a node; ``on_exit(process)`` is called when a process has exited.
+    """Watches processes. ``start(node, name)`` restarts a node; ``on_exit(process)`` is called after each exit.
 
     ``files`` detects nodes whose programs have changed, to restart them. ``is_remote_running()`` returns whether a process
     on another machine is running. ``clock`` returns seconds.
@@ -111,7 +111,7 @@ class Supervisor:
         self.on_change()
 
     def add_master(self, process: Process) -> None:
-        """Watch a master; the run is over when the master exits."""
+        """Watch a master, whose exit ends the run."""
         self.master = process
         self._attend(process)
 
@@ -121,24 +121,24 @@ class Supervisor:
         self._restarts.clear()
         self.master = None
 
-    # --- from any thread
+    # --- called from any thread
 
     def stop(self, why: str) -> None:
         """Stop the run."""
         self._events.put(_Stop(why))
 
     def end_with_nodes(self) -> None:
-        """Make watch(forever=True) return after the last node has exited."""
+        """Make watch(forever=True) return once the last node has exited."""
         self._events.put(_NoMoreNodes())
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
         """Report that a process on another machine has exited."""
         self._events.put(_RemoteExited(node, name, code))
 
-    # --- in the thread that runs the launch
+    # --- called in the thread that runs the launch
 
     def watch(self, *, forever: bool = False) -> int | None:
-        """Watch until all processes, or a required one, have exited, or stop() is called.
+        """Watch the processes until all of them or a required one have exited, or stop() is called.
 
         Return the exit status, or None if no process is left. ``forever``: continue even if no process is left.
         """
@@ -164,7 +164,7 @@ class Supervisor:
         return None
 
     def pause(self, seconds: float) -> None:
-        """Sleep. Raise KeyboardInterrupt if stop() is called during the sleep."""
+        """Sleep; raise KeyboardInterrupt if stop() is called meanwhile."""
         try:
             event = self._events.get(timeout=seconds)
         except queue.Empty:
@@ -184,7 +184,7 @@ class Supervisor:
     # --- helpers
 
     def _attend(self, process: Process) -> None:
-        """Wait in a thread for a process to exit, then put an event on the queue."""
+        """Wait in a thread for a process's exit, then queue an event."""
 
         def wait() -> None:
             process.popen.wait()
@@ -193,7 +193,7 @@ class Supervisor:
         threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
 
     def _next_event(self) -> _Event | None:
-        """Return the next event. After a slice without events, return None after handling due restarts and changed files."""
+        """Return the next event, or None after handling due restarts and changed files if there was no event for a while."""
         pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
             return self._events.get(timeout=min(pauses))
@@ -254,14 +254,14 @@ class Supervisor:
         return 0 if event.code == 0 else 1
 
     def _forget_restart(self, process: Process) -> None:
-        """Stop watching a process that was terminated before its pending restart."""
+        """Stop watching a process that was terminated while waiting for its restart."""
         others = [each for each in self._restarts if each[1] is not process]
         if len(others) < len(self._restarts) and not process.is_restarting:
             self._restarts = others
             self.processes.remove(process)
 
     def _restart(self, process: Process) -> None:
-        """Restart an exited node at the same position in the list of processes."""
+        """Restart an exited node at its position in the list of processes."""
         node = process.node
         assert node
         if process.is_ending and not process.is_restarting:

@@ -13,7 +13,7 @@ __all__ = ["FileWatch"]
 
 
 class FileWatch:
-    """Watches a node's program, and the Python modules in its package's ``src`` folder."""
+    """Watches a node's program and the Python modules in its package's ``src`` folder."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
@@ -24,10 +24,10 @@ class FileWatch:
         self._seen[node.name] = self._times(node)
 
     def changed(self, node: NodeSpec) -> Path | None:
-        """Return a file that has changed since the node was added, or since the last call."""
+        """Return a file that has changed since add() or the last call, or None."""
         before, now = self._seen.get(node.name, {}), self._times(node)
         self._seen[node.name] = now
-        # Ignore a missing file, which is probably just being rewritten.
+        # Ignore missing files, which are probably being rewritten.
         return next((path for path, when in now.items() if before.get(path) != when), None)
 
     def _times(self, node: NodeSpec) -> dict[Path, int]:

@@ -85,7 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def handle_exception(
     roslaunch_core: Any, logger: logging.Logger | None, msg: str, e: BaseException
 ) -> NoReturn:
-    """Print an error to stderr, write its traceback to the log, and exit."""
+    """Print an error to stderr, log its traceback and exit."""
     import traceback
 
     roslaunch_core.printerrlog(msg + str(e))

@@ -17,7 +17,7 @@ __all__ = [
 
 
 def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
-    """Return the args that launch files declare: a dict of (doc, default) keyed by name."""
+    """Return the args that launch files declare as a dict from names to (doc, default)."""
     packages, found = chosen_packages(), {}
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each
@@ -27,7 +27,7 @@ def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | Non
 
 
 def dump_args(roslaunch_files: Sequence[LaunchFile]) -> None:
-    """Print the arguments of launch files, required ones first. Print an error and exit if a file cannot be read."""
+    """Print the launch files' arguments, required ones first. Print an error and exit if a file cannot be read."""
     try:
         args = get_args(roslaunch_files)
     except RLException as error:

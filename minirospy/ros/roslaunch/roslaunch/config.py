@@ -43,7 +43,7 @@ LaunchFile = str | tuple[str, Sequence[str]]
 
 
 class ROSLaunchConfig:
-    """The content of launch files: ``nodes``, ``params`` (by global name), ``machines``, ``tests``, ``clear_params``."""
+    """Launch file content: ``nodes``, ``params`` (by global name), ``machines``, ``tests`` and ``clear_params``."""
 
     def __init__(self) -> None:
         self.master = Master()
@@ -56,7 +56,7 @@ class ROSLaunchConfig:
         self.clear_params: list[str] = []
         self.roslaunch_files: list[str] = []
         self.config_errors: list[str] = []
-        self.resolved_node_names: list[str] = []  # the global names of nodes that have a name
+        self.resolved_node_names: list[str] = []  # global names of the nodes that have a name
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
         """Add a node. Raise RLException if its name is already used."""
@@ -84,12 +84,12 @@ class ROSLaunchConfig:
         self.executables.append(exe)
 
     def add_roslaunch_file(self, f: str) -> None:
-        """Add a file to the list of files that were read."""
+        """Add a file to the list of files read."""
         if f not in self.roslaunch_files:
             self.roslaunch_files.append(f)
 
     def set_master(self, m: Master) -> None:
-        """Set the master for the nodes."""
+        """Set the master that the nodes use."""
         self.master = m
 
     def assign_machines(self) -> None:
@@ -103,12 +103,12 @@ class ROSLaunchConfig:
             node.machine = self.machines[found.name if found else ""]
 
     def has_remote_nodes(self) -> bool:
-        """Return whether assign_machines() has assigned a node to another machine."""
+        """Return whether assign_machines() has assigned any node to another machine."""
         nodes = (*self.nodes, *self.tests)
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
     def summary(self, local: bool = False) -> str:
-        """Return the summary that roslaunch prints before it starts any process. It lists machines unless ``local``."""
+        """Return the summary that roslaunch prints before starting processes. It lists machines unless ``local``."""
         return summary(
             self.spec.nodes,
             {name: param.value for name, param in self.params.items()},
@@ -117,7 +117,7 @@ class ROSLaunchConfig:
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
-        """Add a parameter. If its name is below another parameter's name, record a configuration error."""
+        """Add a parameter. If its name is inside another parameter's namespace, record a configuration error."""
         for parent in namespaces_of(p.key):
             if parent in self.params:
                 self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
@@ -126,11 +126,11 @@ class ROSLaunchConfig:
             printlog(f"Added parameter [{p.key}]")
 
     def add_clear_param(self, param: str) -> None:
-        """Add a namespace that is deleted before the parameters are set."""
+        """Add a namespace to delete before the parameters are set."""
         self.clear_params.append(param)
 
     def add_machine(self, m: Machine, verbose: bool = True) -> bool:
-        """Add a machine; return False if it was already added. Raise RLException if a different machine has the same name."""
+        """Add a machine; return False if it was already added. Raise RLException if a different one has the same name."""
         if m.name not in self.machines:
             self.machines[m.name] = m
             if verbose:
@@ -141,12 +141,12 @@ class ROSLaunchConfig:
         return False
 
     def add_config_error(self, msg: str) -> None:
-        """Add a configuration error, to be printed as a warning."""
+        """Add a configuration error to print as a warning."""
         self.config_errors.append(msg)
 
     @property
     def spec(self) -> LaunchSpec:
-        """Return the whole configuration as a LaunchSpec, which the launcher can run."""
+        """Return the whole configuration as a LaunchSpec for the launcher."""
         return LaunchSpec(
             nodes=[node.spec for node in self.nodes],
             params={name: _as_sent(param.value) for name, param in self.params.items()},
@@ -167,7 +167,7 @@ def load_config_default(
     assign_machines: bool = True,
     ignore_unset_args: bool = False,
 ) -> ROSLaunchConfig:
-    """Return the combined configuration from launch files and strings. Raise RLException if a file or string is invalid."""
+    """Combine launch files and strings into a configuration. Raise RLException if one of them is invalid."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
     if port:
         environment = Environment.read()
@@ -188,12 +188,12 @@ def load_config_default(
 
 
 def get_roscore_filename() -> str | None:
-    """Return the launch file for the master's own nodes: always None, because it has none."""
+    """Return None: the master does not start nodes from a launch file."""
     return None
 
 
 def _parameter_command(exe: Executable) -> ParameterCommand | None:
-    """Return a rosparam command in the launcher's form, or None if the launcher does not support the command."""
+    """Convert a rosparam command for the launcher, or return None if it is not supported."""
     match (exe.command, *exe.args):
         case ("rosparam", "delete", name):
             return ParameterCommand(name)
@@ -212,13 +212,13 @@ def _as_sent(value: object) -> object:
 
 
 def namespaces_of(name: str) -> list[str]:
-    """Return the namespaces that contain a global name, starting with the root."""
+    """Return the namespaces that contain a global name, from the root downwards."""
     parts = name.strip("/").split("/")[:-1]
     return ["/", *("/" + "/".join(parts[: i + 1]) for i in range(len(parts)))]
 
 
 def calculate_env_loader(env: Mapping[str, str] | None = None) -> str:
-    """Return the path of the distribution's script that sets the environment on another machine."""
+    """Return the path of the distribution's script that sets up the environment on another machine."""
     from minirospy.ros.rospkg.rospkg.distro import current_distro_codename
 
     return f"/opt/ros/{current_distro_codename()}/env.sh"

@@ -64,7 +64,7 @@ class RLException(Exception):
 
 
 class Master:
-    """The master for the nodes; ``uri`` defaults to the environment's."""
+    """The master for the nodes; ``uri`` defaults to the environment's master URI."""
 
     ROSMASTER = "rosmaster"
 
@@ -75,15 +75,15 @@ class Master:
 
     @property
     def environment(self) -> Environment:
-        """Return the environment with this master's URI."""
+        """Return an environment that contains this master's URI."""
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """Return the host in the master's URI. Raise ValueError if the URI is not a URL."""
+        """Return the host in the master's URI. Raise ValueError if it is not a URL."""
         return _host_and_port(self.uri)[0]
 
     def get_port(self) -> int:
-        """Return the port in the master's URI, or 80 if the URI has no port. Raise ValueError if the URI is not a URL."""
+        """Return the port in the master's URI, by default 80. Raise ValueError if the URI is not a URL."""
         return _host_and_port(self.uri)[1]
 
     def get(self) -> ServerProxy:
@@ -111,7 +111,7 @@ class Master:
 
 
 class Param:
-    """A parameter: its global name and its value."""
+    """A parameter's global name and value."""
 
     def __init__(self, key: str, value: object) -> None:
         self.key = names.canonicalize(key)
@@ -132,7 +132,7 @@ class Machine:
 
     @classmethod
     def of(cls, spec: MachineSpec) -> Machine:
-        """Return the machine that a launch file declares."""
+        """Create a Machine from a launch file's machine."""
         return cls(
             spec.name, spec.address, spec.env_loader or None, spec.ssh_port, spec.user or None, spec.password or None,
             timeout=spec.timeout,
@@ -176,7 +176,7 @@ class Machine:
         )
 
     def config_equals(self, m2: object) -> bool:
-        """Return whether the other machine has the same address and setup, regardless of its name."""
+        """Return whether another machine has the same address and setup, ignoring the names."""
         return isinstance(m2, Machine) and self.config_key() == m2.config_key()
 
     def __eq__(self, other: object) -> bool:
@@ -198,12 +198,12 @@ class Machine:
 
 @functools.cache
 def local_machine() -> Machine:
-    """Return this machine; always the same object."""
+    """Return this machine, always as the same object."""
     return Machine("", "localhost")
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one. Raise RLException if the machine's address cannot be resolved."""
+    """Return whether a machine is this one. Raise RLException if its address cannot be resolved."""
     try:
         socket.getaddrinfo(machine.address or ".", None)
     except (OSError, UnicodeError) as error:
@@ -212,7 +212,7 @@ def is_machine_local(machine: Machine) -> bool:
 
 
 class Executable:
-    """A command that roslaunch runs in a ``phase`` of the launch."""
+    """A command that roslaunch runs during a ``phase`` of the launch."""
 
     def __init__(self, cmd: str, args: Sequence[str], phase: str = PHASE_RUN) -> None:
         self.command = cmd
@@ -231,7 +231,7 @@ class RosbinExecutable(Executable):
 
 
 class Node:
-    """A node to launch. A node without a ``name`` gets a generated one when it is launched."""
+    """A node to launch. Without a ``name``, it gets a generated one at launch."""
 
     def __init__(
         self,
@@ -278,7 +278,7 @@ class Node:
         self.machine: Machine | None = None
         self.process_name: str | None = None
 
-        # As in ROS, keep the caller's own list, which the caller may change later.
+        # As in ROS, keep the caller's list, which the caller may change later.
         self.remap_args: Sequence[Sequence[str]] = remap_args or []
         self.env_args: Sequence[tuple[str, str]] = env_args or []
         self.output = output
@@ -301,11 +301,11 @@ class Node:
         self.name = self.spec.named().base_name
 
     def xmltype(self) -> str:
-        """Return the tag's name."""
+        """Return the XML tag's name."""
         return "node"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) for each of the tag's attributes; the value is None for an attribute that is not set."""
+        """Return (name, value) for each XML attribute; the value of an unset attribute is None."""
         return [
             *self._placed(),
             ("respawn", self.respawn),
@@ -361,7 +361,7 @@ class Node:
 
 
 class Test(Node):
-    """A ``<test>``."""
+    """A ``<test>`` in a launch file."""
 
     def __init__(
         self,
@@ -395,11 +395,11 @@ class Test(Node):
         self.retry = retry or 0
 
     def xmltype(self) -> str:
-        """Return the tag's name."""
+        """Return the XML tag's name."""
         return "test"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) for each of the tag's attributes; retry and time-limit only if they differ from the defaults."""
+        """Return (name, value) for each XML attribute; retry and time-limit only if they differ from the defaults."""
         attributes = [*self._placed(), *self._named(), ("test-name", self.test_name)]
         if self.retry:
             attributes.append(("retry", str(self.retry)))
@@ -430,7 +430,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Forwards either the error lines or all other lines to a function."""
+    """Passes printed lines to a function: error lines if ``errors``, otherwise all other lines."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function
@@ -440,27 +440,27 @@ class _Handler:
         if (level >= ERROR) == self.errors:
             try:
                 self._function(text)
-            except Exception:  # the program's own function failed; as in ROS, print the line anyway
+            except Exception:  # the program's function failed; as in ROS, still print the line
                 logging.getLogger("roslaunch").debug("a handler of roslaunch's output raised", exc_info=True)
 
 
 def add_printlog_handler(h: Callable[[str], object]) -> None:
-    """Add a function that is called with each line that roslaunch writes to stdout."""
+    """Add a function to call with each line that roslaunch writes to stdout."""
     Output.handlers.append(_Handler(h, errors=False))
 
 
 def add_printerrlog_handler(h: Callable[[str], object]) -> None:
-    """Add a function that is called with each line that roslaunch writes to stderr."""
+    """Add a function to call with each line that roslaunch writes to stderr."""
     Output.handlers.append(_Handler(h, errors=True))
 
 
 def clear_printlog_handlers() -> None:
-    """Remove the functions that add_printlog_handler() added."""
+    """Remove the functions added by add_printlog_handler()."""
     _clear(errors=False)
 
 
 def clear_printerrlog_handlers() -> None:
-    """Remove the functions that add_printerrlog_handler() added."""
+    """Remove the functions added by add_printerrlog_handler()."""
     _clear(errors=True)
 
 
@@ -470,14 +470,14 @@ def generate_run_id() -> str:
 
 
 def get_master_uri_env() -> str:
-    """Return the master's URI from the environment."""
+    """Return the master URI from the environment."""
     return Environment.read().master_uri
 
 
 def setup_env(
     node: Node | None, machine: Machine, master_uri: str, env: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """Return the environment for a node's process, based on ``env`` (default: this process's environment)."""
+    """Return a node's environment, based on ``env`` (default: this process's environment)."""
     environment = Environment.read()._replace(master_uri=master_uri)
     return node_environment((node or Node("p", "t", "n")).spec, environment, env)
 
@@ -507,7 +507,7 @@ _child_mode = [False]
 
 
 def is_child_mode() -> bool:
-    """Return whether this process runs the nodes of a launch on another machine."""
+    """Return whether this process runs a launch's nodes for a roslaunch on another machine."""
     return _child_mode[0]
 
 
@@ -517,7 +517,7 @@ def set_child_mode(child_mode: bool) -> None:
 
 
 def rle_wrapper(fn: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that calls ``fn`` and converts every exception to RLException."""
+    """Return a function that calls ``fn`` and converts all exceptions to RLException."""
 
     def call(*args: object) -> object:
         try:
@@ -529,7 +529,7 @@ def rle_wrapper(fn: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def remap_localhost_uri(uri: str, force_localhost: bool = False) -> str:
-    """Replace localhost in a URI with this machine's address; if ``force_localhost``, replace any host."""
+    """Replace localhost in a URI with this machine's address, or any host if ``force_localhost``."""
     parts = urlsplit(uri)
     if force_localhost or parts.hostname == "localhost":
         return f"http://{Environment.read().host}:{parts.port}/"

@@ -27,11 +27,11 @@ NAME = "roslaunch-deps"
 
 
 class RoslaunchDepsException(Exception):
-    """Raised if the dependencies of a launch file cannot be determined."""
+    """Raised if a launch file's dependencies cannot be determined."""
 
 
 class RoslaunchDeps:
-    """The dependencies of a launch file: ``nodes`` (package, program), ``includes`` (files), ``pkgs`` (packages)."""
+    """A launch file's dependencies: ``nodes`` (package, program), ``includes`` (files), ``pkgs`` (packages)."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ def roslaunch_deps(
     use_test_depends: bool = False,
     ignore_unset_args: bool = False,
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
-    """Return the first file's package, each file's dependencies, and those missing from each package's package.xml.
+    """Return the first file's package, each file's dependencies, and the dependencies missing from package.xml files.
 
     Raise RoslaunchDepsException if a file or package.xml is invalid.
     """
@@ -76,7 +76,7 @@ def roslaunch_deps(
 
 
 def parse_launch(launch_file: str, file_deps: dict[str, RoslaunchDeps], verbose: bool) -> None:
-    """Add the dependencies of a launch file and of each file that it includes to ``file_deps``.
+    """Add the dependencies of a launch file and the files that it includes to ``file_deps``.
 
     Raise RoslaunchDepsException if a file is invalid.
     """
@@ -93,7 +93,7 @@ def parse_launch(launch_file: str, file_deps: dict[str, RoslaunchDeps], verbose:
 
 
 def rl_file_deps(file_deps: dict[str, RoslaunchDeps], launch_file: str, verbose: bool = False) -> None:
-    """Add a launch file's dependencies, like :func:`parse_launch`."""
+    """Add a launch file's dependencies; same as :func:`parse_launch`."""
     parse_launch(launch_file, file_deps, verbose)
 
 
@@ -103,7 +103,7 @@ def fullusage() -> None:
 
 
 def print_deps(base_pkg: object, file_deps: Mapping[str, RoslaunchDeps], verbose: bool) -> None:
-    """Print the packages that launch files need on one line.
+    """Print the packages that launch files need, on one line.
 
     If ``verbose``, print each program and file before that line.
     """
@@ -126,7 +126,7 @@ def calculate_missing(
     file_deps: Mapping[str, RoslaunchDeps],
     use_test_depends: bool = False,
 ) -> dict[str, set[str]]:
-    """Add to ``missing`` the packages that launch files need but package.xml does not declare; return ``missing``."""
+    """Add the packages that launch files need but package.xml does not declare to ``missing``; return ``missing``."""
     for file, deps in file_deps.items():
         package = package_of(file)
         if package is None:

@@ -46,11 +46,11 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 class RLTestTimeoutException(RLException):
-    """Raised if a test has exceeded its time limit."""
+    """Raised if a test exceeded its time limit."""
 
 
 class ROSLaunchRunner:
-    """Runs a configuration in the background. Its methods raise RLException on an error."""
+    """Runs a configuration in the background. Methods raise RLException on an error."""
 
     def __init__(
         self,
@@ -110,12 +110,12 @@ class ROSLaunchRunner:
             monitor.close()
             raise
         monitor.watch()
-        # If the program exits without calling stop(), still terminate the launched processes in the right order.
+        # If the program exits without calling stop(), still terminate the processes in the right order.
         atexit.register(self._end_with_program)
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
     def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
-        """Start another node. Return (its process, True), or (its name, False) if the node fails to start.
+        """Start an additional node. Return (its process, True), or (its name, False) on failure.
 
         Raise RLException after a shutdown.
         """
@@ -145,18 +145,18 @@ class ROSLaunchRunner:
         return process.exit_code == 0
 
     def is_node_running(self, node: Node) -> bool:
-        """Return whether this runner has started the node and it is still running."""
+        """Return whether a node started by this runner is still running."""
         name = node.spec.name
         return any(
             each.node and each.node.name == name and each.is_running for each in self._launcher.processes
         )
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Add a listener that is notified when a process exits."""
+        """Add a listener to notify when a process exits."""
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:
-        """Wait until all nodes have exited, or terminate them on a signal. Without nodes, return immediately."""
+        """Wait until all nodes have exited, or terminate them on a signal. Return immediately if there are none."""
         monitor = self._monitor()
         try:
             if self._launcher.supervisor.is_anything_left:
@@ -174,7 +174,7 @@ class ROSLaunchRunner:
         return self.pm is not None and self.pm.mainthread_spin_once()
 
     def stop(self) -> None:
-        """Terminate all processes and wait for their exit. Idempotent."""
+        """Terminate all processes and wait until they exit. Idempotent."""
         monitor, self.pm = self.pm, None
         if monitor is None:
             return
@@ -186,7 +186,7 @@ class ROSLaunchRunner:
             monitor.close()
 
     def _end_with_program(self) -> None:
-        # A forked child of the program must not stop the nodes when it exits.
+        # A forked child of the program must not stop the nodes at its exit.
         if os.getpid() == self._pid:
             self.stop()
 
@@ -196,7 +196,7 @@ class ROSLaunchRunner:
         return self.pm
 
     def _load_parameters(self) -> None:
-        """Set the parameters without starting any nodes. Raise RLException if a parameter cannot be set."""
+        """Set the parameters without starting nodes. Raise RLException if a parameter cannot be set."""
         try:
             self._launcher.set_parameters()
         except (MinirospyError, RpcError) as error:
@@ -204,14 +204,14 @@ class ROSLaunchRunner:
 
 
 def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str, ...]:
-    """Return the options for starting a master."""
+    """Return the master's start options."""
     options: list[str] = ["--timeout", str(timeout)] if timeout is not None else []
     options += ["--master-logger-level", str(logger_level)] if logger_level else []
     return tuple(options)
 
 
 def replacement_of(module: str, name: str, ours: Function) -> Function:
-    """Return the function that a program has put in place of ``ours`` in one of roslaunch's modules, else ``ours``.
+    """Return the function that a program has substituted for ``ours`` in a roslaunch module, or ``ours``.
 
     For example, programs disable roslaunch's signal handlers with ``roslaunch.pmon._init_signal_handlers = ...``.
     """
@@ -220,7 +220,7 @@ def replacement_of(module: str, name: str, ours: Function) -> Function:
 
 
 def unify_clear_params(params: Iterable[str]) -> list[str]:
-    """Return the namespaces to delete, with trailing slashes. Omit namespaces that are inside another one."""
+    """Return the namespaces to delete, with trailing slashes, omitting namespaces inside others."""
     names = [name if name.endswith("/") else f"{name}/" for name in params]
     return [
         name

@@ -30,7 +30,7 @@ def get_node_list(config: ROSLaunchConfig) -> list[str]:
 
 
 def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list[str]:
-    """Return a node's command, prefixed with its environment variables.
+    """Return a node's command, preceded by its environment variables.
 
     Raise NodeParamsException if the node is unknown or its command cannot be built.
     """
@@ -41,7 +41,7 @@ def get_node_args(node_name: str, roslaunch_files: Sequence[LaunchFile]) -> list
 
 
 def create_local_process_args(node: Node, machine: Machine | None, env: object = None) -> list[str]:
-    """Return a node's command. Raise NodeParamsException if the command cannot be built."""
+    """Return a node's command. Raise NodeParamsException if it cannot be built."""
     node.give_name()
     return _command(node.spec)
 

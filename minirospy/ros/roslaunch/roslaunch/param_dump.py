@@ -15,7 +15,7 @@ __all__ = ["dump_params"]
 
 
 def dump_params(files: Sequence[str]) -> bool:
-    """Print the parameters of launch files as YAML; return whether all files could be loaded."""
+    """Print the launch files' parameters as YAML; return whether all files could be loaded."""
     try:
         params = load_files(list(files), {}, chosen_packages()).params
     except MinirospyError as error:

@@ -19,7 +19,7 @@ __all__ = ["RLException", "ROSLaunchParent", "load_config_default"]
 
 
 class ROSLaunchParent:
-    """Runs launch files (paths, or paths with arguments) in the background. Its methods raise RLException on an error."""
+    """Runs launch files (paths, or paths with arguments) in the background. Methods raise RLException on an error."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class ROSLaunchParent:
         self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
 
     def start(self, auto_terminate: bool = True) -> None:
-        """Start everything; return when all nodes have been started. Raise RLException if that fails.
+        """Start everything; return once all nodes have started. Raise RLException on failure.
 
         If not ``auto_terminate``, the run continues after the last node has exited.
         """
@@ -84,7 +84,7 @@ class ROSLaunchParent:
         try:
             runner.launch()
         except RLException:
-            # Allow the program to call start() again.
+            # Let the program call start() again.
             self.runner = None
             raise
         if auto_terminate and self.pm:
@@ -102,12 +102,12 @@ class ROSLaunchParent:
         return self.runner is not None and self.runner.spin_once()
 
     def shutdown(self) -> None:
-        """Terminate all processes and wait for their exit. Idempotent."""
+        """Terminate all processes and wait until they exit. Idempotent."""
         if self.runner:
             self.runner.stop()
 
     def _load_config(self) -> None:
-        """Load the launch files into ``config``; programs override this method to fill ``config`` differently."""
+        """Load the launch files into ``config``. Programs may override this method to fill ``config`` differently."""
         load = replacement_of("roslaunch.config", "load_config_default", load_config_default)
         self.config = load(
             self.roslaunch_files, self.port, roslaunch_strs=self.roslaunch_strs, verbose=self.verbose

@@ -50,7 +50,7 @@ __all__ = [
 
 
 class ApiLauncher(Launcher):
-    """A launcher that notifies listeners and stores a Process for each node that it started."""
+    """A launcher that notifies listeners and keeps a Process for each started node."""
 
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
@@ -61,7 +61,7 @@ class ApiLauncher(Launcher):
         self.known: dict[str, LaunchedProcess] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
-        """Return a node's command. Raise LaunchError if the command cannot be built."""
+        """Return a node's command. Raise LaunchError if it cannot be built."""
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
@@ -70,7 +70,7 @@ class ApiLauncher(Launcher):
 
     @property
     def log_folder(self) -> str:
-        """Return the folder for the nodes' log files."""
+        """Return the folder for nodes' log files."""
         return str(self._master.log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
@@ -82,7 +82,7 @@ class ApiLauncher(Launcher):
         self.notify(process.name, process.exit_code or 0)
 
     def notify(self, name: str, code: int) -> None:
-        """Notify all listeners that a process has exited; print the error of a listener that fails."""
+        """Notify all listeners of a process's exit; print the error of any listener that fails."""
         for listener in tuple(self.listeners):
             try:
                 listener.process_died(name, code)
@@ -91,11 +91,11 @@ class ApiLauncher(Launcher):
 
 
 class FatalProcessLaunch(RLException):
-    """Raised if a process failed to start, and the launch cannot continue."""
+    """Raised if a process failed to start and the launch cannot continue."""
 
 
 class LaunchedProcess(Process):
-    """A node's process: running, or created by create_node_process() and not yet started."""
+    """A node's process, running or, after create_node_process(), not yet started."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         # Do not set `args`, `env`, `spawn_count` and `exit_code`: as properties, they return the process's current
@@ -113,7 +113,7 @@ class LaunchedProcess(Process):
         self.log_dir = launcher.log_folder
         self._launcher = launcher
         self._node = node
-        self.process: processes.Process | None = None  # the most recently started process
+        self.process: processes.Process | None = None  # the last process started
 
     @property
     def started(self) -> bool:
@@ -127,12 +127,12 @@ class LaunchedProcess(Process):
 
     @property
     def popen(self) -> subprocess.Popen[bytes] | ForkedProcess | None:
-        """Return the process, with the interface of subprocess.Popen."""
+        """Return the process with the interface of subprocess.Popen."""
         return self.process.popen if self.process else None
 
     @property
     def pid(self) -> int:
-        """Return the process id, or -1 before the process is started."""
+        """Return the process id, or -1 before the process starts."""
         return self.process.pid if self.process else -1
 
     @property
@@ -147,7 +147,7 @@ class LaunchedProcess(Process):
 
     @property
     def spawn_count(self) -> int:  # type: ignore[override]
-        """Return the number of times the process was started."""
+        """Return the number of starts."""
         return self.process.starts if self.process else 0
 
     @property
@@ -156,7 +156,7 @@ class LaunchedProcess(Process):
         return self.process.exit_code if self.process else None
 
     def is_alive(self) -> bool:
-        """Return whether the process is running. As in ROS, return True for a process that has not been started yet."""
+        """Return whether the process is running. As in ROS, return True before its first start."""
         return self.process is None or self.process.is_running
 
     def start(self) -> bool:
@@ -172,7 +172,7 @@ class LaunchedProcess(Process):
         return True
 
     def stop(self, errors: list[str] | None = None) -> None:
-        """Terminate the process and wait for its exit; do not restart it."""
+        """Terminate the process and wait for its exit, without restarting it."""
         if self.process:
             self._launcher.supervisor.end_process(self.process)
 
@@ -196,7 +196,7 @@ class LaunchedProcess(Process):
         return info
 
     def get_exit_description(self) -> str:
-        """Return a description of how the process exited."""
+        """Describe how the process exited."""
         files = f"log file: {os.path.join(self.log_dir, self.name.replace('/', '-'))}*.log"
         if self.exit_code == 0:
             return f"process has finished cleanly\n{files}"
@@ -206,12 +206,12 @@ class LaunchedProcess(Process):
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Add the process to another launcher. That launcher watches it once it has started."""
+        """Add the process to another launcher, which watches it once started."""
         self._launcher = launcher
 
 
 class ProcessMonitor:
-    """The processes of a launch."""
+    """Watches the processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
     """The monitors whose processes a signal or pmon_shutdown() terminates. Monitors created by programs are not included."""
@@ -221,7 +221,7 @@ class ProcessMonitor:
         self._launcher = launcher or ApiLauncher(LaunchSpec(), Environment.read())
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        self.is_watching = False  # set once watch() has been called
+        self.is_watching = False  # whether watch() has been called
         if launcher is not None:
             self._living.add(self)
 
@@ -233,22 +233,22 @@ class ProcessMonitor:
         self.plock = self._own.lock
         self.core_procs: list[Process] = []
 
-    daemon = True  # an attribute of threading.Thread, which is the base class in ROS
+    daemon = True  # an attribute of threading.Thread, the base class in ROS
 
     def getName(self) -> str:
         """Return the monitor's name."""
         return self.name
 
     def has_main_thread_jobs(self) -> bool:
-        """Return False, because the main thread has nothing to do."""
+        """Return False: the main thread has nothing to do."""
         return False
 
     def do_main_thread_jobs(self) -> None:
-        """Do nothing, because no process must be started by the main thread."""
+        """Do nothing: no process needs to be started in the main thread."""
 
     @property
     def listeners(self) -> list[ProcessListener]:
-        """Return the objects that are notified when processes exit."""
+        """Return the objects to notify when processes exit."""
         return self._launcher.listeners
 
     @property
@@ -258,7 +258,7 @@ class ProcessMonitor:
 
     @property
     def is_shutdown(self) -> bool:
-        """Return whether a shutdown was requested or has begun."""
+        """Return whether a shutdown was requested or has started."""
         return self._own.is_stopping
 
     @property
@@ -280,7 +280,7 @@ class ProcessMonitor:
         return [process.name for process in self.procs]
 
     def get_process_names_with_spawn_count(self) -> list[list[tuple[str, int]]]:
-        """Return (name, start count) for the watched processes, and for the exited ones."""
+        """Return [watched, exited]: two lists of (process name, number of starts)."""
         return [[(each.name, each.spawn_count) for each in some] for some in (self.procs, self.dead_list)]
 
     def has_process(self, name: str) -> bool:
@@ -303,7 +303,7 @@ class ProcessMonitor:
         return process is not None
 
     def register(self, p: Process) -> None:
-        """Watch a process. For a process from create_node_process(), call this method before the process's start().
+        """Watch a process. For a process from create_node_process(), call this before the process's start().
 
         Raise RLException if another process has its name, or after a shutdown.
         """
@@ -329,23 +329,23 @@ class ProcessMonitor:
         self.core_procs.append(p)
 
     def unregister(self, p: Process) -> None:
-        """Stop watching a process, without terminating it. Raise ValueError if the process is not watched."""
+        """Stop watching a process without terminating it. Raise ValueError if it is not watched."""
         with self.plock:
             self._own.watched.remove(p)
 
     def registrations_complete(self) -> None:
-        """Let the monitor stop after the last process, because no more processes will be registered."""
+        """Let the monitor stop after the last process exits: no more processes will be registered."""
         with self.plock:
             self._own.is_complete = True
             if not self._own.watched:
                 self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Add a listener that is notified when a process exits."""
+        """Add a listener to notify when a process exits."""
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Watch the processes in a thread. When the thread stops, it terminates them.
+        """Start a thread that watches the processes, and terminates them when it stops.
 
         The thread stops after shutdown(), or after registrations_complete() when all processes have exited.
         """
@@ -356,19 +356,19 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, this thread also stops, and the guardian terminates the nodes.
+        # If the program is killed, this thread dies too, and the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
         self._own.start(self.name)
 
     def start(self) -> None:
-        """Like :meth:`watch`: watch the processes."""
+        """Do the same as :meth:`watch`."""
         self.watch()
 
     def close(self) -> None:
-        """Terminate the remaining processes in the calling thread."""
-        # Call these even after an error: other threads wait for the end of the shutdown.
+        """Terminate the remaining processes, in the calling thread."""
+        # Call these even after an error: other threads wait until the shutdown is complete.
         with contextlib.ExitStack() as stack:
             stack.callback(self._ended.set)
             stack.callback(self._launcher.close)
@@ -379,11 +379,11 @@ class ProcessMonitor:
         return self.is_watching and not self.done
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait up to ``timeout`` seconds until all processes have exited. Return immediately if called in a listener's thread."""
+        """Wait up to ``timeout`` seconds until all processes have exited; return immediately in a listener's thread."""
         if threading.current_thread() in (self._thread, self._own.thread):
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
-        # Wait in slices, because on Windows a wait without timeout ignores signals.
+        # Wait in slices: on Windows, a wait without a timeout ignores signals.
         while not self.done and (left := end - time.monotonic()) > 0:
             self._ended.wait(min(0.5, left))
 
@@ -397,7 +397,7 @@ class ProcessMonitor:
 
     def shutdown(self) -> None:
         """Terminate all processes without waiting for their exit."""
-        # Take no lock, also not that of an Event: a signal handler, which may interrupt this method, calls it, too.
+        # Acquire no lock, not even an Event's: a signal handler may interrupt this method and call it again.
         self._own.is_stopping = True
         self._launcher.stop("shutdown")
 
@@ -407,11 +407,11 @@ class ProcessMonitor:
         return [monitor for monitor in cls._living if not monitor.done]
 
 
-_shutting_down = False  # set to False by programs that launch again after a signal
+_shutting_down = False  # programs set this to False to launch again after a signal
 
 
 def start_process_monitor() -> ProcessMonitor | None:
-    """Return a monitor that watches registered processes, or None if the program has set ``_shutting_down``."""
+    """Return a monitor for registered processes, or None if the program has set ``_shutting_down``."""
     if getattr(sys.modules.get("roslaunch.pmon"), "_shutting_down", False):
         return None
     monitor = ProcessMonitor(launcher=ApiLauncher(LaunchSpec(), Environment.read()))
@@ -420,7 +420,7 @@ def start_process_monitor() -> ProcessMonitor | None:
 
 
 def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
-    """Terminate all of a monitor's processes and wait for their exit; return whether there was a monitor."""
+    """Terminate a monitor's processes and wait for their exit; return whether there was a monitor."""
     if process_monitor is None:
         return False
     process_monitor.shutdown()
@@ -430,7 +430,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> LaunchedProcess:
-    """Return a process for a node, without starting it. Raise NodeParamsException if the node has no program."""
+    """Return a node's process without starting it. Raise NodeParamsException if the node has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
@@ -443,7 +443,7 @@ def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Laun
 
 
 def pmon_shutdown() -> None:
-    """Terminate all processes that this program launched, and wait for their exit."""
+    """Terminate all processes launched by this program and wait for their exit."""
     monitors = ProcessMonitor.living()
     for monitor in monitors:
         monitor.shutdown()
@@ -453,7 +453,7 @@ def pmon_shutdown() -> None:
 
 
 class _Handler:
-    """A signal handler that stops everything that this program has launched, and then calls the previous handler."""
+    """A signal handler that stops everything this program has launched, then calls the previous handler."""
 
     def __init__(self, number: signal.Signals) -> None:
         self._before = signal.getsignal(number)
@@ -467,7 +467,7 @@ class _Handler:
 
 
 def init_signal_handlers() -> None:
-    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes; works only in the main thread."""
+    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes. Works only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         return
     numbers: Sequence[signal.Signals | None] = [
@@ -482,5 +482,5 @@ _init_signal_handlers = init_signal_handlers
 
 
 def rl_signal(sig: int, stackframe: FrameType | None) -> None:
-    """Handle a signal: stop everything that this program has launched."""
+    """Handle a signal: stop everything this program has launched."""
     pmon_shutdown()

@@ -35,12 +35,12 @@ def check_log_disk_usage() -> None:
 
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
-    """Return a launch file's errors, including missing programs, one per line, or None if there are none."""
+    """Return a launch file's errors, one per line, including missing programs, or None if there are none."""
     return "\n".join(map(str, faults_of(f, chosen_packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
 def print_file_list(roslaunch_files: Sequence[LaunchFile]) -> None:
-    """Print the files that are read when launch files are loaded."""
+    """Print the files read when loading these launch files."""
     print("\n".join(load_config_default(roslaunch_files, None).roslaunch_files))
 
 
@@ -55,7 +55,7 @@ def update_terminal_name(ros_master_uri: str) -> None:
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
-    """Return the given run id, else the master's, or a new one if no master responds."""
+    """Return the given run id, else the master's, else a new one if no master responds."""
     if options_runid:
         return options_runid
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
@@ -68,7 +68,7 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
-    """Return the paths of the launch files named on a command line: a package and a file, or files.
+    """Return the paths of a command line's launch files, given as a package and a file, or as files.
 
     Raise RLException if a file is not found.
     """

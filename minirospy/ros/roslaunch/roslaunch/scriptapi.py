@@ -13,22 +13,22 @@ __all__ = ["Master", "Node", "RLException", "ROSLaunch"]
 
 
 class ROSLaunch:
-    """Starts nodes one by one: ``start()``, ``launch(Node(...))``, ``stop()``. Its methods raise RLException on an error."""
+    """Starts nodes one by one: ``start()``, ``launch(Node(...))``, ``stop()``. Methods raise RLException on an error."""
 
     def __init__(self) -> None:
         self.parent = ROSLaunchParent(get_or_generate_uuid(None, True), [])
         self.started = False
 
     def load(self, f: str) -> None:
-        """Make start() also run a launch file."""
+        """Add a launch file for start() to run."""
         XmlLoader().load(f, self._config)
 
     def load_str(self, s: str) -> None:
-        """Make start() also run a launch file given as a string."""
+        """Add a launch file, given as a string, for start() to run."""
         XmlLoader().load_string(s, self._config)
 
     def start(self) -> None:
-        """Start the launch, so that nodes can be launched."""
+        """Start the launch, so that launch() can start nodes."""
         self.parent.start(auto_terminate=False)
         self.started = True
 

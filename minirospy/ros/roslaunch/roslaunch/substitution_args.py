@@ -80,7 +80,7 @@ def resolve_args(
     resolve_anon: bool = True,
     filename: str | None = None,
 ) -> str:
-    """Return a string with its substitution arguments resolved; ``context`` may contain args as ``{"arg": {name: value}}``.
+    """Resolve a string's substitution arguments and return it; ``context`` may hold args as ``{"arg": {name: value}}``.
 
     Raise SubstitutionException if an argument is invalid, ArgException if an arg is not set, rospkg.ResourceNotFound if a
     package is not found, and any exception that the expression in an ``$(eval ...)`` raises.
@@ -101,18 +101,18 @@ def resolve_args(
         "arg": _arg,
     }
     resolved = _resolve_args(arg_str, context, resolve_anon, first)
-    # Resolve the other arguments first, because the path after $(find ...) may contain their results.
+    # Resolve the other arguments first: the path after $(find ...) may contain their results.
     return _resolve_args(resolved, context, resolve_anon, {"find": _find})
 
 
 def chosen_packages() -> Packages:
-    """Return the packages that ``$(find ...)`` searches: those of ``_rospack`` if set, else all packages."""
+    """Return the packages for ``$(find ...)`` to search: those of ``_rospack`` if it is set, else all."""
     rospack = getattr(sys.modules.get(_MODULE), "_rospack", None)
     return Packages() if rospack is None else Packages.below(*map(Path, rospack.get_ros_paths()))
 
 
 def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: Mapping[str, Command]) -> str:
-    """Resolve the substitution arguments of the kinds in ``commands``; return the string.
+    """Resolve the kinds of substitution arguments in ``commands``; return the resulting string.
 
     Raise SubstitutionException if an argument is invalid.
     """
@@ -127,7 +127,7 @@ def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: 
 
 
 def _collect_args(arg_str: str) -> list[str]:
-    """Return a string's substitution arguments, without ``$(`` and ``)``.
+    """Return a string's substitution arguments without ``$(`` and ``)``.
 
     Raise SubstitutionException if the syntax is invalid.
     """
@@ -221,7 +221,7 @@ def _eval_find(pkg: str) -> str:
 
 
 def _find(resolved: str, a: str, args: list[str], context: Context) -> str:
-    """Resolve ``$(find PKG)``. If a path follows that names a program or file of the package, insert the full path."""
+    """Resolve ``$(find PKG)``. If the path after it names a program or file in the package, insert its full path."""
     if len(args) != 1:
         raise SubstitutionException(f"$(find pkg) command only accepts one argument [{a}]")
     before, after = _split_command(resolved, a)
@@ -301,7 +301,7 @@ _eval_dict: dict[str, object] = {
 
 
 class _DictWrapper:
-    """The names in an expression: functions first, then the args' values."""
+    """The names available in an expression: functions first, then args."""
 
     def __init__(self, args: Mapping[str, str], functions: Mapping[str, object]) -> None:
         self._args = args
@@ -312,7 +312,7 @@ class _DictWrapper:
 
 
 def _eval(s: str, context: Context) -> str:
-    """Evaluate a Python expression; return the value as a string.
+    """Evaluate a Python expression; return its value as a string.
 
     Raise SubstitutionException if the expression contains a double underscore, or any exception from the expression.
     """
@@ -329,7 +329,7 @@ def _eval(s: str, context: Context) -> str:
 
 
 def convert_value(value: str, type_: str) -> object:
-    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto.
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml or auto.
 
     Raise ValueError if the type is unknown or the text does not match it.
     """

@@ -51,7 +51,7 @@ class XmlParseException(RLException):
 
 
 class Configuration(Protocol):
-    """The object that launch files are loaded into: a ROSLaunchConfig, or a program's own object with these methods.
+    """The target for loading launch files: a ROSLaunchConfig, or a program's own object with these methods.
 
     The methods are called in the order of the tags.
     """
@@ -66,10 +66,10 @@ class Configuration(Protocol):
         """Add a test."""
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> object:
-        """Add a parameter; ``filename`` is given for a ``<param>`` that is not in a node."""
+        """Add a parameter. ``filename`` is given for a ``<param>`` outside a node."""
 
     def add_clear_param(self, param: str) -> object:
-        """Add a namespace to delete."""
+        """Add a namespace to delete before setting parameters."""
 
     def add_executable(self, exe: Executable) -> object:
         """Add a command."""
@@ -78,16 +78,16 @@ class Configuration(Protocol):
         """Add a machine."""
 
     def add_config_error(self, msg: str) -> object:
-        """Add a warning about content that is ignored."""
+        """Add a warning about ignored content."""
 
 
 class ConfigError(str):
-    """An invalid launch file. The message has ROS's wording; ``error`` is minirospy's own message, with the line number."""
+    """An error in a launch file, with ROS's wording; ``error`` is minirospy's version, with the line number."""
 
     error: LaunchError
 
     def __new__(cls, text: str, error: LaunchError) -> ConfigError:
-        """Return ``text`` as a ConfigError that contains ``error``."""
+        """Create a ConfigError with the text ``text`` and the attribute ``error``."""
         made = super().__new__(cls, text)
         made.error = error
         return made
@@ -103,7 +103,7 @@ class _Forwarded(LaunchSpec):
         self._verbose = verbose
 
     def add_file(self, path: str, name: str) -> None:
-        """Print that a file is being loaded. Add the file to the configuration, unless it was given as a string."""
+        """Print that a file is being loaded; add it to the configuration unless it was given as a string."""
         if name == STDIN:
             self._print("... loading XML")
             return
@@ -115,7 +115,7 @@ class _Forwarded(LaunchSpec):
         self._print(f"... done importing include file [{name}]")
 
     def runs_command(self, text: str) -> None:
-        """Print the command of a ``<param>``."""
+        """Print a ``<param>``'s command."""
         self._print(f"... executing command param [{text}]")
 
     def add_node(self, node: NodeSpec) -> None:
@@ -131,7 +131,7 @@ class _Forwarded(LaunchSpec):
     def add_param(
         self, name: str, value: object, error: Callable[[str], LaunchError], file: str | None = None
     ) -> None:
-        """Add a parameter to the configuration; a file's content becomes an xmlrpc.client.Binary."""
+        """Add a parameter to the configuration, with a file's bytes as an xmlrpc.client.Binary."""
         if isinstance(value, bytes):
             from xmlrpc.client import Binary
 
@@ -143,7 +143,7 @@ class _Forwarded(LaunchSpec):
             self._config.add_param(param, filename=_shown(file), verbose=self._verbose)
 
     def add_clear(self, name: str) -> None:
-        """Add a namespace to the configuration."""
+        """Add a namespace to delete to the configuration."""
         self._config.add_clear_param(f"{name.rstrip('/')}/")
 
     def add_command(self, command: ParameterCommand) -> None:
@@ -168,7 +168,7 @@ class _Forwarded(LaunchSpec):
 
 
 def _shown(file: str) -> str:
-    """Return a file's name in the form that ROS prints."""
+    """Return a file's name as ROS prints it."""
     return "string" if file == STDIN else file
 
 
@@ -188,14 +188,14 @@ class XmlLoader:
         argv: Sequence[str] | None = None,
         verbose: bool = True,
     ) -> None:
-        """Load a file, with its args as ``["name:=value", ...]``. Raise XmlParseException if the file is invalid."""
+        """Load a file with args ``["name:=value", ...]``. Raise XmlParseException if it is invalid."""
         source = LaunchSource(filename, None, names.parse_launch_arguments(argv or ()))
         self._load(source, _Forwarded(ros_config, core=core, verbose=verbose))
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
-        """Load a launch file given as a string. Raise XmlParseException if the string is invalid."""
+        """Load a launch file from a string. Raise XmlParseException if it is invalid."""
         source = LaunchSource(STDIN, xml_text.encode(), {})
         self._load(source, _Forwarded(ros_config, core=core, verbose=verbose))
 

@@ -14,10 +14,10 @@ _interactive = [False]
 
 
 def is_interactive() -> bool:
-    """Return whether the process is interactive, as set by set_interactive()."""
+    """Return the value from set_interactive(): whether the process is interactive."""
     return _interactive[0]
 
 
 def set_interactive(interactive: bool) -> None:
-    """Set whether the process is interactive."""
+    """Set the value that is_interactive() returns."""
     _interactive[0] = interactive

@@ -4,4 +4,4 @@ __all__ = ["ROSLibException"]
 
 
 class ROSLibException(Exception):
-    """The base class of roslib's errors."""
+    """Base class of roslib's errors."""

@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Dependencies(TypedDict):
-    """A definition's dependencies."""
+    """The messages and files that a definition depends on."""
 
     files: dict[str, str]
     deps: list[str]
@@ -39,7 +39,7 @@ class Dependencies(TypedDict):
 def get_file_dependencies(
     f: str, stdout: object = sys.stdout, stderr: object = sys.stderr, rospack: object = None
 ) -> Dependencies:
-    """Return the dependencies of a package's definition file. Raise Exception if the file is not a definition file."""
+    """Return the dependencies of a package's definition file. Raise Exception if it is not a definition file."""
     path = Path(f)
     folder = next((each for each in path.resolve().parents if (each / "package.xml").is_file()), None)
     package = folder.name if folder else None
@@ -64,7 +64,7 @@ def get_dependencies(
     stderr: object = sys.stderr,
     rospack: object = None,
 ) -> Dependencies:
-    """Return the dependencies of a package's definition. Raise genmsg.MsgNotFound if a definition does not exist."""
+    """Return the dependencies of a package's definition. Raise genmsg.MsgNotFound if one does not exist."""
     context = _context(spec)
     parts = [spec.request, spec.response] if isinstance(spec, SrvSpec) else [spec]
     needed = list(dict.fromkeys(name for part in parts for name in context.get_all_depends(part.full_name)))
@@ -78,17 +78,17 @@ def compute_md5(get_deps_dict: Dependencies, rospack: object = None) -> str:
 
 
 def compute_md5_text(get_deps_dict: Dependencies, spec: MsgSpec, rospack: object = None) -> str:
-    """Return the text whose md5sum is the message's md5sum."""
+    """Return the text from which a message's md5sum is computed."""
     return gentools.compute_md5_text(_context(get_deps_dict["spec"]), spec)
 
 
 def compute_full_text(get_deps_dict: Dependencies) -> str:
-    """Return a definition's text, followed by those of its dependencies."""
+    """Return a definition's text followed by the texts of its dependencies."""
     return gentools.compute_full_text(_context(get_deps_dict["spec"]), get_deps_dict["spec"])
 
 
 def _context(spec: MsgSpec | SrvSpec) -> msg_loader.MsgContext:
-    """Return a context that contains all of a definition's dependencies."""
+    """Return a context with all of a definition's dependencies."""
     context = msg_loader.MsgContext.create_default()
     search = {name: [str(folder / "msg")] for name, folder in Packages().folders().items()}
     msg_loader.load_depends(context, spec, search)

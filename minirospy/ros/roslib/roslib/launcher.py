@@ -16,7 +16,7 @@ __all__ = ["load_manifest"]
 
 
 def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
-    """Add the ``src`` folders of a package and its dependencies to sys.path, unless the package is already importable.
+    """Add the ``src`` folders of a package and its dependencies to sys.path, unless the package is importable.
 
     The package that contains the script, or one that is importable, need not be on ROS_PACKAGE_PATH.
     Raise ResourceNotFound if a package does not exist.
@@ -35,13 +35,13 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
     for folder in folders:
         source = str(folder / "src")
         modules = [found.parent.name for found in Path(source).glob("*/__init__.py")]
-        # Append the folder only if a module is missing: a sourced devel folder also contains the package's messages.
+        # Append the folder only if a module is missing: a sourced devel folder also contains the messages.
         if source not in sys.path and not all(map(_is_importable, modules)):
             sys.path.append(source)
 
 
 def _folder_of_script(package: str) -> Path | None:
-    """Return the folder of the package that contains the running script, or None if the script is in another package."""
+    """Return the folder of the package that contains the running script, or None if that is another package."""
     script: Sequence[str] = sys.argv[:1]
     if not script or not script[0]:
         return None

@@ -49,14 +49,14 @@ class Depend(NamedTuple):
 
 
 class VersionControl(NamedTuple):
-    """The source repository's location."""
+    """The location of the package's source repository."""
 
     type: str
     url: str
 
 
 class Manifest:
-    """The content of a manifest.xml; initially empty."""
+    """A manifest.xml's content, initially empty."""
 
     def __init__(self) -> None:
         self.description = self.brief = self.license = self.author = self.url = self.status = self.notes = ""
@@ -72,7 +72,7 @@ class Manifest:
 
 
 def folders_with(file: str, path: str) -> Iterator[str]:
-    """Yield the folders below ``path`` that contain the manifest ``file``. Do not search inside these folders."""
+    """Yield the folders below ``path`` that contain the manifest ``file``, without searching inside them."""
     for folder, subfolders, files in os.walk(path, followlinks=True):
         if file in files:
             yield folder
@@ -86,7 +86,7 @@ def folders_with(file: str, path: str) -> Iterator[str]:
 
 
 def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | None = None) -> str:
-    """Return the path to a package's manifest.xml; if not ``required``, the file need not exist.
+    """Return the path of a package's manifest.xml, which need not exist unless ``required``.
 
     Raise InvalidROSPkgException if the package, or a required file, does not exist.
     """
@@ -110,7 +110,7 @@ def load_manifest(package: str) -> Manifest:
 
 
 def parse_file(file: str) -> Manifest:
-    """Parse a manifest file. Raise ValueError if the file does not exist, ManifestException if its content is invalid."""
+    """Parse a manifest file. Raise ValueError if it does not exist, ManifestException if it is invalid."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):

@@ -87,7 +87,7 @@ class MsgSpecException(Exception):
 
 
 class Constant:
-    """A message's constant: ``type``, ``name``, ``val``, and ``val_text``, the value as written in the definition."""
+    """A message constant: ``type``, ``name``, ``val``, and ``val_text``, the value as written in the definition."""
 
     __slots__ = ["name", "type", "val", "val_text"]
 
@@ -112,7 +112,7 @@ class Constant:
 
 
 class Field:
-    """A message's field: ``name``, ``type``, and the values that `parse_type` returns for the type."""
+    """A message field: ``name``, ``type``, and the values returned by `parse_type` for the type."""
 
     def __init__(self, name: str, type: str) -> None:
         self.name = name
@@ -126,7 +126,7 @@ class Field:
 
 
 class MsgSpec:
-    """A message's definition: its fields' ``types`` and ``names``, its ``constants``, and its ``text``."""
+    """A message definition: its fields' ``types`` and ``names``, its ``constants`` and its ``text``."""
 
     def __init__(
         self,
@@ -138,7 +138,7 @@ class MsgSpec:
         short_name: str = "",
         package: str = "",
     ) -> None:
-        """Create the definition. Raise MsgSpecException if two fields have the same name."""
+        """Create a definition. Raise MsgSpecException if two fields have the same name."""
         if len(set(names)) != len(names):
             raise MsgSpecException(f"Duplicate field names in message: {names}")
         assert len(types) == len(names), f"len({types}) != len({names})"
@@ -157,7 +157,7 @@ class MsgSpec:
         return list(zip(self.types, self.names, strict=True))
 
     def parsed_fields(self) -> list[Field]:
-        """Return the fields as objects."""
+        """Return the fields as Field objects."""
         return self._parsed_fields
 
     def has_header(self) -> bool:
@@ -182,23 +182,23 @@ class MsgSpec:
 
 
 def is_verbose() -> bool:
-    """Return whether the functions that load definitions print progress messages."""
+    """Return whether functions that load definitions print their progress."""
     return VERBOSE
 
 
 def set_verbose(v: bool) -> None:
-    """Set whether the functions that load definitions print progress messages."""
+    """Set whether functions that load definitions print their progress."""
     global VERBOSE  # noqa: PLW0603 - programs read it
     VERBOSE = v
 
 
 def base_msg_type(type_: str | None) -> str | None:
-    """Return a type without array brackets."""
+    """Return a type without its array brackets."""
     return type_ if type_ is None else type_.partition("[")[0]
 
 
 def resolve_type(type_: str, package_context: str) -> str:
-    """Return a type with its package; the default package is ``package_context``."""
+    """Return a type with its package, by default ``package_context``."""
     base = type_.partition("[")[0]
     if base == HEADER:
         return "std_msgs/Header"
@@ -233,12 +233,12 @@ def is_valid_msg_field_name(x: str) -> bool:
 
 
 def list_msg_types(package: str, include_depends: bool) -> list[str]:
-    """Return the names of a package's message files, without the package; ``include_depends`` applies only to rosbuild."""
+    """Return the names of a package's messages, without the package; ``include_depends`` applies only to rosbuild."""
     return sorted(Catalogue({package: Packages().find(package)}).files(package, "msg"))
 
 
 def msg_file(package: str, type_: str) -> str:
-    """Return the path to a message's definition file. The file need not exist.
+    """Return the path of a message's definition file, which need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """
@@ -246,7 +246,7 @@ def msg_file(package: str, type_: str) -> str:
 
 
 def get_pkg_msg_specs(package: str) -> tuple[list[tuple[str, MsgSpec]], list[str]]:
-    """Return (name, definition) for each of a package's messages, and the names of messages that cannot be read."""
+    """Return (name, definition) for each of a package's messages, and the names of the unreadable ones."""
     _init()
     found: list[tuple[str, MsgSpec]] = []
     failed: list[str] = []
@@ -260,7 +260,7 @@ def get_pkg_msg_specs(package: str) -> tuple[list[tuple[str, MsgSpec]], list[str
 
 
 def load_by_type(msgtype: str, package_context: str = "") -> tuple[str, MsgSpec]:
-    """Return (full name, definition) for a type. Raise MsgSpecException if the type's package does not exist."""
+    """Return (full name, definition) for a type. Raise MsgSpecException if its package does not exist."""
     package, slash, name = msgtype.partition(SEP)
     package, name = (package, name) if slash else (package_context, msgtype)
     try:
@@ -273,7 +273,7 @@ def load_by_type(msgtype: str, package_context: str = "") -> tuple[str, MsgSpec]
 
 
 def load_from_file(file_path: str, package_context: str = "") -> tuple[str, MsgSpec]:
-    """Return (full name, definition) for a definition file. Raise MsgSpecException if the file is invalid."""
+    """Return (full name, definition) for a definition file. Raise MsgSpecException if it is invalid."""
     if VERBOSE:
         print(
             "Load spec from", file_path, *([f"into package [{package_context}]"] if package_context else [])
@@ -295,7 +295,7 @@ def load_from_file(file_path: str, package_context: str = "") -> tuple[str, MsgS
 def load_from_string(
     text: str, package_context: str = "", full_name: str = "", short_name: str = ""
 ) -> MsgSpec:
-    """Return the definition parsed from a string; types without a package belong to ``package_context``.
+    """Parse a definition from a string; types without a package belong to ``package_context``.
 
     Raise MsgSpecException if the string is invalid.
     """
@@ -325,7 +325,7 @@ def load_from_string(
 def _constant(type_: str, declared: str, line: str) -> Constant:
     if not is_valid_constant_type(type_):
         raise MsgSpecException(f"{type_} is not a legal constant type")
-    # A string constant extends to the end of the line, even past a #.
+    # A string constant extends to the end of the line and may contain a #.
     name, _, value = (line if type_ == "string" else declared).strip().partition(" ")[2].partition(CONSTCHAR)
     if type_ != "string" and CONSTCHAR in value:
         raise MsgSpecException(f"Invalid declaration: {declared}")
@@ -336,7 +336,7 @@ def _constant(type_: str, declared: str, line: str) -> Constant:
 
 
 def _convert_val(type_: str, val: str) -> object:
-    """Return a constant's value. Raise MsgSpecException or ValueError if the value does not match the type."""
+    """Convert a constant's value. Raise MsgSpecException or ValueError if it does not match the type."""
     if type_ in ("float32", "float64"):
         return float(val)
     if type_ == "string":
@@ -353,7 +353,7 @@ def _convert_val(type_: str, val: str) -> object:
 
 
 def _strify_spec(spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
-    """Format a definition with the fields of the registered messages that it uses. Also write it to ``buff``."""
+    """Format a definition, expanding fields whose message types are registered; also write it to ``buff``."""
     stream = StringIO() if buff is None else buff
     for constant in spec.constants:
         stream.write(f"{indent}{constant.type} {constant.name}={constant.val_text}\n")
@@ -372,7 +372,7 @@ _initialized = [False]
 
 
 def _init() -> None:
-    """Register the types known to every package."""
+    """Register the types known in every package."""
     if _initialized[0]:
         return
     _initialized[0] = True
@@ -384,7 +384,7 @@ def _init() -> None:
 
 
 def reinit() -> None:
-    """Remove all registered definitions except those known to every package."""
+    """Remove all registered definitions except the types known in every package."""
     _initialized[0] = False
     _loaded.clear()
     REGISTERED_TYPES.clear()
@@ -392,7 +392,7 @@ def reinit() -> None:
 
 
 def load_package(package: str) -> None:
-    """Register a package's messages, both with and without the package's name."""
+    """Register a package's messages, with and without the package's name."""
     _init()
     if VERBOSE:
         print("Load package", package)
@@ -410,7 +410,7 @@ def load_package(package: str) -> None:
 
 
 def load_package_dependencies(package: str, load_recursive: bool = False) -> None:
-    """Register the messages of a package's direct dependencies, or of all dependencies if ``load_recursive``."""
+    """Register the messages of a package's direct dependencies, or of all of them if ``load_recursive``."""
     from minirospy.ros.rospkg.rospkg.rospack import RosPack
 
     _init()
@@ -431,7 +431,7 @@ def is_registered(msg_type_name: str) -> bool:
 
 
 def get_registered(msg_type_name: str, default_package: str | None = None) -> MsgSpec:
-    """Return the definition registered under a name, or under that name in ``default_package``.
+    """Return the definition registered under a name or, failing that, under the name in ``default_package``.
 
     Raise KeyError if no definition is registered.
     """

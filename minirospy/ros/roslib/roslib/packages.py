@@ -68,7 +68,7 @@ def get_pkg_dir(
 
 
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """Return (folder, name) of the package that contains a path, or (None, None) if no package contains it."""
+    """Return (folder, name) of the package that contains a path, or (None, None)."""
     name = get_package_name(d)
     place = Path(d).absolute()
     folder = next((each for each in (place, *place.parents) if package_name(each) is not None), None)
@@ -93,7 +93,7 @@ def get_pkg_subdir(
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """Return the path to a file in a package's folder; the file need not exist.
+    """Return the path of a file in a package's folder, which need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """
@@ -144,8 +144,8 @@ def _files(folder: Path, package: str, name: str) -> Iterator[Path]:
 
 
 def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] | None = None) -> list[str]:
-    """Return the files with this name below a folder; follow links, and skip folders whose name starts with a dot."""
-    # On Windows, programs may be named without their suffix, and case is ignored.
+    """Return the files with this name below a folder, following links and skipping folders that start with a dot."""
+    # On Windows, programs may be named without suffix, and case is ignored.
     suffixes = ("", ".exe", ".bat", ".py") if os.name == "nt" else ("",)
     wanted = [os.path.normcase(resource_name + suffix) for suffix in suffixes]
     found, seen = [], set()
@@ -153,7 +153,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
     for path, folders, names in os.walk(d, followlinks=True):
         real = os.path.realpath(path)
         if real in seen:
-            # Do not follow a link to a parent folder: the search would never end.
+            # Do not follow a link to a parent folder, because the search would never end.
             folders.clear()
             continue
         seen.add(real)
@@ -166,7 +166,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
 def _get_pkg_subdir_by_dir(
     package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return a folder in the package at a path. If ``required``, create it if it is missing.
+    """Return a subfolder of the package at a path. If ``required``, create it if it is missing.
 
     Raise OSError if the folder cannot be created.
     """

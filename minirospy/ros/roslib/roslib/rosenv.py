@@ -52,12 +52,12 @@ def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None =
 def get_master_uri(
     required: bool = True, env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None
 ) -> str:
-    """Return the master's URI from the command line or the environment."""
+    """Return the master URI from the command line or the environment."""
     return rosenv.get_master_uri(env, argv)
 
 
 def get_ros_home(env: Mapping[str, str] | None = None) -> str:
-    """Return the folder for ROS's own files: ROS_HOME, or ~/.ros."""
+    """Return ROS_HOME, or ~/.ros if it is not set."""
     return environment.get_ros_home(env)
 
 

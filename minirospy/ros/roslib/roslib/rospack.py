@@ -27,12 +27,12 @@ warnings.warn("roslib.rospack is deprecated, please use rospkg", stacklevel=2)
 
 
 def rospackexec(args: Sequence[str]) -> str:
-    """Return the stripped stdout of `rospack` run with these arguments, or an empty string if it fails."""
+    """Return the stripped stdout of `rospack` with these arguments, or an empty string on failure."""
     return _output("main", args)
 
 
 def rosstackexec(args: Sequence[str]) -> str:
-    """Return the stripped stdout of `rosstack` run with these arguments, or an empty string if it fails."""
+    """Return the stripped stdout of `rosstack` with these arguments, or an empty string on failure."""
     return _output("rosstack", args)
 
 

@@ -43,23 +43,23 @@ class _Verbosity:
 
 
 def is_verbose() -> bool:
-    """Return the value set by :func:`set_verbose`."""
+    """Return the value set with :func:`set_verbose`."""
     return _Verbosity.is_on
 
 
 def set_verbose(v: bool) -> None:
-    """Set the value that :func:`is_verbose` returns. It has no other effect."""
+    """Set the value that :func:`is_verbose` returns; it has no other effect."""
     _Verbosity.is_on = bool(v)
 
 
 def list_srv_types(package: str, include_depends: bool) -> list[str]:
-    """Return the names of a package's service files, without the package; ``include_depends`` applies only to rosbuild."""
+    """Return the names of a package's services, without the package; ``include_depends`` applies only to rosbuild."""
     folder = Path(packages.get_pkg_dir(package) or "", "srv")
     return sorted(path.stem for path in folder.glob(f"*{EXT}"))
 
 
 def srv_file(package: str, type_: str) -> str:
-    """Return the path to a service's definition file. The file need not exist.
+    """Return the path of a service's definition file, which need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """
@@ -67,7 +67,7 @@ def srv_file(package: str, type_: str) -> str:
 
 
 def get_pkg_srv_specs(package: str) -> tuple[list[tuple[str, SrvSpec]], list[str]]:
-    """Return a package's services with their names, and the names of the files that cannot be read."""
+    """Return (name, definition) for each of a package's services, and the names of the unreadable files."""
     found, failed = [], []
     for name in list_srv_types(package, False):
         try:
@@ -80,14 +80,14 @@ def get_pkg_srv_specs(package: str) -> tuple[list[tuple[str, SrvSpec]], list[str
 def load_from_string(
     text: str, package_context: str = "", full_name: str = "", short_name: str = ""
 ) -> SrvSpec:
-    """Return the service spec parsed from a definition's text. Raise genmsg.InvalidMsgSpec if the definition is invalid."""
+    """Parse a service definition. Raise genmsg.InvalidMsgSpec if it is invalid."""
     return load_srv_from_string(
         MsgContext.create_default(), text, full_name or f"{package_context}/{short_name}"
     )
 
 
 def load_from_file(file_name: str, package_context: str = "") -> tuple[str, SrvSpec]:
-    """Return the full name and spec of a service from its definition file.
+    """Return a service's full name and spec from its definition file.
 
     Raise genmsg.InvalidMsgSpec if the definition is invalid, OSError if the file cannot be read.
     """

@@ -45,7 +45,7 @@ class InvalidROSStackException(ROSStackException):
 def list_stacks_by_path(
     path: str, stacks: list[str] | None = None, cache: dict[str, str] | None = None
 ) -> list[str]:
-    """Append the stacks below a folder to ``stacks``, store their folders in ``cache``, and return ``stacks``."""
+    """Append the stacks below a folder to ``stacks`` and return it; store their folders in ``cache``."""
     found = [] if stacks is None else stacks
     for folder in folders_with(STACK_FILE, path):
         if (name := os.path.basename(folder)) not in found:
@@ -80,7 +80,7 @@ def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str |
 
 
 def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the stack that contains a package, or None if no stack contains it.
+    """Return the stack that contains a package, or None.
 
     Raise InvalidROSPkgException if there is no such package.
     """
@@ -112,7 +112,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to search, or None to search the folders in this process's environment."""
+    """Return the folders to search, or None for those in this process's environment."""
     return None if env is None else _folders(env)
 
 
@@ -135,7 +135,7 @@ def _packages(env: Mapping[str, str] | None) -> dict[str, str]:
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str | None:
-    """Return a stack's version from its stack.xml or its CMakeLists.txt, or None if neither states it."""
+    """Return a stack's version from its stack.xml or CMakeLists.txt, or None if neither contains one."""
     from minirospy.ros.rospkg.rospkg.manifest import parse_manifest_file
 
     if os.path.isfile(os.path.join(stack_dir, STACK_FILE)):
@@ -150,7 +150,7 @@ def get_stack_version_by_dir(stack_dir: str) -> str | None:
 
 
 def _get_cmake_version(text: str) -> str | None:
-    """Return the version in the `rosbuild_make_distribution` of a CMakeLists.txt, or None if it has no version."""
+    """Return the version in the `rosbuild_make_distribution` of a CMakeLists.txt, or None if there is none."""
     for line in text.split("\n"):
         if line.strip().startswith("rosbuild_make_distribution"):
             return line.partition("(")[2].partition(")")[0] or None

@@ -47,7 +47,7 @@ journal's lock.
 
 
 class _Options(NamedTuple):
-    """The options for starting a master."""
+    """Options for starting a master."""
 
     verbose: bool
     quiet: bool
@@ -74,10 +74,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class _MasterParser(Parser):
-    """Ignores the remapping arguments that a launch file may add."""
+    """Ignores remapping arguments, which a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Parse the arguments to a dict keyed by name. Raise CommandLineError if the arguments are invalid."""
+        """Parse the arguments to a dict keyed by name. Raise CommandLineError if an argument is invalid."""
         return super().parse(split_assignments(words)[0])
 
 
@@ -94,7 +94,7 @@ def _parser(name: str) -> Parser:
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")
     add("-v", dest="verbose", action="store_true", help="verbose printing")
 
-    # Accept these options without effect, because one loop in one process serves all clients.
+    # Accept these options without effect: one event loop in one process serves all clients.
     parser.accept(
         "-w",
         "--numworkers",
@@ -191,7 +191,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # Reject an empty value, which may come from an unset variable: it would give every address access to the master.
+        # Reject an empty value, for example from an unset variable: it would give every address access to the master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -207,7 +207,7 @@ def _master(
 
 
 def _environment(*, local: bool) -> Environment:
-    """Return the environment for a master. If ROS_MASTER_URI names another machine, only its port is used."""
+    """Return a master's environment. If ROS_MASTER_URI names another machine, use only its port."""
     environ = dict(os.environ)
     local = is_local(environ) or local
     environ.pop("MINIROSPY_LOCAL", None)
@@ -216,7 +216,7 @@ def _environment(*, local: bool) -> Environment:
 
 
 def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
-    """If the master is local, warn in one line about options and variables that only matter for other machines."""
+    """If the master is local, warn in one line about options and variables meant for other machines."""
     asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
@@ -265,7 +265,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         _announce(master, where, log_file, quiet=options.quiet)
         _warn_of_host(environment)
         if not options.quiet and name != "rosmaster":
-            # Check in a thread, so that an unreachable name server does not delay the start.
+            # Check in a thread, so that an unreachable DNS server does not delay the start.
             threading.Thread(target=_warn_of_uri, args=(environment, master), daemon=True).start()
 
         rosout = None
@@ -277,7 +277,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # Remove the file while this master still owns the port; later, the file may belong to the next master.
+        # Remove the file while this master still owns the port; later, it may belong to the next master.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -288,7 +288,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
 
 
 def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, quiet: bool) -> None:
-    """Print and log the master's URI, the recovered state, and the path to its log."""
+    """Print and log the master's URI, the recovered state and the path of its log."""
     listening, *warnings = where
     if not quiet:
         logs = f"log file {log_file}" if log_file else "no log file"
@@ -303,7 +303,7 @@ def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, qu
 
 
 def _write_pid(path: Path) -> None:
-    """As in ROS, write the process id to a file for scripts to read."""
+    """As in ROS, write the process id to a file for scripts."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with private_files.open_text(path, "w") as file:
@@ -329,7 +329,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master. For ROS's rosmaster, get the data from its API."""
+    """Print one line about the running master. For ROS's rosmaster, get the data from the Master API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -363,14 +363,14 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Warn if no node can reach ROS_IP, which is usually an address in another network."""
+    """Warn if nodes cannot reach ROS_IP, which usually means that it belongs to another network."""
     why = wrong_address(environment)
     if why:
         warn(f"{why} (`minirospy doctor` shows more)")
 
 
 def _warn_of_uri(environment: Environment, master: Master) -> None:
-    """Warn if ROS_MASTER_URI, which nodes started from this terminal use, is the URI of another master."""
+    """Warn if ROS_MASTER_URI, which nodes from this terminal use, is another master's URI."""
     host, port = environment.master_address
     if port != master.port:
         what = f"port [{port}] does not match this roscore [{master.port}]"
@@ -382,7 +382,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _max_clients() -> int:
-    """Raise the open-file limit. Return the number of clients that it allows, with some files reserved for other uses."""
+    """Raise the open-file limit; return the number of clients it allows, reserving some files for other uses."""
     if sys.platform == "win32":
         return 400
     import resource
@@ -397,7 +397,7 @@ def _max_clients() -> int:
 
 
 def _stop_event() -> asyncio.Event:
-    """Return an event that Ctrl-C, SIGTERM or a closed terminal (SIGHUP, except under nohup) sets."""
+    """Return an event that is set by Ctrl-C, SIGTERM or a closed terminal (SIGHUP, except under nohup)."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     numbers = [*interrupt_signals(), signal.SIGTERM]
@@ -407,7 +407,7 @@ def _stop_event() -> asyncio.Event:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
-            # On Windows, the handler runs in the main thread, but not before the loop in this thread wakes up.
+            # On Windows, the handler runs in this thread only after the event loop wakes up.
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
     if sys.platform == "win32":
         _keep_waking(loop)
@@ -415,7 +415,7 @@ def _stop_event() -> asyncio.Event:
 
 
 def _keep_waking(loop: asyncio.AbstractEventLoop) -> None:
-    """Wake the loop twice a second, because on Windows Ctrl-C does not interrupt a select."""
+    """Wake the loop twice a second, because Ctrl-C does not interrupt a select on Windows."""
     loop.call_later(0.5, _keep_waking, loop)
 
 
@@ -442,7 +442,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
-        # The master's journal is still locked, so the master is running, but it does not respond.
+        # The journal is still locked, so the master is running but does not respond.
         silence = (
             f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
         )
@@ -453,7 +453,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
 
 
 def _holder(path: Path) -> int | None:
-    """Return the pid of the master that holds a journal's lock (0: unknown pid), or None if the journal is not locked."""
+    """Return the pid of the master that holds a journal's lock (0: unknown), or None if it is not locked."""
     from minirospy.runtime.master.journal import Journal, JournalBusyError
 
     if not path.with_name(path.name + ".lock").exists():
@@ -470,7 +470,7 @@ def _holder(path: Path) -> int | None:
 
 
 def _quiet(line: str) -> None:
-    """Discard a log line."""
+    """Ignore a log line."""
 
 
 class _Shown(logging.Handler):
@@ -482,16 +482,16 @@ class _Shown(logging.Handler):
 
 
 def _show(line: str) -> None:
-    """Print a line. If stdout is closed (`roscore -v | head`), continue without printing."""
+    """Print a line; ignore a closed stdout (`roscore -v | head`)."""
     with contextlib.suppress(OSError):
-        # Use a single write, because another thread prints the warning about ROS_MASTER_URI.
+        # Print in a single write, because another thread may print the warning about ROS_MASTER_URI.
         print(f"{line}\n", end="", flush=True)
 
 
 def _log_to_file(
     folder: Path, *, verbose: bool, level: str | None
 ) -> tuple[Path | None, Callable[[str], object]]:
-    """Log to ``folder``/master.log; ``latest`` next to the folder links to it if links are supported.
+    """Log to ``folder``/master.log; next to the folder, create a link ``latest`` to it if possible.
 
     Return the file, and the function that logs registrations. If the file cannot be written, the master runs without a log.
     """

@@ -8,7 +8,7 @@ __all__ = ["DEFAULT_MASTER_PORT", "Master"]
 
 
 class Master:
-    """A master that serves on ``port`` between :meth:`start` and :meth:`stop`; ``uri`` is its URI.
+    """Serves as a master on ``port`` between :meth:`start` and :meth:`stop`; ``uri`` is its URI.
 
     It stores nothing on disk.
     """

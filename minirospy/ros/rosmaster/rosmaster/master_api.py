@@ -56,7 +56,7 @@ def mlogwarn(msg: str, *args: object) -> None:
 
 
 def publisher_update_task(api: str, topic: str, pub_uris: Sequence[str]) -> None:
-    """Send the URIs of a topic's publishers to the node at ``api``. Raise OSError if the node does not respond."""
+    """Send the URIs of a topic's publishers to the node at ``api``. Raise OSError if it does not respond."""
     node: Any = xmlrpcapi(api)
     call = f"publisherUpdate[{topic}] -> {api} {pub_uris}"
     mloginfo(call)
@@ -72,14 +72,14 @@ def publisher_update_task(api: str, topic: str, pub_uris: Sequence[str]) -> None
 
 
 def service_update_task(api: str, service: str, uri: str) -> None:
-    """Send a service's URI to the node at ``api``. Raise OSError if the node does not respond."""
+    """Send a service's URI to the node at ``api``. Raise OSError if it does not respond."""
     node: Any = xmlrpcapi(api)
     mloginfo("serviceUpdate[%s, %s] -> %s", service, uri, api)
     node.serviceUpdate(_CALLER_ID, service, uri)
 
 
 class _Api(MasterApi):
-    """The tables and responses of the Master API. Notifications for nodes are put into ``notices``."""
+    """The Master API's tables and responses. Notifications to nodes are queued in ``notices``."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -89,15 +89,15 @@ class _Api(MasterApi):
 
     @property
     def uri(self) -> str:
-        """Return the URI that was passed to :meth:`ROSMasterHandler._ready`."""
+        """Return the URI passed to :meth:`ROSMasterHandler._ready`."""
         return self.where
 
     def notify(self, action: Notice) -> None:
-        """Queue a notification for the thread that sends it."""
+        """Queue a notification for the sending thread."""
         self.notices.put(action)
 
     def defer(self, uri: str, topic: str) -> None:
-        """Do nothing: deferring makes no difference, because a notification contains the state at the time it is sent."""
+        """Do nothing: a notification always contains the state at the time of sending."""
 
     def stop(self) -> None:
         """Stop sending notifications."""
@@ -105,12 +105,12 @@ class _Api(MasterApi):
         self.notices.put(None)
 
     def get_status(self, caller_id: str) -> Answer:
-        """Reject the call, because only minirospy's own master supports it."""
+        """Reject the call, which only minirospy's own master supports."""
         return [ERROR, "not a call of the Master API", 0]
 
 
 class ROSMasterHandler:
-    """The Master API: each method's first argument is the caller's name; it returns (code, status message, value)."""
+    """The Master API. Each method's first argument is the caller's name; it returns (code, status message, value)."""
 
     def __init__(self, num_workers: int = NUM_WORKERS) -> None:
         self.uri: str | None = None
@@ -159,7 +159,7 @@ class ROSMasterHandler:
 
 
 def _method(name: str) -> Callable[..., tuple[int, str, object]]:
-    """Return the method of ROSMasterHandler for a call of the Master API."""
+    """Return a ROSMasterHandler method for a Master API call."""
 
     def call(*args: Any, **kwds: object) -> tuple[int, str, object]:
         handler, *rest = args
@@ -174,5 +174,5 @@ for _name in _Api().dispatcher.methods:
 
 
 def _value(tree: ParameterTree, key: str) -> object:
-    """Return the parameter's value to send in a notification: {} if it is not set."""
+    """Return the value to send in a parameter notification: {} if the parameter is not set."""
     return tree.get(key) if tree.has(key) else {}

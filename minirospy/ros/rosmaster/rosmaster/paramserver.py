@@ -25,7 +25,7 @@ Notify = Callable[[list[tuple[list[tuple[str, str]], str, object]]], object]
 
 
 class ParamDictionary:
-    """Parameters and their subscribers. ``reg_manager``, rosmaster's node table, has no effect here."""
+    """Parameters and their subscribers. Ignores ``reg_manager``, rosmaster's node table."""
 
     def __init__(self, reg_manager: object = None) -> None:
         self._tree = ParameterTree()
@@ -36,7 +36,7 @@ class ParamDictionary:
         return self._tree.names()
 
     def search_param(self, ns: str, key: str) -> str | None:
-        """Search for a parameter from a namespace upwards; return the closest match.
+        """Search for a parameter in a namespace and its parents; return the closest match.
 
         Raise ValueError if the key is empty or private, or the namespace is not global.
         """
@@ -57,7 +57,7 @@ class ParamDictionary:
     def set_param(
         self, key: str, value: object, notify_task: Notify | None = None, caller_id: str | None = None
     ) -> None:
-        """Set a value; a dictionary replaces a namespace. Raise TypeError if the root is set to anything but a dictionary."""
+        """Set a value; a dictionary replaces a namespace. Raise TypeError if the root is set to a non-dictionary."""
         if key == "/" and not isinstance(value, dict):
             raise TypeError("cannot set root of parameter tree to non-dictionary")
         self._notify(self._tree.set(key, value, caller_id or ""), notify_task)
@@ -98,7 +98,7 @@ class ParamDictionary:
 def compute_param_updates(
     subscribers: Any, param_key: str, param_value: object, caller_id_to_ignore: str | None = None
 ) -> list[tuple[list[tuple[str, str]], str, object]]:
-    """Return ([(node, API)], key, value) for each subscribed key that setting ``param_key`` changes.
+    """Return ([(node, API)], key, value) for each subscribed key affected by setting ``param_key``.
 
     ``subscribers`` maps each subscribed key to [(node, API)]. It is a dictionary, or a table with ``iterkeys()`` as in
     rosmaster.
@@ -128,7 +128,7 @@ def compute_param_updates(
 def _compute_all_keys(
     param_key: str, param_value: dict[str, Any], all_keys: list[str] | None = None
 ) -> list[str]:
-    """Return the keys, with trailing slashes, of all values and namespaces in a dictionary set at ``param_key``."""
+    """Return the keys (with trailing slashes) of all values and namespaces in a dictionary set at ``param_key``."""
     found = [] if all_keys is None else all_keys
     for name, value in param_value.items():
         key = f"{param_key.rstrip(SEP)}{SEP}{name}{SEP}"

@@ -20,14 +20,14 @@ Answer = tuple[int, str, int]
 
 
 class Pool(Protocol):
-    """The method of MarkedThreadPool that a RegistrationManager uses."""
+    """The part of MarkedThreadPool that a RegistrationManager uses."""
 
     def queue_task(self, marker: object, task: Callable[..., object], args: tuple[object, ...]) -> object:
-        """Call ``task(*args)`` in a thread; at most one task per marker runs at a time."""
+        """Call ``task(*args)`` in a thread, with at most one task at a time per marker."""
 
 
 class Registrations:
-    """One table: topic subscribers, topic publishers, services, or parameter subscribers."""
+    """A registration table: topic subscribers, topic publishers, services or parameter subscribers."""
 
     TOPIC_SUBSCRIPTIONS, TOPIC_PUBLICATIONS, SERVICE, PARAM_SUBSCRIPTIONS = 1, 2, 3, 4
 
@@ -48,7 +48,7 @@ class Registrations:
         return self.map.get(key, [])
 
     def has_key(self, key: str) -> bool:
-        """Return whether a name has registrations."""
+        """Return whether any node is registered for a name."""
         return key in self.map
 
     def iterkeys(self) -> KeysView[str]:
@@ -84,7 +84,7 @@ class Registrations:
             self._require_no_service()
 
     def unregister_all(self, caller_id: str) -> None:
-        """Remove all registrations of a node."""
+        """Remove all of a node's registrations."""
         kept = {key: [node for node in nodes if node[0] != caller_id] for key, nodes in self.map.items()}
         self.map = {key: nodes for key, nodes in kept.items() if nodes}
         if self.service_api_map:
@@ -95,7 +95,7 @@ class Registrations:
     def unregister(
         self, key: str, caller_id: str, caller_api: str | None, service_api: str | None = None
     ) -> Answer:
-        """Unregister a node from a name; return the Master API's response, whose value is the number of removed nodes."""
+        """Unregister a node from a name; return the Master API's response with the number of removed nodes."""
         done = f"Unregistered [{caller_id}] as provider of [{key}]"
         if service_api:
             if self.service_api_map is None:
@@ -120,7 +120,7 @@ class Registrations:
 
 
 class NodeRef:
-    """The registrations of one node."""
+    """A node's registrations."""
 
     def __init__(self, id: str, api: str) -> None:
         self.id = id
@@ -128,7 +128,7 @@ class NodeRef:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all registrations, but keep the node's name and API."""
+        """Remove all registrations but keep the node's name and API."""
         self.param_subscriptions: list[str] = []
         self.topic_subscriptions: list[str] = []
         self.topic_publications: list[str] = []
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Ask a node to shut down. Ignore a node that does not respond; it has probably exited already."""
+    """Ask a node to shut down. Ignore a node that does not respond, because it has probably exited."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")
@@ -164,7 +164,7 @@ def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
 
 
 class RegistrationManager:
-    """A master's tables and nodes. If a node registers with a new API, the old node with that name is shut down."""
+    """A master's tables and nodes. If a node registers with a new API, the old node of that name is shut down."""
 
     def __init__(self, thread_pool: Pool) -> None:
         self.nodes: dict[str, NodeRef] = {}

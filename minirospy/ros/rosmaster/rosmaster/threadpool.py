@@ -18,7 +18,7 @@ class _Task(NamedTuple):
 
 
 class MarkedThreadPool:
-    """Runs tasks in daemon threads, in order, at most one at a time per marker.
+    """Runs tasks in daemon threads, in order, with at most one task at a time per marker.
 
     The master uses a node's URI as the marker, so that a slow node occupies only one thread.
     """
@@ -32,7 +32,7 @@ class MarkedThreadPool:
         self.set_thread_count(numThreads)
 
     def set_thread_count(self, newNumThreads: int) -> bool:
-        """Start or stop threads to reach this count; return False if the count cannot be set."""
+        """Start or stop threads to reach this count; return False if that is impossible."""
         with self._changed:
             if self._is_joining:
                 return False
@@ -51,7 +51,7 @@ class MarkedThreadPool:
         args: tuple[object, ...] | None = None,
         taskCallback: Callable[[object], object] | None = None,
     ) -> bool:
-        """Call ``task(*args)`` in a thread, then ``taskCallback`` with its result; return whether the task was accepted."""
+        """Call ``task(*args)`` in a thread, then ``taskCallback`` with the result; return whether the task was accepted."""
         with self._changed:
             if self._is_joining or not callable(task):
                 return False
@@ -60,7 +60,7 @@ class MarkedThreadPool:
             return True
 
     def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
-        """Stop the threads; if requested, run the queued tasks first. The pool can be reused afterwards."""
+        """Stop the threads, first running the queued tasks if requested. The pool can be reused afterwards."""
         with self._changed:
             self._is_joining = True
             while wait_for_tasks and self._tasks and self._threads:
@@ -91,11 +91,11 @@ class MarkedThreadPool:
                 if task.on_result:
                     task.on_result(result)
             except Exception:
-                # Catch every exception, because the caller's task may raise any kind.
+                # Catch all exceptions: a caller's task may raise any.
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:
-        """Return the first task whose marker is not in use, or None if this thread must exit."""
+        """Return the first task whose marker is free, or None if this thread must exit."""
         with self._changed:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:

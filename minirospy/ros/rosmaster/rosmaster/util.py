@@ -15,7 +15,7 @@ __all__ = [
     "xmlrpcapi",
 ]
 
-_CLOSE_WAIT = 8  # TCP state CLOSE_WAIT in Linux: the peer has closed the connection
+_CLOSE_WAIT = 8  # Linux's TCP state CLOSE_WAIT: the peer has closed the connection
 
 
 class _Proxies(threading.local):
@@ -27,7 +27,7 @@ _PROXIES = _Proxies()
 
 
 def xmlrpcapi(uri: str | None) -> ServerProxy | None:
-    """Return the proxy for a URI, or None if the URI has no host. Raise OSError if the URI is not an http URI."""
+    """Return the proxy for a URI, or None if the URI has no host. Raise OSError if it is not an http URI."""
     if uri is None or not urlparse(uri).netloc:
         return None
     if uri not in _PROXIES.by_uri:
@@ -36,12 +36,12 @@ def xmlrpcapi(uri: str | None) -> ServerProxy | None:
 
 
 def remove_server_proxy(uri: str) -> None:
-    """Remove the proxy for a URI; call this when its server has exited."""
+    """Remove the proxy for a URI. Call this after its server has exited."""
     _PROXIES.by_uri.pop(uri, None)
 
 
 def close_half_closed_sockets() -> None:
-    """Close this thread's proxy connections that the server has already closed."""
+    """Close this thread's proxy connections that the server has closed."""
     if not hasattr(socket, "TCP_INFO"):
         return
     for proxy in _PROXIES.by_uri.values():

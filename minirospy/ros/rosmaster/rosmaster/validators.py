@@ -39,7 +39,7 @@ Check = Callable[[object, str], object]
 
 
 def not_none(param_name: str) -> Check:
-    """Require a value other than None."""
+    """Return a validator that requires a value other than None."""
 
     def check(value: object, caller_id: str) -> object:
         if value is None:
@@ -50,7 +50,7 @@ def not_none(param_name: str) -> Check:
 
 
 def non_empty(param_name: str) -> Check:
-    """Require a non-empty value."""
+    """Return a validator that requires a non-empty value."""
 
     def check(value: object, caller_id: str) -> object:
         if not value:
@@ -61,7 +61,7 @@ def non_empty(param_name: str) -> Check:
 
 
 def non_empty_str(param_name: str) -> Check:
-    """Require a non-empty string."""
+    """Return a validator that requires a non-empty string."""
 
     def check(value: object, caller_id: str) -> object:
         if not isinstance(non_empty(param_name)(value, caller_id), str):
@@ -72,7 +72,7 @@ def non_empty_str(param_name: str) -> Check:
 
 
 def empty_or_valid_name(param_name: str) -> Check:
-    """Require an empty string or a valid name; return the resolved name."""
+    """Return a validator that requires an empty string or a valid name; it returns the resolved name."""
 
     def check(value: object, caller_id: str) -> object:
         if not isinstance(value, str):
@@ -83,7 +83,7 @@ def empty_or_valid_name(param_name: str) -> Check:
 
 
 def global_name(param_name: str) -> Check:
-    """Require a global name."""
+    """Return a validator that requires a global name."""
 
     def check(value: object, caller_id: str) -> object:
         name = _text(param_name, value)
@@ -95,12 +95,12 @@ def global_name(param_name: str) -> Check:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the resolved name. Raise ParameterInvalid if the value is not a valid name."""
+    """Return the resolved name. Raise ParameterInvalid if it is not a valid name."""
     return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the name unchanged. Raise ParameterInvalid if the value is not a valid name."""
+    """Return the name unchanged. Raise ParameterInvalid if it is not a valid name."""
     name = _text(param_name, param_value)
     if ":" in name or " " in name:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")
@@ -108,7 +108,7 @@ def valid_name_validator_unresolved(param_name: str, param_value: object, caller
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Check:
-    """Require a valid name; resolve it if ``resolve`` is set."""
+    """Return a validator that requires a valid name and, if ``resolve`` is set, resolves it."""
     chosen = valid_name_validator_resolved if resolve else valid_name_validator_unresolved
 
     def check(value: object, caller_id: str) -> object:
@@ -118,7 +118,7 @@ def valid_name(param_name: str, resolve: bool = True) -> Check:
 
 
 def is_topic(param_name: str) -> Check:
-    """Require a topic name other than the global namespace; return the resolved name."""
+    """Return a validator that requires a topic name other than the global namespace; it returns the resolved name."""
 
     def check(value: object, caller_id: str) -> object:
         name = valid_name_validator_unresolved(param_name, value, caller_id)
@@ -130,12 +130,12 @@ def is_topic(param_name: str) -> Check:
 
 
 def is_service(param_name: str) -> Check:
-    """Require a service name other than the global namespace; return the resolved name."""
+    """Return a validator that requires a service name other than the global namespace; it returns the resolved name."""
     return is_topic(param_name)
 
 
 def is_api(paramName: str) -> Check:
-    """Require the URI of a node or service API."""
+    """Return a validator that requires the URI of a node or service API."""
 
     def check(value: object, caller_id: str) -> object:
         if not value or not isinstance(value, str):
@@ -148,7 +148,7 @@ def is_api(paramName: str) -> Check:
 
 
 def valid_type_name(param_name: str) -> Check:
-    """Require ``package/Type``, or ``*`` for any type."""
+    """Return a validator that requires ``package/Type``, or ``*`` for any type."""
 
     def check(value: object, caller_id: str) -> object:
         name = _text(param_name, value)

@@ -28,7 +28,7 @@ def main_srv(argv: Sequence[str] | None = None) -> int:
 
 
 class _Verbs:
-    """The verbs for one kind of interface: messages or services."""
+    """The verbs of rosmsg or rossrv."""
 
     def __init__(self, command: str, kind: Kind) -> None:
         self.command = command
@@ -161,14 +161,14 @@ def reason_not_shown(kind: Kind, name: str) -> str:
     try:
         folder = packages.find(package) / kind.value
     except NotFoundError:
-        # ROS prints every package's folder here, which is thousands of characters.
+        # ROS prints the folders of all packages here, thousands of characters.
         searched = f"{{{len(packages.folders())} packages: rospack list}}"
         return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path [{searched}]"
     return f"{refused}: Cannot locate message [{base}] in package [{package}] with paths [['{folder}']]"
 
 
 def _names(name: str | None) -> list[str]:
-    """Return the name from the command line, else the names from stdin."""
+    """Return the name from the command line, or the names from stdin if there is none."""
     if name is not None:
         return [name]
     import sys
@@ -180,7 +180,7 @@ def _names(name: str | None) -> list[str]:
 
 
 def _invalid_package(name: str) -> str:
-    """Return ROS's error message for a package that does not exist; the message lists the searched folders."""
+    """Return ROS's error message, with the searched folders, for a package that does not exist."""
     from minirospy.workspace.packages import Packages
 
     roots = (f"\nROS path [{number}]={root}" for number, root in enumerate(Packages().roots))

@@ -77,7 +77,7 @@ _KINDS = {MODE_MSG: Kind.MESSAGE, MODE_SRV: Kind.SERVICE}
 
 
 class ROSMsgException(Exception):
-    """Raised if a type does not exist, or its definition is invalid."""
+    """Raised if a type does not exist or its definition is invalid."""
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
@@ -130,27 +130,27 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_debug(rospack: object, mode: str, type_: str, raw: bool = False) -> None:
-    """Print a type's definition, like `rosmsg show`. Raise ROSMsgException if the type or the mode is unknown."""
+    """Print a type's definition like `rosmsg show`. Raise ROSMsgException if the type or mode is unknown."""
     if mode not in _KINDS:
         raise ROSMsgException(f"Invalid mode for debug: {mode}")
     print(_text(type_, raw, _KINDS[mode]))
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the full names of types called ``base_type`` in any package."""
+    """Yield the full names of types named ``base_type`` in all packages."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 
 
 def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
-    """Yield (name, folder with its definitions) for each package that contains definitions."""
+    """Yield (name, definitions folder) for each package that contains definitions."""
     packages = Packages()
     for name in Interfaces(packages, _kind(mode, "iterate_packages")).packages():
         yield name, str(packages.find(name) / mode.removeprefix("."))
 
 
 def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
-    """Format a genmsg spec like `rosmsg show`, indented by ``indent``. Also write it to the stream ``buff``.
+    """Format a genmsg spec like `rosmsg show`, indented by ``indent``; also write it to the stream ``buff``.
 
     Raise KeyError if one of its dependencies is not in the context.
     """
@@ -172,7 +172,7 @@ def get_yaml_for_msg(
     flow_style_: bool | None = None,
     fill_arrays_: bool = False,
 ) -> str:
-    """Format a message as YAML with sorted fields. Prepend ``prefix`` to each line.
+    """Format a message as YAML with sorted fields and ``prefix`` at the start of each line.
 
     ``time_offset`` is subtracted from times. ``field_filter`` returns the names of a message's fields to print.
     ``flow_style_``: write everything in braces. By default, flat values are in braces after the first message or array
@@ -182,14 +182,14 @@ def get_yaml_for_msg(
 
 
 def rosmsgmain(mode: str = MODE_MSG) -> int:
-    """Run the command with this process's arguments. Return its exit status."""
+    """Run the command with this process's arguments and return its exit status."""
     from minirospy.ros.rosmsg.commands import rosmsg
 
     return rosmsg.main_srv() if mode == MODE_SRV else rosmsg.main()
 
 
 def fullusage(mode: str) -> str:
-    """Return the list of commands that `rosmsg` or `rossrv` prints."""
+    """Return `rosmsg`'s or `rossrv`'s list of commands."""
     command = f"ros{mode[1:]}"
     word = "Message" if mode == MODE_MSG else "Service"
     verbs = (
@@ -251,7 +251,7 @@ def rosmsg_cmd_package(mode: str, full: object) -> None:
 
 
 def rosmsg_cmd_show(mode: str, full: object, alias: str = "show") -> int | None:
-    """Run ``rosmsg show`` or ``rossrv show`` with this process's arguments. Return 1 if no type has the name.
+    """Run ``rosmsg show`` or ``rossrv show`` with this process's arguments. Return 1 if there is no such type.
 
     Raise ROSMsgException if a name with a package is unknown.
     """
@@ -302,12 +302,12 @@ def _add_single_line(parser: OptionParser, listed: str) -> None:
 
 
 def _parse(parser: OptionParser, argv: Sequence[str] | None) -> tuple[Values, list[str]]:
-    """Parse a command line that starts with the verb, by default this process's command line."""
+    """Parse a command line that starts with the verb (default: this process's)."""
     return parser.parse_args(list(sys.argv[1:] if argv is None else argv)[1:])
 
 
 def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
-    """Return the options and the only name on this process's command line. If there is no name, read one from stdin."""
+    """Return the options and the single name on this process's command line; without a name, read it from stdin."""
     options, words = parser.parse_args(sys.argv[2:])
     if len(words) > 1:
         parser.error(f"you may only specify one {full}")
@@ -320,24 +320,24 @@ def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names of a folder's entries whose paths ``rfilter`` accepts, or [] if the folder does not exist."""
+    """Return the names of a folder's entries that ``rfilter`` accepts by path, or [] if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
 
 
 def _msg_filter(ext: str) -> Callable[[str], bool]:
-    """Return a predicate that returns whether a path is a file with this extension."""
+    """Return a predicate that tells whether a path is a file with this extension."""
     return lambda path: os.path.isfile(path) and path.endswith(ext)
 
 
 def _list_types(path: str, subdir: str, ext: str) -> list[str]:
-    """Return the sorted names of the types defined by a folder's files. As in ROS, ``subdir`` has no effect."""
+    """Return the sorted names of the types defined in a folder. As in ROS, ``subdir`` has no effect."""
     return sorted(name[: -len(ext)] for name in _list_resources(path, _msg_filter(ext)))
 
 
 def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
-    """Return the folders that contain a package's definitions, for programs that load them with genmsg."""
+    """Return the folders with a package's definitions, for programs that load them with genmsg."""
     return [rospack.get_path(pkgname)]
 
 

@@ -89,14 +89,14 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error for a missing node name. It lists the nodes if a master responds."""
+    """Return the error for a missing node name, listing the nodes if a master responds."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # Print the error twice, as ROS does: ROS also includes the error message in its list of nodes.
+    # Like ROS, print the error twice, because ROS includes the message in its list of nodes.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
@@ -105,7 +105,7 @@ def _no_node_to_ping() -> Misuse:
 
 
 def _ping_one(graph: Graph, node: NodeAddress, count: int) -> int:
-    """Ping a node once a second: ``count`` times, or until Ctrl-C if ``count`` is 0."""
+    """Ping a node once a second, ``count`` times or, if ``count`` is 0, until Ctrl-C."""
     print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
     times: list[float] = []
     try:
@@ -144,7 +144,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping a node and print the time. Append the milliseconds to ``times`` before printing, in case Ctrl-C is pressed."""
+    """Ping a node and print the time; first append it to ``times`` (ms), in case of Ctrl-C."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -239,7 +239,7 @@ def _machine(machine: str | None) -> None:
         try:
             found = nodes_on(graph, machine) if machine else sorted({*node_hosts(graph).values()})
         except MasterUnreachableError as error:
-            # ROS looks up the machine's address before it calls the master.
+            # ROS resolves the machine's address before calling the master.
             if machine and not is_known_host(machine):
                 raise WordedError(error, RosText(_NO_ADDRESS.format(name=machine))) from error
             raise
@@ -294,7 +294,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return the ``names`` that are nodes; print an error for each of the others."""
+    """Return the ``names`` that are nodes, and print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

@@ -86,7 +86,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
-    """Return `NODE (URI)` if a node that uses ``topic`` in ``system_state`` has this URI, else the URI."""
+    """Return `NODE (URI)` for the node with this URI that uses ``topic`` in ``system_state``, or only the URI."""
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
@@ -98,7 +98,7 @@ def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str
 
 
 def get_node_info_description(node_name: str) -> str:
-    """Return the master's information about a node in the format of `rosnode info`.
+    """Return the master's information about a node, formatted like `rosnode info`.
 
     Raise ROSNodeIOException if the master does not respond.
     """
@@ -111,7 +111,7 @@ def get_node_info_description(node_name: str) -> str:
 
 
 def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
-    """Return the process id and connections of the node at ``node_api``, in the format of `rosnode info`.
+    """Return the process id and connections of the node at ``node_api``, formatted like `rosnode info`.
 
     Raise ROSNodeIOException if the node does not respond.
     """
@@ -125,7 +125,7 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node responds to ``max_count`` pings. If ``max_count`` is None, ping until a ping fails.
+    """Return whether a node responds to ``max_count`` pings. If that is None, ping until one fails.
 
     Raise ROSNodeIOException if the master does not respond. The reason for a failure is always printed to stderr,
     everything else only if ``verbose``.
@@ -152,7 +152,7 @@ def rosnode_ping(
 
 
 def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[list[str], list[str]]:
-    """Return (nodes that respond, nodes that do not). Raise ROSNodeIOException if the master does not respond."""
+    """Return (responding nodes, other nodes). Raise ROSNodeIOException if the master does not respond."""
     answering: list[str] = []
     silent: list[str] = []
     with _graph() as graph:
@@ -196,7 +196,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
     As in ROS, raise ConnectionRefusedError if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
-        # Query the master even if the list is empty, because an unreachable master is an error here.
+        # Query the master even for an empty list, because an unreachable master is an error.
         graph.state()
         for node in graph.addresses(blacklist):
             print(f"Unregistering {node.name}")
@@ -240,7 +240,7 @@ def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Print the output of `rosnode info`; if ``quiet``, do not query the node.
+    """Print the output of `rosnode info`; if ``quiet``, without querying the node.
 
     Raise ROSNodeIOException if the master does not respond.
     """
@@ -261,7 +261,7 @@ rosnode_debugnode = rosnode_info
 
 
 def rosnode_cleanup() -> None:
-    """Run `rosnode cleanup` with its confirmation prompt. Raise ROSNodeIOException if the master does not respond."""
+    """Run `rosnode cleanup`, which prompts for confirmation. Raise ROSNodeIOException if the master does not respond."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     with _graph() as graph:
@@ -270,7 +270,7 @@ def rosnode_cleanup() -> None:
 
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
-    """As in ROS, run the command and exit with its status. ``argv`` starts with the command's name."""
+    """Run the command and, as in ROS, exit with its status. ``argv`` starts with the command's name."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
@@ -287,7 +287,7 @@ def _run_verb(name: str, argv: Sequence[str]) -> int | None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return a verb's function. Its argument is a command line that starts with the command's name and the verb."""
+    """Return a function that runs a verb, given a command line that starts with the command's name and the verb."""
 
     def call(argv: Sequence[str]) -> None:
         _run_verb(name, argv)
@@ -303,7 +303,7 @@ _rosnode_cmd_ping = _verb("ping")
 
 
 def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
-    """Run `rosnode kill`; return its status. Raise ROSNodeException if a name is not a node's name."""
+    """Run `rosnode kill`; return its exit status. Raise ROSNodeException if a name is not a node."""
     names = [script_resolve_name(ID, word) for word in argv[2:] if not word.startswith("-")]
     if names:
         try:
@@ -317,7 +317,7 @@ def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
 
 
 def _fullusage(return_error: bool = True) -> NoReturn:
-    """Print the list of commands, and exit: with the status of a usage error if ``return_error`` is true, otherwise with 0."""
+    """Print the list of commands and exit, with the status of a usage error if ``return_error``, otherwise 0."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     status = main([])
@@ -336,7 +336,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value from a response (code, status message, value). Raise ROSNodeException if the response is an error."""
+    """Return the value of a response (code, status message, value). Raise ROSNodeException if it is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")
@@ -348,7 +348,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """Ping a node; return the round-trip time in seconds. If the node does not respond, print an error and return None."""
+    """Ping a node and return the round-trip time in seconds, or print an error and return None if it does not respond."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:
@@ -370,8 +370,8 @@ def _address(host: str) -> str | None:
 def _graph(
     master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
 ) -> Iterator[Graph]:
-    """Yield the graph of ``master`` (default: the environment's master); convert errors to this module's exceptions."""
-    # Old scripts pass a ServerProxy, which returns an object for any attribute, but never a string.
+    """Yield the graph of ``master`` (default: the environment's master), converting errors to this module's exceptions."""
+    # Old scripts pass a ServerProxy, whose attributes are objects but never strings.
     uri = getattr(master, "master_uri", None)
     try:
         with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:

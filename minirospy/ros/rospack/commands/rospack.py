@@ -41,7 +41,7 @@ _FOOTER = """\
 
 
 class _RospackError(MinirospyError):
-    """An error with rospack's message."""
+    """An error with the text that rospack prints."""
 
 
 class _Line(NamedTuple):
@@ -53,7 +53,7 @@ class _Line(NamedTuple):
 
 
 class _Verb(NamedTuple):
-    """A verb. ``usage`` follows its name in the help; ``summary`` is the output of `rospack help VERB`."""
+    """A verb. In the help, ``usage`` follows its name; ``summary`` is what `rospack help VERB` prints."""
 
     body: Callable[[_Line, Dependencies], None]
     usage: str
@@ -63,7 +63,7 @@ class _Verb(NamedTuple):
 
 
 class _Tool(NamedTuple):
-    """A command: its name, its term for a package, and its verbs."""
+    """A command: its name, its word for a package, and its verbs."""
 
     name: str
     thing: str
@@ -151,7 +151,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """Return a command line's verb. Raise _RospackError if the verb does not exist or does not support the options."""
+    """Return a command line's verb. Raise _RospackError if it does not exist or does not support the options."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")
@@ -174,7 +174,7 @@ def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
 
 
 def _package(line: _Line, *others: str, said: str = "package") -> str:
-    """Return the package given on a command line, or the current folder's package.
+    """Return the command line's package, by default the one in the current folder.
 
     Raise _RospackError if no package is given or found, or if an option named in ``others`` is missing.
     """
@@ -238,8 +238,7 @@ def _depends_manifests(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # Only check the package.
-    # rosbuild created these files when it generated messages, and catkin packages do not contain them.
+    # Only check the package, and print nothing: rosbuild created these files when generating messages, catkin does not.
     tree.all(_package(line))
     print()
 
@@ -263,7 +262,7 @@ def _rosdep0(line: _Line, tree: Dependencies) -> None:
 
 
 def _vcs(line: _Line, tree: Dependencies) -> None:
-    # Only check that the package exists: <versioncontrol> is a tag of manifest.xml that package.xml does not have.
+    # Only check that the package exists: <versioncontrol> is a tag only in manifest.xml, not in package.xml.
     tree.folder(_package(line))
 
 
@@ -287,7 +286,7 @@ def _export(line: _Line, tree: Dependencies) -> None:
 
 
 def _exported(line: _Line, tree: Dependencies, package: str, tag: str, attribute: str) -> list[str]:
-    """Return the distinct values of an attribute in the exports of a package and all its dependencies."""
+    """Return an attribute's distinct values in the exports of a package and all its dependencies."""
     own = [] if "deps-only" in line.options else [package]
     found: dict[str, None] = {}
     for name in [*own, *reversed(tree.all(package))]:
@@ -319,7 +318,7 @@ def _contains(line: _Line, tree: Dependencies) -> None:
 
 
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
-    """Return a verb that prints the flags in <cpp> exports that ``keep`` accepts, without ``prefix``."""
+    """Return a verb that prints the flags in <cpp> exports accepted by ``keep``, without ``prefix``."""
 
     def body(line: _Line, tree: Dependencies) -> None:
         words = " ".join(_exported(line, tree, _package(line), "cpp", attribute)).split()

@@ -76,7 +76,7 @@ def _set(parameter: str, value: str | None, textfile: str | None, binfile: str |
     elif binfile is not None:
         new = _read_bytes(binfile)
     else:
-        # In a shell, an omitted value means the empty string; YAML would read it as null.
+        # An omitted value in the shell means an empty string, which YAML would read as null.
         new = parse_value(value) if value else ""
 
     with Graph.open("rosparam") as graph:
@@ -272,7 +272,7 @@ FAMILY = Family(
         ),
         Verb("list", "list parameter names", _list_parser, _list),
     ),
-    # As in ROS, exit with 0 for an unknown verb, although scripts then do not notice the error.
+    # As in ROS, exit with 0 for an unknown verb, although scripts then miss the error.
     help_status=HelpStatus(none=0, short=0, long=0, unknown=64),
     shows_help_on_error=True,
 )

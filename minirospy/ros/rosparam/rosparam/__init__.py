@@ -87,11 +87,11 @@ class RosParamIOException(RosParamException):
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
-    """Raised if the YAML is invalid. Programs catch one or the other of the two base classes."""
+    """Raised if the YAML is invalid. Programs catch either of its base classes."""
 
 
 def get_param(param: str) -> Any:
-    """Return a parameter's value. As in ROS, bytes and dates are in xmlrpc.client's wrappers.
+    """Return a parameter's value. As in ROS, bytes and dates are xmlrpc.client objects.
 
     Raise rosgraph.MasterError if the parameter is not set, or if the name is empty.
     """
@@ -104,7 +104,7 @@ def get_param(param: str) -> Any:
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
-    """Set a parameter from a YAML string. Raise RosParamException if the string is not YAML or the parameter cannot be set."""
+    """Set a parameter from a YAML string. Raise RosParamException if it is not YAML or the parameter cannot be set."""
     try:
         parsed = parse_value(value)
     except ValueTextError as error:
@@ -113,7 +113,7 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 
 
 def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
-    """Set a parameter to a value. A dictionary is merged: it does not delete the namespace's other parameters."""
+    """Set a parameter to a value. A dictionary is merged, keeping the namespace's other parameters."""
     with _graph() as graph:
         target = graph.resolve(param) if isinstance(param, str) else _resolve(graph, param)
         for name, single in parameters.set_parameter(graph, target, _with_bytes(value)):
@@ -122,7 +122,7 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """In a value, replace Binary with bytes, and numpy's numbers and arrays with Python's numbers and lists."""
+    """Replace Binary in a value with bytes, and numpy numbers and arrays with Python numbers and lists."""
     if is_numpy(value):
         return _with_bytes(value.tolist())  # type: ignore[attr-defined]
     if isinstance(value, Binary):
@@ -133,7 +133,7 @@ def _with_bytes(value: object) -> object:
 
 
 def upload_params(ns: str, values: object, verbose: bool = False) -> None:
-    """Set all values in a namespace. Raise RosParamException if the root is set to anything but a dictionary."""
+    """Set all values in a namespace. Raise RosParamException if the root is set to a non-dictionary."""
     check_sendable(ns)
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
@@ -143,7 +143,7 @@ def upload_params(ns: str, values: object, verbose: bool = False) -> None:
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter. Raise rosgraph.MasterError if the parameter is not set, or if the name is empty."""
+    """Delete a parameter. Raise rosgraph.MasterError if it is not set or its name is empty."""
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
@@ -155,7 +155,7 @@ def delete_param(param: str, verbose: bool = False) -> None:
 
 
 def print_params(params: object, ns: str) -> None:
-    """Print parameters, one ``name=value`` per line; if there is only a value, print just that."""
+    """Print parameters as ``name=value`` lines, or only the value if there is no name."""
     if isinstance(params, dict):
         for name, value in parameters.flatten(ns, params):
             print(f"{name}={value}")
@@ -164,7 +164,7 @@ def print_params(params: object, ns: str) -> None:
 
 
 def get_param_server() -> Master:
-    """Return a proxy for the parameter server, which is the environment's master."""
+    """Return a proxy for the parameter server, the environment's master."""
     return Master("/" + NAME)
 
 
@@ -178,7 +178,7 @@ def list_params(ns: str) -> list[str]:
 def load_file(
     filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] for each document in a YAML file; values may have types that parameters do not support.
+    """Return [(values, namespace)] for each document in a YAML file, even with types that parameters do not support.
 
     ``-`` or an empty name means stdin. Raise RosParamException if the file cannot be read; for invalid YAML, the exception
     is also a yaml.YAMLError.
@@ -203,7 +203,7 @@ def load_file(
 def load_str(
     str: str | bytes, filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] for each document in a YAML string that was read from ``filename``."""
+    """Return [(values, namespace)] for each document in a YAML string that came from ``filename``."""
     text = str.decode() if isinstance(str, bytes) else str
     try:
         documents = list(parse_documents(text, filename))
@@ -220,7 +220,7 @@ def load_str(
 
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
-    """Write the parameters in a namespace to a file.
+    """Write a namespace's parameters to a file.
 
     Raise OSError if the file cannot be written, rosgraph.MasterError if there are no parameters.
     """
@@ -231,7 +231,7 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
+    """Run the command and, as in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
@@ -295,7 +295,7 @@ def _pretty_print(value: dict[str, object], indent: str = "") -> None:
 
 
 def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[Values, list[str]]:
-    """Parse a command line of `rosparam set`, in which values may be negative numbers; return the options and values."""
+    """Parse a `rosparam set` command line, whose values may be negative numbers; return the options and values."""
     values: list[str] = []
     options: list[str] = []
     takes_value = False
@@ -309,7 +309,7 @@ def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[V
 
 
 def _get_caller_id() -> str:
-    """Return the caller id for this process's calls to the master."""
+    """Return this process's caller id for calls to the master."""
     from minirospy.ros.rosgraph.rosgraph.names import make_caller_id
 
     return make_caller_id(f"rosparam-{os.getpid()}")
@@ -342,7 +342,7 @@ def construct_angle_radians(loader: Any, node: Any) -> float | str:
 
 
 def construct_yaml_binary(loader: Any, node: Any) -> Binary:
-    """Return the bytes in a YAML node as an xmlrpc.client.Binary."""
+    """Return a YAML node's bytes as an xmlrpc.client.Binary."""
     return Binary(loader.construct_yaml_binary(node))
 
 
@@ -357,7 +357,7 @@ def represent_foo(loader: Any, data: str) -> Any:
     return loader.represent_scalar("#", data)
 
 
-# As in ROS, importing rosparam makes PyYAML's own loaders read deg(90) and rad(pi/2), and return bytes as Binary.
+# As in ROS, importing rosparam makes PyYAML's loaders read deg(90) and rad(pi/2), and return bytes as Binary.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
     _loader.add_constructor("!degrees", construct_angle_degrees)
@@ -374,7 +374,7 @@ def _fullusage() -> NoReturn:
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """Return a parameter's global name. Raise MasterError for an empty name, which would mean all parameters in the namespace.
+    """Return a parameter's global name. Raise MasterError if the name is empty, which would mean the whole namespace.
 
     A value that is not a string raises the same error as in ROS, which sends the value to the master: TypeError if XML-RPC
     does not support its type.

@@ -13,7 +13,7 @@ ROS_STACK = "ros"
 
 
 class ResourceNotFound(Exception):
-    """Raised if no package or stack has the given name. ``ros_paths``: the folders that were searched."""
+    """Raised if no package or stack has the given name. ``ros_paths`` holds the folders searched."""
 
     def __init__(self, msg: str, ros_paths: Sequence[str] | None = None, nearest: Sequence[str] = ()) -> None:
         super().__init__(msg)

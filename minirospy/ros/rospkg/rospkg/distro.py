@@ -10,5 +10,5 @@ __all__ = ["current_distro_codename"]
 
 
 def current_distro_codename(env: Mapping[str, str] | None = None) -> str:
-    """Return ROS_DISTRO, or the last ROS 1 distribution if it is not set."""
+    """Return ROS_DISTRO, by default the last ROS 1 distribution."""
     return folders.distro_codename(env)

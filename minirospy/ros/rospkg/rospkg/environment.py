@@ -67,7 +67,7 @@ def get_ros_package_path(env: Environ | None = None) -> str | None:
 
 
 def get_ros_paths(env: Environ | None = None) -> list[str]:
-    """Return the folders in ROS_PACKAGE_PATH, followed by those with minirospy's own packages."""
+    """Return the folders in ROS_PACKAGE_PATH, then those of minirospy's own packages."""
     named = _compute_package_paths(get_ros_root(env), get_ros_package_path(env))
     return list(dict.fromkeys([*named, *map(str, built_in_roots())]))
 
@@ -88,13 +88,13 @@ def get_test_results_dir(env: Environ | None = None) -> str:
 
 
 def get_etc_ros_dir(env: Environ | None = None) -> str:
-    """Return ROS_ETC_DIR, or the system's folder for ROS settings."""
+    """Return ROS_ETC_DIR, by default the system's folder for ROS settings."""
     default = r"C:\opt\ros\etc" if sys.platform == "win32" else "/etc/ros"
     return _environ(env).get("ROS_ETC_DIR") or default
 
 
 def on_ros_path(p: str, env: Environ | None = None) -> bool:
-    """Return whether a path is in one of the folders that are searched for packages."""
+    """Return whether a path is below a folder that is searched for packages."""
     place = Path(p).resolve()
     return any(place.is_relative_to(Path(root).resolve()) for root in get_ros_paths(env))
 

@@ -82,12 +82,12 @@ class Export:
         self.str = str
 
     def get(self, attr: str) -> str | None:
-        """Return an attribute's value, or None if the tag does not have the attribute."""
+        """Return an attribute's value, or None if the tag does not have it."""
         return self.attrs.get(attr)
 
 
 class Manifest:
-    """A parsed manifest, with rospkg's attributes; initially empty. ``filename`` is its path."""
+    """A parsed manifest with rospkg's attributes, initially empty. ``filename`` is its path."""
 
     def __init__(self, type_: str = "package", filename: str | None = None, is_catkin: bool = False) -> None:
         self.type = type_
@@ -108,7 +108,7 @@ class Manifest:
         self.unknown_tags: list[Element] = []
 
     def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """Return the values of an attribute in all exports with this tag. If ``convert``, replace ``${prefix}`` by the folder.
+        """Return an attribute's values in all exports with this tag. If ``convert``, replace ``${prefix}`` with the folder.
 
         Raise ValueError if ``convert`` and the manifest has no path.
         """
@@ -122,7 +122,7 @@ class Manifest:
 
 
 def catkin_manifest(read: manifest.Manifest, depends: Sequence[str], rosdeps: Sequence[str]) -> Manifest:
-    """Return a package.xml with rospkg's attributes, its dependencies split into packages and others."""
+    """Return a package.xml with rospkg's attributes and its dependencies split into packages and others."""
     result = Manifest(filename=str(read.path), is_catkin=True)
     result.name = read.name
     result.version = read.version
@@ -147,7 +147,7 @@ def _people(read: manifest.Manifest) -> str:
 
 
 def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: object = None) -> Manifest:
-    """Return a folder's parsed manifest: the named manifest.xml or stack.xml if it exists, otherwise the package.xml.
+    """Return a folder's parsed manifest: the given manifest.xml or stack.xml if it exists, otherwise package.xml.
 
     Every dependency in a package.xml counts as a package. Raise OSError if there is no manifest, InvalidManifest if it
     cannot be parsed.
@@ -168,7 +168,7 @@ def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack
 
 
 def parse_manifest(manifest_name: str, string: str, filename: str = "string") -> Manifest:
-    """Return the content of rosbuild's manifest.xml or stack.xml. Raise InvalidManifest if it is invalid.
+    """Parse rosbuild's manifest.xml or stack.xml. Raise InvalidManifest if it is invalid.
 
     Source: http://wiki.ros.org/Manifest, http://wiki.ros.org/Stack%20Manifest.
     """
@@ -232,7 +232,7 @@ def _root(tag: str, string: str, filename: str) -> Element:
 
 
 def _only(root: Element, tag: str, filename: str, *, raw: bool = False) -> str | None:
-    """Return the text of a tag that must be unique, or None if there is none. ``raw``: with the tags inside it."""
+    """Return the text of a tag that may occur only once, or None. If ``raw``, include the tags inside it."""
     found = child_elements(root, tag)
     if len(found) > 1:
         raise InvalidManifest(f"Invalid manifest file [{filename}]: must have a single '{tag}' element")
@@ -257,7 +257,7 @@ def _platform(element: Element) -> Platform:
 
 
 def _required(element: Element, attribute: str, missing: str) -> str:
-    """Return an attribute. Raise InvalidManifest with the text ``missing`` if it does not exist, ValueError if it is empty."""
+    """Return an attribute. Raise InvalidManifest with the text ``missing`` if it is absent, ValueError if it is empty."""
     if not element.hasAttribute(attribute):
         raise InvalidManifest(missing)
     value = element.getAttribute(attribute)
@@ -272,7 +272,7 @@ def _attribute(root: Element, tag: str, attribute: str, default: str = "") -> st
 
 
 def child_elements(parent: Element, tag: str = "") -> list[Element]:
-    """Return the child elements with a tag, or all of them."""
+    """Return the child elements with this tag, or all of them."""
     return [
         each for each in parent.childNodes if each.nodeType == each.ELEMENT_NODE and tag in ("", each.tagName)
     ]

@@ -93,7 +93,7 @@ _OF_FDO = {
 
 
 class OsNotDetected(Exception):
-    """Raised if the detector does not support the running operating system, or no detector does."""
+    """Raised if a detector's OS is not running, or no detector matches."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
@@ -126,7 +126,7 @@ class OsDetector:
     """Detects one operating system."""
 
     def is_os(self) -> bool:
-        """Return whether the detector's system is running."""
+        """Return whether the detector's OS is running."""
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
@@ -146,7 +146,7 @@ class FdoDetect(OsDetector):
         self.release_info = release if release and release.get("ID") == fdo_id else None
 
     def is_os(self) -> bool:
-        """Return whether the detector's system is running."""
+        """Return whether the detector's OS is running."""
         return self.release_info is not None
 
     def get_version(self) -> str:
@@ -168,7 +168,7 @@ class FdoDetect(OsDetector):
 
 
 class LsbDetect(FdoDetect):
-    """Detects a Linux distribution by the name that `lsb_release` prints; os-release contains the same name in lower case."""
+    """Detects a Linux distribution by its `lsb_release` name, which os-release contains in lower case."""
 
     def __init__(self, lsb_name: str, get_version_fn: object = None) -> None:
         self.lsb_name = lsb_name
@@ -183,22 +183,22 @@ class Debian(LsbDetect):
 
 
 class _Platform(OsDetector):
-    """Detects a system by the name that Python's ``platform`` module returns."""
+    """Detects an OS by its name in Python's ``platform`` module."""
 
     system = ""
 
     def is_os(self) -> bool:
-        """Return whether this machine runs the detector's system."""
+        """Return whether the detector's OS is running."""
         return platform.system() == self.system
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected if another system is running."""
+        """Return the system's version. Raise OsNotDetected if another OS is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return self._version()
 
     def get_codename(self) -> str:
-        """Return an empty codename. Raise OsNotDetected if another system is running."""
+        """Return an empty codename. Raise OsNotDetected if another OS is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return ""
@@ -238,7 +238,7 @@ class FreeBSD(_Platform):
 
 
 class OsDetect:
-    """Detects the operating system. The first detector that matches is used."""
+    """Detects the OS with the first detector that matches."""
 
     default_os_list: list[tuple[str, OsDetector]] = []
 
@@ -267,7 +267,7 @@ class OsDetect:
         return self._found[:3]
 
     def get_detector(self, name: str | None = None) -> OsDetector | None:
-        """Return the detector with this name, or the one that matched.
+        """Return the detector with this name, by default the one that matched.
 
         Raise KeyError if the name is unknown, OsNotDetected if no detector matches.
         """

@@ -44,7 +44,7 @@ _Manager = TypeVar("_Manager", bound="ManifestManager")
 
 
 class ManifestManager:
-    """Finds packages or stacks below the given folders. Results are cached, so create a new object to see changes on disk."""
+    """Finds packages or stacks below the given folders. Results are cached: create a new object to see changes on disk."""
 
     _manifest_name = MANIFEST_FILE
 
@@ -56,7 +56,7 @@ class ManifestManager:
 
     @classmethod
     def get_instance(cls: type[_Manager], ros_paths: Sequence[str] | None = None) -> _Manager:
-        """Return the shared object for these folders."""
+        """Return the shared instance for these folders."""
         key: object = cls
         found = _instance(key, tuple(get_ros_paths() if ros_paths is None else ros_paths))
         assert isinstance(found, cls)
@@ -64,7 +64,7 @@ class ManifestManager:
 
     @property
     def ros_paths(self) -> Names:
-        """Return the searched folders."""
+        """Return the folders searched."""
         return list(self._ros_paths)
 
     def get_ros_paths(self) -> Names:
@@ -76,7 +76,7 @@ class ManifestManager:
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
-        """Return the folder of a package or stack. Raise ResourceNotFound if there is no such package or stack."""
+        """Return the folder of a package or stack. Raise ResourceNotFound if it does not exist."""
         folders = self._folders()
         if name not in folders:
             raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))
@@ -90,7 +90,7 @@ class ManifestManager:
         return self._rosbuild(name) or catkin_manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
-        """Return a package's direct dependencies or, if ``implicit``, all of them.
+        """Return a package's direct dependencies, or all of them if ``implicit``.
 
         Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
@@ -102,14 +102,14 @@ class ManifestManager:
         return list(found)
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Names:
-        """Return the packages that depend on this one directly or, if ``implicit``, directly or indirectly."""
+        """Return the packages that depend on this one directly, or also indirectly if ``implicit``."""
         found = []
         for other in self._folders():
             try:
                 if name in self.get_depends(other, implicit):
                     found.append(other)
             except (InvalidManifest, ResourceNotFound):
-                # An invalid manifest, or a package that is missing, does not affect other packages.
+                # An invalid manifest or a missing package does not affect other packages.
                 continue
         return found
 
@@ -122,7 +122,7 @@ class ManifestManager:
         self._custom[key] = value
 
     def _load_manifest(self, name: str) -> Manifest:
-        # Programs call this method although it is private in rospkg, too.
+        # Programs call this method although it is private in rospkg too.
         return self.get_manifest(name)
 
     def _folders(self) -> dict[str, Path]:
@@ -136,7 +136,7 @@ class ManifestManager:
             raise InvalidManifest(str(error)) from error
 
     def _rosbuild(self, name: str) -> Manifest | None:
-        """Return the manifest that rosbuild uses, or None if there is none."""
+        """Return a package's manifest.xml or a stack's stack.xml, or None if there is none."""
         if name not in self._manifests:
             folder = self.get_path(name)
             exists = os.path.isfile(os.path.join(folder, self._manifest_name))
@@ -159,7 +159,7 @@ class ManifestManager:
             if each not in found:
                 found[each] = None
                 self._visit(each, found)
-                # Move the package behind its dependencies.
+                # Move the package after its dependencies.
                 found[each] = found.pop(each)
 
 
@@ -167,7 +167,7 @@ class RosPack(ManifestManager):
     """Finds packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
-        """Return a package's dependencies that are not packages; if ``implicit``, also those of the packages it depends on.
+        """Return a package's dependencies that are not packages; if ``implicit``, also those of its dependencies.
 
         If one of these cannot be read, return only the package's own. Raise ResourceNotFound if the package does not exist,
         InvalidManifest if its manifest cannot be parsed.
@@ -180,7 +180,7 @@ class RosPack(ManifestManager):
         return list(dict.fromkeys(key for name in names for key in self._split(name)[1]))
 
     def stack_of(self, package: str) -> str | None:
-        """Return the rosbuild stack whose folder contains a package, or None if there is none; catkin has no stacks.
+        """Return the rosbuild stack whose folder contains a package, or None; catkin has no stacks.
 
         Raise ResourceNotFound if the package does not exist.
         """
@@ -192,7 +192,7 @@ class RosPack(ManifestManager):
 
 
 class RosStack(ManifestManager):
-    """Finds metapackages, and rosbuild's stacks."""
+    """Finds metapackages and rosbuild stacks."""
 
     _manifest_name = STACK_FILE
 
@@ -232,7 +232,7 @@ def _instance(cls: type[ManifestManager], ros_paths: tuple[str, ...]) -> Manifes
 
 
 def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[str]:
-    """Return the packages below a folder, or the stacks if ``manifest_name`` is stack.xml; store their folders in ``cache``.
+    """Return the packages below a folder, or its stacks if ``manifest_name`` is stack.xml; store their folders in ``cache``.
 
     If it is package.xml, rosbuild packages are left out.
     """
@@ -264,7 +264,7 @@ def _folders_with(name: str, root: Path) -> Iterator[Path]:
 
 
 def get_package_name(path: str) -> str | None:
-    """Return the package that contains a path, or None if no package contains it."""
+    """Return the package that contains a path, or None."""
     place = Path(path).absolute()
     for folder in (place, *place.parents):
         if name := folder.name if (folder / MANIFEST_FILE).is_file() else package_name(folder):

@@ -127,7 +127,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log a message with the source position of the caller's caller. rospy's log functions wrap this function.
+    """Log a message with the source position of the caller's caller. rospy's log functions call this.
 
     ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """
@@ -152,12 +152,12 @@ def is_initialized() -> bool:
 
 
 def is_shutdown_requested() -> bool:
-    """Return whether a shutdown has started. is_shutdown() still returns False while its hooks run."""
+    """Return whether a shutdown has started; while its hooks run, is_shutdown() still returns False."""
     return current_session().lifecycle.is_shutdown_requested
 
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() still returns False.
+    """Call ``h(reason)`` at shutdown, after the on_shutdown hooks and while is_shutdown() still returns False.
 
     Raise TypeError if ``h`` is not callable.
     """
@@ -166,7 +166,7 @@ def add_preshutdown_hook(h: Callable[[object], object]) -> None:
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` once is_shutdown() returns True. Raise TypeError if ``h`` is not callable."""
+    """Call ``h(reason)`` at shutdown, once is_shutdown() returns True. Raise TypeError if ``h`` is not callable."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
@@ -177,7 +177,7 @@ def add_client_shutdown_hook(h: Callable[[], object]) -> None:
 
 
 def register_signals() -> None:
-    """Make SIGINT and SIGTERM shut the node down, like init_node. Works only in the main thread."""
+    """Like init_node, make SIGINT and SIGTERM shut the node down. Works only in the main thread."""
     current_session().signals.install()
 
 
@@ -190,7 +190,7 @@ def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -
 
 
 def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
-    """Return the (host, port) in a service's ``rosrpc://host:port``. Raise ParameterInvalid if the URI is invalid."""
+    """Return the (host, port) in a service's ``rosrpc://host:port``. Raise ParameterInvalid if it is invalid."""
     if not uri.startswith(ROSRPC):
         raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
     try:
@@ -201,7 +201,7 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a validator for topic names. It raises ParameterInvalid, naming ``param_name``, for other values."""
+    """Return a validator for topic names, which raises ParameterInvalid, naming ``param_name``, for other values."""
     resolved = valid_name(param_name)
 
     def check(param_value: object, caller_id: str) -> str:

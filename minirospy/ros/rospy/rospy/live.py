@@ -59,7 +59,7 @@ def _restart_unless(value: object) -> None:
         replace_session()
 
 
-# Programs set these flags to False to start another node after the first one has shut down.
+# Programs reset these flags to start another node after the first one has shut down.
 _install(
     rospy.core,
     _shutdown_flag=(lambda: current_session().is_shutdown(), _restart_unless),
@@ -91,7 +91,7 @@ _install(
         lambda: _identity().remappings,
         lambda value: setattr(_identity(), "remappings", value),
     ),
-    # Setting a new name keeps the namespace, as in rospy, where they are separate variables.
+    # Setting a new name keeps the namespace, as in rospy, which stores them separately.
     _caller_id=(
         lambda: _identity().name,
         lambda value: _identity().be_called(value, _identity().namespace),

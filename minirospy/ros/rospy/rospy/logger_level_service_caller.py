@@ -19,18 +19,18 @@ class ROSConsoleException(Exception):
 
 
 class LoggerLevelServiceCaller:
-    """Reads and sets the levels of other nodes' loggers."""
+    """Gets and sets the logger levels of other nodes."""
 
     def __init__(self) -> None:
         self._current_loggers: list[str] = []
         self._current_levels: dict[str, str] = {}
 
     def get_levels(self) -> list[str]:
-        """Return the names of the levels, the least severe first."""
+        """Return the level names, least severe first."""
         return ["debug", "info", "warn", "error", "fatal"]
 
     def get_node_names(self) -> list[str]:
-        """Return the nodes that offer the logger-level services."""
+        """Return the nodes that provide the logger level services."""
         names = rosservice.get_service_list()
         return sorted(name.removesuffix(_SET) for name in names if name.endswith(_SET))
 
@@ -50,7 +50,7 @@ class LoggerLevelServiceCaller:
         return self._current_loggers
 
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
-        """Set a level; return False if get_loggers() has reported this level already.
+        """Set a level; return False if get_loggers() has already reported this level.
 
         Raise rosservice.ROSServiceException if the call fails.
         """

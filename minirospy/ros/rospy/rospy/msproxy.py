@@ -42,7 +42,7 @@ _master_arg_remap = {
 
 
 class ServerProxy:
-    """A proxy for an XML-RPC server; each attribute is one of the server's methods.
+    """A proxy for an XML-RPC server, with the server's methods as attributes.
 
     As in xmlrpc.client, calls raise OSError (ConnectionRefusedError, TimeoutError) if the server is unreachable, and
     xmlrpc.client.Fault if the server returns a fault. Thread-safe.
@@ -125,13 +125,13 @@ class MasterProxy:
         return iter(value)
 
     def search_param(self, key: str) -> str | None:
-        """Search for a parameter upwards from this node's namespace. Return the closest match's name, or None."""
+        """Search for a parameter in this node's namespace and its parents. Return the closest match's name, or None."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
 
     def get_param_cached(self, key: str) -> Any:
-        """Return a parameter's value from this node's cache. Raise KeyError if the parameter is not set."""
+        """Return a parameter's value from this node's cache. Raise KeyError if it is not set."""
         return get_param_cached(key)
 
 
@@ -142,7 +142,7 @@ def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return a proxy for the XML-RPC server at ``uri``, or None if ``uri`` is invalid. Each call returns the same proxy."""
+    """Return the proxy for the XML-RPC server at ``uri`` (always the same object), or None if ``uri`` is invalid."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)

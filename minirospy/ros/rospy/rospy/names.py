@@ -97,7 +97,7 @@ def get_mappings() -> dict[str, str]:
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """Return the remappings with global names; empty before init_node. Changes to the dict take effect immediately."""
+    """Return the remappings with global names, empty before init_node. Changes to the dict take effect immediately."""
     return current_session().identity.remappings
 
 
@@ -107,7 +107,7 @@ def reload_mappings(argv: Sequence[str]) -> None:
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, with the node name ``node_name``.
+    """Resolve the remappings again, for the node name ``node_name``.
 
     Raise ValueError if there are any names to resolve and ``node_name`` is not a name.
     """
@@ -118,7 +118,7 @@ def initialize_mappings(node_name: str) -> None:
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """Return a topic's global name before init_node has been called. Raise ValueError if the name is private."""
+    """Return a topic's global name without using the node's name. Raise ValueError if the name is private."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return current_session().identity.resolve_topic(name or "")
@@ -132,7 +132,7 @@ def scoped_name(caller_id: str, name: str) -> str:
 
 
 def global_name(param_name: str) -> Validator:
-    """Return a validator for global names. It raises ParameterInvalid, naming ``param_name``, for other values."""
+    """Return a validator for global names, which raises ParameterInvalid, naming ``param_name``, for other values."""
 
     def validator(param_value: object, caller_id: str) -> str:
         text = _text(param_name, param_value)
@@ -153,12 +153,12 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument's global name without remapping it. Raise ParameterInvalid if the argument is not a valid name."""
+    """Return an argument's global name without remapping it. Raise ParameterInvalid if it is not a valid name."""
     return resolve_name_for(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument unchanged. Raise ParameterInvalid if the argument is not a valid name."""
+    """Return an argument unchanged. Raise ParameterInvalid if it is not a valid name."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")

@@ -26,7 +26,7 @@ __all__ = [
 
 
 def wallsleep(duration: float) -> None:
-    """Sleep for ``duration`` seconds of wall-clock time, even if the node's time is simulated.
+    """Sleep for ``duration`` seconds of wall time, even if the node's time is simulated.
 
     Raise ValueError if ``duration`` is negative.
     """
@@ -34,7 +34,7 @@ def wallsleep(duration: float) -> None:
 
 
 def get_rostime_cond() -> threading.Condition:
-    """Return the condition that is notified when simulated time changes."""
+    """Return the condition that is notified of changes in simulated time."""
     return current_session().time_changed
 
 
@@ -44,7 +44,7 @@ def is_rostime_initialized() -> bool:
 
 
 def set_rostime_initialized(val: bool) -> None:
-    """Make the time available, so that a program without a node can call Time.now()."""
+    """Mark the time as available, so that a program without a node can call Time.now()."""
     current_session().has_time = bool(val)
 
 
@@ -63,10 +63,10 @@ _set_rostime = set_rostime
 
 
 def switch_to_wallclock() -> None:
-    """Switch the node to the machine's clock."""
+    """Switch the node to the system clock."""
     session = current_session()
     before, session.clock = session.clock, WallClock()
     if isinstance(before, SimulatedClock):
-        # Wake the threads that are sleeping on the previous clock.
+        # Wake the threads sleeping on the previous clock.
         before.set(session.clock.now())
     session.has_time = True

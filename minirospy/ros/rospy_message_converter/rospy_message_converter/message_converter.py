@@ -76,7 +76,7 @@ def convert_dictionary_to_ros_message(
 def convert_ros_message_to_dictionary(
     message: Message, binary_array_as_bytes: bool = True
 ) -> dict[str, object]:
-    """Convert a message to a dict. Byte arrays become base64 strings; if not ``binary_array_as_bytes``, they become lists."""
+    """Convert a message to a dict. Byte arrays become base64 strings, or lists if ``binary_array_as_bytes`` is False."""
     return {
         name: _from_ros(type_, getattr(message, name), binary_array_as_bytes)
         for name, type_ in zip(message.__slots__, message._slot_types, strict=True)
@@ -84,7 +84,7 @@ def convert_ros_message_to_dictionary(
 
 
 def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> object:
-    """Convert a dict's value to a field's value. Raise TypeError if the value's type is wrong, ValueError if it is invalid."""
+    """Convert a dict's value to a field value. Raise TypeError for a wrong type, ValueError for an invalid value."""
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
             return _bytes_of(name, value)
@@ -111,7 +111,7 @@ def _wrong(name: str, value: object, valid: str) -> TypeError:
 
 
 def _bytes_of(name: str, value: Any) -> bytes:
-    """Convert a base64 string, bytes, or a list of numbers to a byte array."""
+    """Convert a base64 string, bytes or a list of numbers to a byte array."""
     try:
         return base64.b64decode(value, validate=True) if isinstance(value, str) else bytes(value)
     except (binascii.Error, ValueError) as error:

@@ -60,11 +60,11 @@ _VERSIONS = {
 }
 _OPEN_SECONDS = 3.0
 _READY_SECONDS = 0.1
-_BOOT_SECONDS = 2.0  # seconds for a device to boot, because an Arduino restarts when its port is opened
+_BOOT_SECONDS = 2.0  # seconds for a device to boot: an Arduino restarts when its port is opened
 
 
 class SerialClient:
-    """A device on a port. ``port`` is a port name, or an object with ``read``, ``write`` and ``inWaiting``."""
+    """Connects a device on a port to ROS. ``port`` is a name, or an object with ``read``, ``write`` and ``inWaiting``."""
 
     header = b"\xff"
     protocol_ver1 = b"\xff"
@@ -78,7 +78,7 @@ class SerialClient:
         timeout: float = 5.0,
         fix_pyserial_for_test: bool = False,
     ) -> None:
-        """Open the port, retrying after a failure, and request the device's topics. ``timeout`` is in seconds per packet."""
+        """Open the port, retrying on failure, and request the device's topics. ``timeout`` is in seconds per packet."""
         self.timeout = timeout
         self.synced = False
         self.publishers: dict[int, Publisher] = {}
@@ -90,7 +90,7 @@ class SerialClient:
         self.callbacks: dict[int, Callable[[bytes], object]] = {
             TopicInfo.ID_PUBLISHER: self.setupPublisher,
             TopicInfo.ID_SUBSCRIBER: self.setupSubscriber,
-            # A service has two entries, one for the requests and one for the responses.
+            # A service has two entries, one for requests and one for responses.
             TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_PUBLISHER: self.setupServiceServerPublisher,
             TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_SUBSCRIBER: self.setupServiceServerSubscriber,
             TopicInfo.ID_SERVICE_CLIENT + TopicInfo.ID_PUBLISHER: self.setupServiceClientPublisher,
@@ -135,7 +135,7 @@ class SerialClient:
     # --- serial connection
 
     def run(self) -> None:
-        """Forward messages until the node is shut down. Raise PortError if the connection is lost."""
+        """Forward messages until the node shuts down. Raise PortError if the connection is lost."""
         if self.port is None:
             return
         self._writer = threading.Thread(target=self._write_all, args=(self.port,), daemon=True)
@@ -156,7 +156,7 @@ class SerialClient:
         self._writer.join(self.timeout)
 
     def close(self) -> None:
-        """Unregister the device's topics and services, and close the port."""
+        """Unregister the device's topics and services and close the port."""
         self._to_write.put(None)
         for each in (*self.publishers.values(), *self.subscribers.values(), *self.services.values()):
             each.unregister()
@@ -171,7 +171,7 @@ class SerialClient:
             self._write_error = error
 
     def send(self, topic: int, msg: bytes) -> None:
-        """Send a message on the topic with this id to the device."""
+        """Send a message to the device, on the topic with this id."""
         if 0 < self.buffer_in < len(msg) or len(msg) > MAX_MESSAGE_LENGTH:
             text = "Message from ROS network dropped: message larger than buffer (%d of %d bytes)."
             rospy.logerr(text, len(msg), self.buffer_in if self.buffer_in > 0 else MAX_MESSAGE_LENGTH)
@@ -283,7 +283,7 @@ class SerialClient:
             rospy.loginfo("Setup publisher on %s [%s]", info.topic_name, info.message_type)
 
     def setupSubscriber(self, data: bytes) -> None:
-        """Subscribe to a topic for the device."""
+        """Subscribe to a topic that the device receives."""
         with _Creation("subscriber"):
             info = _info(data)
             known = self.subscribers.get(info.topic_name)
@@ -308,23 +308,23 @@ class SerialClient:
                 known.id = info.topic_id
 
     def setupServiceServerPublisher(self, data: bytes) -> None:
-        """Register the topic on which the device sends its service's responses."""
+        """Register the topic on which the device sends responses from its service."""
         self._set_up_half(data, ServiceServer, "server", from_device=True)
 
     def setupServiceServerSubscriber(self, data: bytes) -> None:
-        """Register the topic on which the device receives its service's requests."""
+        """Register the topic on which the device receives requests to its service."""
         self._set_up_half(data, ServiceServer, "server", from_device=False)
 
     def setupServiceClientPublisher(self, data: bytes) -> None:
-        """Register the topic on which the device sends the requests of its service calls."""
+        """Register the topic on which the device sends requests when it calls a service."""
         self._set_up_half(data, ServiceClient, "client", from_device=True)
 
     def setupServiceClientSubscriber(self, data: bytes) -> None:
-        """Register the topic on which the device receives the responses to its service calls."""
+        """Register the topic on which the device receives responses when it calls a service."""
         self._set_up_half(data, ServiceClient, "client", from_device=False)
 
     def _set_up_half(self, data: bytes, kind: type[_Service], name: str, *, from_device: bool) -> None:
-        """Register one direction of a service's calls: from the device or to the device."""
+        """Register one direction of a service: messages from or to the device."""
         with _Creation(f"service {name}"):
             info = _info(data)
             (self.setPublishSize if from_device else self.setSubscribeSize)(info.buffer_size)
@@ -348,7 +348,7 @@ class SerialClient:
         return known
 
     def handleTimeRequest(self, data: bytes) -> None:
-        """Send the time to the device. The device's request also serves as a heartbeat."""
+        """Send the time to the device. Its request also serves as a heartbeat."""
         self.send(TopicInfo.ID_TIME, to_bytes(Time(rospy.Time.now())))
         self.lastsync = rospy.Time.now()
         self._synced_at = time.monotonic()
@@ -413,7 +413,7 @@ def _info(data: bytes) -> TopicInfo:
 
 
 class _Creation:
-    """A context manager that logs and suppresses errors raised while a topic or service is created."""
+    """A context manager that logs and suppresses errors when creating a topic or service."""
 
     def __init__(self, what: str) -> None:
         self._what = what

@@ -95,7 +95,7 @@ class Subscriber:
 
 
 class _Service:
-    """The base class of services. Holds the message classes, and the id of the topic for the device's part of a call.
+    """Base class of services: the message classes, and the topic id for the device's part of a call.
 
     Raise EndpointError if the service type is not installed.
     """
@@ -114,16 +114,16 @@ class _Service:
         self.response: type[Message] = self.service_class._response_class
 
     def check_request(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device has a different request type."""
+        """Raise EndpointError if the device uses a different request type."""
         _compare(self.request._md5sum, info.md5sum)
 
     def check_response(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device has a different response type."""
+        """Raise EndpointError if the device uses a different response type."""
         _compare(self.response._md5sum, info.md5sum)
 
 
 class ServiceServer(_Service):
-    """A service that the device provides; handles one call at a time."""
+    """A service provided by the device. Handles one call at a time."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
@@ -137,7 +137,7 @@ class ServiceServer(_Service):
             if self.id < 0:
                 raise rospy.ServiceException("the device has not finished to describe this service")
             while not self._responses.empty():
-                # Discard a late response to a call that has timed out.
+                # Discard a late response to a call that timed out.
                 self._responses.get_nowait()
             self._send(self.id, to_bytes(request))
             while not self._is_closed and not rospy.is_shutdown():
@@ -161,7 +161,7 @@ class ServiceServer(_Service):
 
 
 class ServiceClient(_Service):
-    """Calls a service for the device. Uses a thread, so that the device's other topics are not blocked."""
+    """Calls a service for the device, in a thread, so that the device's other topics are not blocked."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
@@ -184,7 +184,7 @@ class ServiceClient(_Service):
             except rospy.ROSInterruptException:
                 return
             except rospy.ROSException as error:
-                # Send no response; the device stops waiting after its own timeout.
+                # Send no response: the device has its own timeout.
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
             except rospy.ServiceException as error:
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)

@@ -38,7 +38,7 @@ class Parent(Protocol):
 
 
 def load_pkg_module(package: str, directory: str) -> ModuleType | None:
-    """Import a package's module ``directory`` (msg or srv), and return the package.
+    """Import a package's module ``directory`` (msg or srv) and return the package.
 
     If that fails, log the reason and return None.
     """
@@ -52,7 +52,7 @@ def load_pkg_module(package: str, directory: str) -> ModuleType | None:
 
 
 def load_message(package: str, message: str) -> type[Message]:
-    """Return a message's class. Raise AttributeError if there is no such class."""
+    """Return a message class. Raise AttributeError if it does not exist."""
     found: type[Message] = getattr(_module(package, "msg"), message)
     return found
 
@@ -62,7 +62,7 @@ def _module(package: str, directory: str) -> Any:
 
 
 def load_service(package: str, service: str) -> tuple[Any, type[Message], type[Message]]:
-    """Return the classes of a service, its request and its response. Raise AttributeError if there is no such service."""
+    """Return a service's class, request class and response class. Raise AttributeError if the service does not exist."""
     module = _module(package, "srv")
     return (
         getattr(module, service),
@@ -105,7 +105,7 @@ class Subscriber(endpoints.Subscriber):
 
 
 class ServiceServer(endpoints.ServiceServer):
-    """A service that the device provides.
+    """A service provided by the device.
 
     ``id`` is the id of the topic on which the device receives requests; set it before use.
     """
@@ -132,7 +132,7 @@ class ServiceServer(endpoints.ServiceServer):
 
 
 class ServiceClient:
-    """Service calls from the device.
+    """Calls a service for the device.
 
     ``id`` is the id of the topic on which the device receives responses; set it before use.
     """
@@ -148,7 +148,7 @@ class ServiceClient:
         self.proxy: Any = rospy.ServiceProxy(self.topic, service)
 
     def handlePacket(self, data: bytes) -> None:
-        """Call the service with the device's request, and send the response."""
+        """Call the service with the device's request and send the response."""
         request = self.mreq()
         request.deserialize(data)
         self.parent.send(self.id, to_bytes(self.proxy(request)))

@@ -14,7 +14,7 @@ __all__ = ["MAX_MESSAGE_LENGTH", "Decoder", "Fault", "Packet", "WrongVersion", "
 
 _SYNC, _VERSION = 0xFF, 0xFE
 _HEAD = struct.Struct("<HBH")
-MAX_MESSAGE_LENGTH = 0xFFFF  # maximum size in bytes; the packet's length field has 16 bits
+MAX_MESSAGE_LENGTH = 0xFFFF  # maximum in bytes; the packet's length field has 16 bits
 
 
 class Packet(NamedTuple):
@@ -25,13 +25,13 @@ class Packet(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A rejected packet. The error is worded as in the real rosserial_python."""
+    """A rejected packet, with the real rosserial_python's error text."""
 
     text: str
 
 
 class WrongVersion(NamedTuple):
-    """The second byte belongs to another protocol version, or the data is not a packet at all."""
+    """An error: the second byte belongs to another protocol version, or the data is not a packet."""
 
     byte: int
 
@@ -58,24 +58,24 @@ def encode(topic_id: int, data: bytes) -> bytes:
 
 
 class Decoder:
-    """Decodes packets from bytes that arrive in chunks of any size."""
+    """Decodes packets from bytes received in chunks of any size."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
     @property
     def missing(self) -> int:
-        """Return the number of bytes missing from the current packet, or 0 between packets."""
+        """Return how many bytes the current packet still needs, or 0 between packets."""
         return self._needed() - len(self._bytes) if self._bytes else 0
 
     @property
     def received(self) -> int:
-        """Return the number of bytes of the current packet received so far."""
+        """Return how many bytes of the current packet have been received."""
         return len(self._bytes)
 
     @property
     def step(self) -> str:
-        """Return which part of a packet to read next, with the real rosserial_python's name for it."""
+        """Return the part of a packet to read next, under the real rosserial_python's name for it."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:
@@ -87,7 +87,7 @@ class Decoder:
         self._bytes.clear()
 
     def feed(self, data: bytes) -> Iterator[Packet | Fault | WrongVersion]:
-        """Add bytes and yield the packets and errors that they complete."""
+        """Add bytes; yield the packets and errors that they complete."""
         self._bytes += data
         while self._bytes:
             if self._bytes[0] != _SYNC:
@@ -101,7 +101,7 @@ class Decoder:
                 yield found
 
     def _needed(self) -> int:
-        """Return the number of bytes needed for the next step."""
+        """Return how many bytes the next step needs."""
         if len(self._bytes) < 2 or self._bytes[1] != _VERSION:
             return 2
         if len(self._bytes) < 5 or not self._has_right_length():

@@ -18,20 +18,20 @@ _CHUNK = 4096
 
 
 class PortError(MinirospyError):
-    """Raised if a connection cannot be opened, or was lost. The message is one line with the reason."""
+    """Raised if a connection cannot be opened or was lost. The message is one line with the reason."""
 
 
 class Port(Protocol):
     """A connection to a device."""
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the connection is lost."""
+        """Return the bytes received, or b"" after a short wait. Raise PortError if the connection is lost."""
 
     def write(self, data: bytes) -> None:
         """Write all bytes. Raise PortError if the connection is lost."""
 
     def flush_input(self) -> None:
-        """Discard the received bytes that have not been read."""
+        """Discard received bytes that have not been read."""
 
     def close(self) -> None:
         """Close the connection."""
@@ -39,7 +39,7 @@ class Port(Protocol):
 
 @runtime_checkable
 class File(Protocol):
-    """A file-like object from the user's program. ``read`` blocks until it has ``count`` bytes. ``flushInput`` is optional."""
+    """A file-like object from the program. ``read`` blocks until it has ``count`` bytes; ``flushInput`` is optional."""
 
     def read(self, count: int, /) -> bytes:
         """Return bytes from the device."""
@@ -48,11 +48,11 @@ class File(Protocol):
         """Write bytes to the device."""
 
     def inWaiting(self) -> int:
-        """Return the number of bytes that have arrived."""
+        """Return the number of bytes received and not yet read."""
 
 
 class SerialPort:
-    """A serial port. Raise PortError if the port cannot be opened, ImportError if pyserial is not installed."""
+    """A serial port. Raise PortError if it cannot be opened, ImportError if pyserial is not installed."""
 
     def __init__(self, path: str, baud: int, *, uses_handshake: bool = False) -> None:
         try:
@@ -76,7 +76,7 @@ class SerialPort:
             raise PortError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the connection is lost."""
+        """Return the bytes received, or b"" after a short wait. Raise PortError if the connection is lost."""
         try:
             first = bytes(self._serial.read(1))
             waiting = self._serial.in_waiting if first else 0
@@ -92,7 +92,7 @@ class SerialPort:
             raise PortError(f"Serial Port write failure: {error}") from error
 
     def flush_input(self) -> None:
-        """Discard the received bytes that have not been read."""
+        """Discard received bytes that have not been read."""
         try:
             self._serial.reset_input_buffer()
         except Exception as error:
@@ -111,7 +111,7 @@ class SocketPort:
         connection.settimeout(_WRITE_SECONDS)
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the connection is closed."""
+        """Return the bytes received, or b"" after a short wait. Raise PortError if the connection is closed."""
         try:
             ready, _, _ = select.select([self._socket], [], [], _LOOK_SECONDS)
             if not ready:
@@ -131,7 +131,7 @@ class SocketPort:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Do nothing, because a new TCP connection has no stray bytes."""
+        """Do nothing: a new TCP connection has no stray bytes."""
 
     def close(self) -> None:
         """Close the connection."""
@@ -139,13 +139,13 @@ class SocketPort:
 
 
 class FilePort:
-    """A port for an object from the user's program that has ``read(count)``, ``write`` and ``inWaiting``."""
+    """A port that uses an object from the program with ``read(count)``, ``write`` and ``inWaiting``."""
 
     def __init__(self, file: File) -> None:
         self._file = file
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the object raises an exception."""
+        """Return the bytes received, or b"" after a short wait. Raise PortError if the object raises an exception."""
         try:
             waiting = int(self._file.inWaiting())
             if waiting < 1:
@@ -163,10 +163,10 @@ class FilePort:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Discard the received bytes that have not been read."""
+        """Discard received bytes that have not been read."""
         flush = getattr(self._file, "flushInput", None)
         if flush is not None:
             flush()
 
     def close(self) -> None:
-        """Leave the object open: it belongs to the program."""
+        """Do nothing: the object belongs to the program."""

@@ -22,7 +22,7 @@ _OTHER = "/rosserial_embeddedlinux"
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status, 1 if it cannot start."""
+    """Run the node until it shuts down; return 1 if it cannot start, else 0."""
     try:
         rospy.init_node("serial_node")
         rospy.loginfo("ROS Serial Python Node")
@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
 
 
 def _param(name: str, default: object) -> object:
-    """Return a private parameter; its default is rosserial_embeddedlinux's parameter of that name, for older launch files."""
+    """Return a private parameter, by default the one of rosserial_embeddedlinux, which older launch files set."""
     return rospy.get_param(f"~{name}", rospy.get_param(f"{_OTHER}/{name}", default))
 
 
@@ -80,7 +80,7 @@ def _follow(port: str, baud: int, uses_handshake: bool) -> None:
 
 
 def message_info_service() -> int:
-    """Run message_info_service, which only logs that it is no longer needed; return the exit status."""
+    """Run message_info_service, which only logs that it is obsolete; return the exit status."""
     try:
         rospy.init_node("message_info_service")
         rospy.logwarn(

@@ -23,7 +23,7 @@ class RosSerialServer:
         self.fork_server = fork_server
 
     def listen(self) -> None:
-        """Serve devices until the node is shut down. Raise OSError if the port cannot be opened."""
+        """Serve devices until the node shuts down. Raise OSError if the port cannot be opened."""
         with socket.create_server(("", self.tcp_portnum), backlog=8) as server:
             server.settimeout(_LOOK_SECONDS)
             rospy.loginfo("Waiting for socket connection")

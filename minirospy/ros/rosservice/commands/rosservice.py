@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _service_parser(verb: str, description: str, missing: str = "service must be specified") -> Parser:
-    """Return the parser for a verb that needs a service name."""
+    """Return the parser for a verb that takes a service name."""
     parser = Parser(
         f"rosservice {verb}",
         description,
@@ -60,7 +60,7 @@ def _info(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
         name = graph.resolve(service)
         offer = services.service_offer(graph, name)
-        # Print the master's information before calling the node, which may have exited.
+        # Print the master's information before calling the node, which may be gone.
         print(f"Node: {offer.node}\nURI: {offer.uri}", flush=True)
         type_ = services.service_type(graph, name)
     print(f"Type: {type_}\nArgs: {' '.join(services.service_arguments(type_))}")
@@ -173,7 +173,7 @@ def _call(
 
 
 def _as_ros_shows(error: ServiceException, service: str) -> str:
-    """Return ROS's message for an error. ROS prints an error from the service's handler as bytes."""
+    """Return ROS's message for an error; ROS formats an error from a service handler as bytes."""
     cause = error.__cause__
     if isinstance(cause, CallFailed):
         return f"service [{service}] responded with an error: {cause.text!r}"
@@ -181,7 +181,7 @@ def _as_ros_shows(error: ServiceException, service: str) -> str:
 
 
 def _incorrect_type(type_: str, error: MessageException) -> WordedError:
-    """Return ROS's error message for a request whose values do not match the type. The message ends with the definition."""
+    """Return ROS's error message for request values that do not match the type, ending with the type's definition."""
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages
 
@@ -197,7 +197,7 @@ def _warn_waiting(graph: Graph, service: str) -> None:
 
 
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
-    """Yield the requests: one built from the command line, or one for each document on stdin.
+    """Yield the requests: one from the command line, or one per document on stdin.
 
     On a terminal, prompt for fields without a value.
     """
@@ -274,7 +274,7 @@ FAMILY = Family(
             {"service": RosText("ERROR: unknown service")},
         ),
         Verb("list", "list active services", _list_parser, _list),
-        # ROS supports this verb, but its help does not list it.
+        # ROS supports this verb but omits it from its help.
         Verb("node", "", _node_parser, _node, {"service": RosText("Unknown service: {name}")}),
         Verb(
             "type",

@@ -78,7 +78,7 @@ class ROSServiceIOException(ROSServiceException):
 def get_service_list(
     node: str | None = None, namespace: str | None = None, include_nodes: bool = False
 ) -> list[Any]:
-    """Return the services' names, optionally only those of one node or in one namespace.
+    """Return the service names, optionally only those of one node or in one namespace.
 
     If ``include_nodes``, return [name, [nodes]] for each service.
     """
@@ -127,7 +127,7 @@ def get_service_args(service_name: str) -> str:
 
 
 def get_service_class_by_name(service_name: str) -> ServiceClass:
-    """Return a running service's class. Raise ROSServiceException if the service does not exist or its type is not installed."""
+    """Return a running service's class. Raise ROSServiceException if the service does not exist or its type is missing."""
     from minirospy.core.idl.load import service_class
 
     with _graph() as graph:
@@ -135,7 +135,7 @@ def get_service_class_by_name(service_name: str) -> ServiceClass:
 
 
 def rosservice_find(service_type: str) -> list[str]:
-    """Return the services that have this type."""
+    """Return the services of this type."""
     with _graph() as graph:
         if service_type:
             return services.find_services_of_type(graph, service_type)
@@ -147,7 +147,7 @@ def rosservice_find(service_type: str) -> list[str]:
 def call_service(
     service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
 ) -> tuple[Message, Any]:
-    """Call a service; return (request, response), with the request built from the values.
+    """Call a service with a request built from the values; return (request, response).
 
     Raise ROSServiceException if the call fails.
     """
@@ -159,7 +159,7 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """Return the connection header of a service's response. Raise ROSServiceIOException if the service does not respond."""
+    """Return the connection header of a service's response. Raise ROSServiceIOException if it does not respond."""
     if not isinstance(service_uri, str):
         raise ROSServiceException(
             f"Unable to communicate with service [{service_name}], address [{service_uri}]"
@@ -174,7 +174,7 @@ def has_service_args(service_name: str, service_class: ServiceClass | None = Non
 
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
-    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
+    """Run the command and, as in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     from minirospy.ros.rosservice.commands.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
@@ -185,7 +185,7 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return a verb's function. Its argument is a command line that starts with the command's name and the verb."""
+    """Return a function that runs a verb, given a command line that starts with the command's name and the verb."""
 
     def call(argv: Sequence[str] = sys.argv) -> None:
         from minirospy.command.called import Raised, call_verb
@@ -221,22 +221,22 @@ def _rosservice_cmd_info(argv: Sequence[str]) -> None:
 
 
 def _rosservice_type(service_name: str) -> None:
-    """Print a service's type; if there is no such service, print an error and exit."""
+    """Print a service's type. If the service does not exist, print an error and exit."""
     _print_or_exit(get_service_type(service_name), f"Unknown service [{service_name}]")
 
 
 def _rosservice_uri(service_name: str) -> None:
-    """Print a service's URI; if there is no such service, print an error and exit."""
+    """Print a service's URI. If the service does not exist, print an error and exit."""
     _print_or_exit(get_service_uri(service_name), f"Unknown service: {service_name}")
 
 
 def _rosservice_node(service_name: str) -> None:
-    """Print the node that provides a service; if there is no such service, print an error and exit."""
+    """Print the node that provides a service. If the service does not exist, print an error and exit."""
     _print_or_exit(get_service_node(service_name), f"Unknown service: {service_name}")
 
 
 def _rosservice_args(service_name: str) -> None:
-    """Print the field names of a service's request. Raise ROSServiceException if there is no such service."""
+    """Print the field names of a service's request. Raise ROSServiceException if the service does not exist."""
     print(get_service_args(service_name))
 
 
@@ -248,13 +248,13 @@ def _print_or_exit(text: str | None, error: str) -> None:
 
 
 def _rosservice_list(namespace: str | None = None, print_nodes: bool = False) -> None:
-    """Print the services below a namespace; if ``print_nodes``, also print the nodes that provide each service."""
+    """Print the services in a namespace and, if ``print_nodes``, the nodes that provide them."""
     for name, nodes in sorted(get_service_list(namespace=namespace, include_nodes=True)):
         print(f"{name} {','.join(nodes)}" if print_nodes else name)
 
 
 def _rosservice_info(service_name: str) -> None:
-    """Print a service's node, URI, type and arguments; if there is no such service, print an error and exit."""
+    """Print a service's node, URI, type and arguments. If the service does not exist, print an error and exit."""
     node = get_service_node(service_name)
     if not node:
         print("ERROR: unknown service", file=sys.stderr)
@@ -274,7 +274,7 @@ def _rosservice_call(
     verbose: bool = False,
     service_class: ServiceClass | None = None,
 ) -> None:
-    """Call a service; print its response or, if ``verbose``, request and response.
+    """Call a service; print the response and, if ``verbose``, the request before it.
 
     Raise ROSServiceException if the call fails.
     """
@@ -285,7 +285,7 @@ def _rosservice_call(
 
 
 def _optparse_service_only(cmd: str, argv: Sequence[str] = sys.argv) -> str:
-    """Return the global name of the only service on a command line.
+    """Return the global name of the single service on a command line.
 
     If there is none or more than one, print the usage and exit.
     """
@@ -299,12 +299,12 @@ def _optparse_service_only(cmd: str, argv: Sequence[str] = sys.argv) -> str:
 
 
 def _resource_name_package(name: str) -> str | None:
-    """Return the package in `pkg/Name`, or None if the name has no package."""
+    """Return the package in `pkg/Name`, or None if there is none."""
     return name.partition("/")[0] if "/" in name else None
 
 
 def _stdin_yaml_arg() -> Iterator[Any]:
-    """Yield each YAML document on stdin; a line with three hyphens, or an empty line, ends a document."""
+    """Yield each YAML document on stdin; a line with three hyphens or an empty line ends a document."""
     lines: list[str] = []
     while True:
         line = sys.stdin.readline()
@@ -323,7 +323,7 @@ def _stdin_yaml_arg() -> Iterator[Any]:
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value from a response (code, status message, value). Raise ROSServiceException if the response is an error."""
+    """Return the value of a response (code, status message, value). Raise ROSServiceException if it is an error."""
     code, text, value = args
     if code != 1:
         raise ROSServiceException(f"remote call failed: {text}")
@@ -331,23 +331,23 @@ def _succeed(args: Sequence[object]) -> object:
 
 
 def _fullusage() -> None:
-    """Print the list of commands, and exit with the status of a usage error."""
+    """Print the list of commands and exit with the status of a usage error."""
     rosservicemain([NAME])
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Resolve a name to a global name. As in ROS, a value of another type yields a name that matches no service."""
+    """Return a name's global name. As in ROS, a non-string becomes a name that matches no service."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the global name to send to the master. Raise TypeError if XML-RPC has no type for the value."""
+    """Return the global name to send to the master. Raise TypeError if XML-RPC does not support the value's type."""
     check_sendable(name)
     return _resolved(graph, name)
 
 
 def _get_master() -> masterapi.Master:
-    """Return a master proxy with rosservice's caller id."""
+    """Return a master proxy that uses rosservice's caller id."""
     return masterapi.Master("/rosservice")
 
 

@@ -24,12 +24,12 @@ __all__ = ["ROSTEST", "ROSUNIT", "rostest", "rosunit"]
 
 
 def rostest(argv: Sequence[str] | None = None) -> int:
-    """Run rostest; return 0 if all tests passed, 1 if a test could not run or reported no results, 2 if a test failed."""
+    """Run rostest; return 0 if all tests passed, 1 if one could not run or reported no results, 2 if one failed."""
     return ROSTEST.main(argv)
 
 
 def rosunit(argv: Sequence[str] | None = None) -> int:
-    """Run rosunit; return 0 if all tests passed, 1 if the file could not run or reported no results, 2 if a test failed."""
+    """Run rosunit; return 0 if all tests passed, 1 if the file could not run or reported no results, 2 if one failed."""
     return ROSUNIT.main(argv)
 
 
@@ -96,7 +96,7 @@ def _rostest(
     from minirospy.ros.rostest.runner.runner import RosTest
 
     base = _base(results_base_dir)
-    # When the nodes exit, delete the boards that test nodes create, such as MINIROSPY_BOARD=$(anon test).
+    # When the nodes exit, delete the boards created by test nodes, such as MINIROSPY_BOARD=$(anon test).
     os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,
@@ -188,7 +188,7 @@ def _rosunit(
 
 
 def _told(own: Result, results: Result, runner: str, output: Path | None) -> int:
-    """Write the results to ``output`` if it is given, and print them; return the exit status."""
+    """If ``output`` is given, write the results there and print them; return the exit status."""
     if output is not None:
         own.write(output)
         failed = [case.name for case in own.test_case_results if case.failures]
@@ -205,7 +205,7 @@ def _base(folder: str | None) -> Path:
 
 
 def _file(what: list[str], packages: Packages) -> Path:
-    """Return the launch file named on the command line.
+    """Return the command line's launch file.
 
     Raise MinirospyError if the file does not exist or the arguments are invalid.
     """
@@ -225,7 +225,7 @@ def _file(what: list[str], packages: Packages) -> Path:
 
 
 def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
-    """Return the package that contains a file, and the package's folder. Raise MinirospyError if no package contains it."""
+    """Return the name and folder of the package that contains a file. Raise MinirospyError if there is none."""
     for folder in file.resolve().parents:
         name = package_name(folder)
         if name:

@@ -26,7 +26,7 @@ __all__ = [
 
 
 def rostestmain() -> None:
-    """Run the command `rostest`, and exit."""
+    """Run the command `rostest` and exit."""
     import sys
 
     from minirospy.ros.rostest.commands.rostest import rostest

@@ -17,7 +17,7 @@ __all__ = ["ROSTestLaunchParent"]
 
 
 class ROSTestLaunchParent(ROSLaunchParent):
-    """Runs a configuration's nodes with a new master on a free port, and runs tests with them.
+    """Starts a new master on a free port, and runs a configuration's nodes and tests with it.
 
     ``reuse_master``: use the master at ROS_MASTER_URI instead; ``clear`` first deletes its parameters. ``port`` has no effect.
     """
@@ -39,7 +39,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open = ExitStack()
 
     def setUp(self) -> None:
-        """Start or connect to the master.
+        """Start the master, or connect to it.
 
         Raise RLException if the master cannot be started, MasterUnreachableError if a reused master does not respond.
         """
@@ -53,7 +53,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self.pm = self.runner.pm
 
     def launch(self) -> tuple[list[str], list[str]]:
-        """Start the nodes; return the names of the started processes and of the nodes that failed to start."""
+        """Start the nodes; return the names of the started processes and of the nodes that failed."""
         assert self.runner
         return self.runner.launch()
 
@@ -71,4 +71,4 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open.close()
 
     def _load_config(self) -> None:
-        """Use the configuration that was passed to the constructor."""
+        """Use the configuration passed to the constructor."""

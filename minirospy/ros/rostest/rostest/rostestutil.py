@@ -42,23 +42,23 @@ _logger = logging.getLogger("rostest")
 
 
 def printlog(msg: str, *args: object) -> None:
-    """Print and log a line, with its ``%s`` replaced by ``args``."""
+    """Print and log a line, with ``args`` in place of its ``%s``."""
     text = msg % args if args else msg
     _logger.info("%s", text)
     print("[ROSTEST]" + text)
 
 
 def printlogerr(msg: str, *args: object) -> None:
-    """Print a line to stderr and log it as an error, with its ``%s`` replaced by ``args``."""
+    """Print a line to stderr and log it as an error, with ``args`` in place of its ``%s``."""
     text = msg % args if args else msg
     _logger.error("%s", text)
     print("[ROSTEST]" + text, file=sys.stderr)
 
 
 def printRostestSummary(result: unittest.TestResult, rostest_results: Result) -> None:
-    """Print a run's summary: the runner's result, and the results that the test nodes reported."""
+    """Print a summary of the runner's result and of the results reported by the test nodes."""
     print_runner_summary(result, rostest_results, "ROSTEST")
 
 
 def getErrors() -> None:
-    """Return None; use `rostest.runner.getResults()` to get the errors."""
+    """Return None: the errors are in `rostest.runner.getResults()`."""

@@ -42,7 +42,7 @@ _DEFAULT_TEST_PORT = 22422
 
 
 class _Run:
-    """The state of this process's test run."""
+    """State of this process's test run."""
 
     def __init__(self) -> None:
         self.results = Result("rostest")
@@ -55,7 +55,7 @@ _run = _Run()
 
 
 class RosTestCase(unittest.TestCase):
-    """Declares the attributes of the classes that :func:`createUnitTest` returns. Programs may also define such classes."""
+    """Declares the attributes of the classes returned by :func:`createUnitTest`. Programs may define such classes too."""
 
     config: ROSLaunchConfig
     test_file: str
@@ -68,7 +68,7 @@ TestMethod: TypeAlias = Callable[[RosTestCase], None]
 
 
 def getResults() -> Result:
-    """Return the combined results that the tests have written so far."""
+    """Return the combined results of the tests so far."""
     return _run.results
 
 
@@ -78,17 +78,17 @@ def getConfig() -> ROSLaunchConfig | None:
 
 
 def getRostestParents() -> list[ROSTestLaunchParent]:
-    """Return the launches of all tests, so that each one can be torn down at the end."""
+    """Return the launches of all tests, to be torn down at the end."""
     return _run.parents
 
 
 def _accumulateResults(results: Result) -> None:
-    """Add a test's results to those of :func:`getResults`."""
+    """Add a test's results to those that :func:`getResults` returns."""
     _run.results.accumulate(results)
 
 
 def _addRostestParent(runner: ROSTestLaunchParent) -> None:
-    """Add a launch to those of :func:`getRostestParents`, and make its configuration that of :func:`getConfig`."""
+    """Add a launch to :func:`getRostestParents`, and make :func:`getConfig` return its configuration."""
     _run.parents.append(runner)
     _run.config = runner.config
 
@@ -99,7 +99,7 @@ def setTextMode(val: bool) -> None:
 
 
 def failRunner(testName: str, message: str) -> TestMethod:
-    """Return a test method that fails with a given message."""
+    """Return a test method that fails with this message."""
 
     def fn(self: RosTestCase) -> None:
         print(message, file=sys.stderr)
@@ -119,7 +119,7 @@ def failDuplicateRunner(testName: str) -> TestMethod:
 
 
 def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None) -> TestMethod:
-    """Return a test method that launches the nodes and runs a ``<test>``. It retries the test as often as the tag allows.
+    """Return a test method that launches the nodes and runs a ``<test>``, retrying as often as the tag allows.
 
     The method reads the results from the test's XML file, in the package's folder below ``results_base_dir``.
     """
@@ -172,7 +172,7 @@ def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None
 
 
 def setUp(self: RosTestCase) -> None:
-    """Prepare to launch a test; createUnitTest() uses this function as its class's setUp method."""
+    """Prepare a test's launch. The classes from createUnitTest() use this function as their setUp method."""
     self.test_parent = ROSTestLaunchParent(
         self.config, [self.test_file], reuse_master=self.reuse_master, clear=self.clear
     )
@@ -183,7 +183,7 @@ def setUp(self: RosTestCase) -> None:
 
 
 def tearDown(self: RosTestCase) -> None:
-    """Terminate a test's launch; createUnitTest() uses this function as its class's tearDown method."""
+    """Terminate a test's launch. The classes from createUnitTest() use this function as their tearDown method."""
     printlog("tearDown[%s]", self.test_file)
     if self.test_parent:
         self.test_parent.tearDown()
@@ -197,7 +197,7 @@ def createUnitTest(
     clear: bool = False,
     results_base_dir: str | None = None,
 ) -> type[unittest.TestCase]:
-    """Return a TestCase class with a launch file's tests. Raise RLException if the file cannot be read."""
+    """Return a TestCase class with a launch file's tests. Raise RLException if the file is unreadable."""
     config = load_config_default([test_file], None)
     methods: dict[str, TestMethod] = {}
     for test in config.tests:

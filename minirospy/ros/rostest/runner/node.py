@@ -42,7 +42,7 @@ def run(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Call rosrun; an old name of that function."""
+    """Call rosrun, under its old name."""
     rosrun(package, test_name, test, sysargs)
 
 
@@ -59,7 +59,7 @@ def unitrun(
 
 
 def get_master() -> MasterProxy:
-    """Return a proxy for the master that the environment specifies."""
+    """Return a proxy for the environment's master."""
     return MasterProxy(Environment.read(host="localhost").master_uri, _CALLER_ID)
 
 

@@ -25,19 +25,19 @@ _WAIT_SECONDS = 20.0
 _POLL_SECONDS = 0.1
 _UNSET = object()
 
-_Item: TypeAlias = dict[str, Any]  # an item in a list parameter: a name, and the conditions for that name
+_Item: TypeAlias = dict[str, Any]  # an item of a list parameter: a name and its conditions
 
 
 def main(name: str) -> None:
-    """Run one of the test nodes, as the main function of its program."""
+    """Run a test node, as its program's main function."""
     test = _TESTS[name]
-    # In ROS, the class is defined in the program itself, so the results contain this module name.
+    # ROS defines the class in the program itself, so the results contain this module name.
     test.__module__ = "__main__"
     rosrun("rostest", name, test)
 
 
 class _NodeTest(unittest.TestCase):
-    """The base class for the tests: a node and its private parameters."""
+    """Base class of the tests: a node with private parameters."""
 
     node: str
 
@@ -50,7 +50,7 @@ class _NodeTest(unittest.TestCase):
             self.fail(text)
 
     def param(self, name: str, default: object = _UNSET) -> Any:
-        """Return a private parameter; fail the test if it has neither a value nor a default."""
+        """Return a private parameter; fail the test if it is not set and has no default."""
         value = rospy.get_param(f"~{name}", None)
         if value is None and default is _UNSET:
             self.fail(
@@ -59,14 +59,14 @@ class _NodeTest(unittest.TestCase):
         return default if value is None else value
 
     def seconds(self, name: str, default: object = _UNSET) -> float:
-        """Return a private parameter that is a time in seconds."""
+        """Return a private parameter in seconds."""
         value = self.param(name, default)
         if not isinstance(value, int | float) or isinstance(value, bool) or value < 0:
             self.fail(f"bad parameter ({name}): [{value}] is not a number of seconds")
         return float(value)
 
     def listed(self, name: str) -> list[_Item]:
-        """Return a private parameter that is a list of dictionaries, each with a name."""
+        """Return a private parameter that is a list of dictionaries with names."""
         value = self.param(name, [])
         if not isinstance(value, list) or not all(
             isinstance(each, dict) and each.get("name") for each in value
@@ -75,7 +75,7 @@ class _NodeTest(unittest.TestCase):
         return [{**each, "name": rospy.resolve_name(str(each["name"]))} for each in value]
 
     def limits(self, name: str) -> list[tuple[str, float, bool, _Item]]:
-        """Return (name, timeout, negative, item) for each item in a list parameter, shortest timeout first."""
+        """Return (name, timeout, negative, item) for each item of a list parameter, shortest timeout first."""
         found = [
             (each["name"], float(each.get("timeout", _WAIT_SECONDS)), bool(each.get("negative")), each)
             for each in self.listed(name)
@@ -151,7 +151,7 @@ class PublishTest(_NodeTest):
 
 
 class _GraphTest(_NodeTest):
-    """Conditions that are checked by polling the master."""
+    """Checks conditions by polling the master."""
 
     def setUp(self) -> None:
         super().setUp()

@@ -36,7 +36,7 @@ _CLASS = "rostest.runner.RosTest"
 
 @dataclass
 class RosTest:
-    """Runs a launch file's tests. ``own`` records whether each test could run, ``results`` the cases that the tests reported.
+    """Runs a launch file's tests. ``own`` holds whether each test could run, ``results`` the cases reported by the tests.
 
     ``text``: print everything and write no XML files. ``reuse_master``: use the running master instead of starting one;
     ``clear`` deletes all of its parameters. ``results_dir``: folder for the XML files.
@@ -55,7 +55,7 @@ class RosTest:
     is_interrupted: bool = False
 
     def run(self) -> None:
-        """Run all tests in sequence, sorted by name. A signal stops the run."""
+        """Run all tests in sequence, sorted by name. Stop on a signal."""
         nodes = {node.name for node in self.spec.nodes}
         by_name: dict[str, list[TestSpec]] = {}
         for test in self.spec.tests:
@@ -98,7 +98,7 @@ class RosTest:
                 return
 
     def _why_not(self, test: TestSpec) -> str:
-        """Return the reason why a test cannot run, or an empty string if it can run."""
+        """Return why a test cannot run, or an empty string if it can."""
         node = f"{test.node.package}/{test.node.type}"
         try:
             self.packages.find_executable(test.node.package, test.node.type)
@@ -112,7 +112,7 @@ class RosTest:
         return ""
 
     def _try(self, test: TestSpec, case: TestCaseResult) -> None:
-        """Run a test once; record in ``case`` any errors that are not in the test's own results."""
+        """Run a test once; record errors missing from the test's own results in ``case``."""
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()
@@ -149,14 +149,14 @@ class RosTest:
             case.add_failure(_failure(text + self._last_lines(test)))
 
     def _launch(self, test: TestSpec, environment: Environment, case: TestCaseResult) -> int:
-        """Run the nodes, and the test until it exits or its time limit is reached."""
+        """Run the nodes and the test until the test exits or exceeds its time limit."""
         words = [test.node.args, shlex.quote(f"{XML_OUTPUT_FLAG}{self._results_file(test)}")]
         if self.text:
             words.append("--text")
         node = replace(
             test.node,
             args=" ".join(filter(None, words)),
-            # The whole launch stops when the test exits.
+            # stop the whole launch when the test exits
             required=True,
             output="screen" if self.text else "log",
         )
@@ -180,7 +180,7 @@ class RosTest:
 
     @property
     def run_id(self) -> str:
-        """Return the name of the folder for the nodes' log files."""
+        """Return the run id, which names the folder for the nodes' log files."""
         return f"rostest-{os.getpid()}"
 
     def _results_file(self, test: TestSpec) -> Path:
@@ -188,7 +188,7 @@ class RosTest:
         return Path(xml_results_file(self.package, test.test_name, False, place))
 
     def _last_lines(self, test: TestSpec) -> str:
-        """Return the last lines that a test printed."""
+        """Return the last lines of a test's output."""
         stem = test.node.name.lstrip("/").replace("/", "-")
         folder = self.environment.log_dir / self.run_id
         files = sorted(folder.glob(f"{stem}-*-stdout.log"), key=os.path.getmtime)
@@ -207,7 +207,7 @@ class RosTest:
 def master_of_tests(
     environment: Environment, run_id: str, *, reuse: bool = False, clear: bool = False
 ) -> Iterator[Environment]:
-    """Start a master with this run_id on a free port; yield its environment. Stop the master after the block.
+    """Start a master with this run_id on a free port and yield its environment; stop the master after the block.
 
     ``reuse``: use the master that the environment specifies; ``clear`` deletes its parameters first.
     Raise MasterUnreachableError if that master does not respond.

@@ -278,7 +278,7 @@ def _echo(
         _warn_of_type_left_behind(graph, field.topic)
 
     def report(error: Exception) -> None:
-        """Print ROS's message and minirospy's message for an index that exceeds an array."""
+        """Print ROS's and minirospy's messages for an index beyond the end of an array."""
         print(f"{error.__cause__}: /{field.path}\nrostopic: {error}", file=sys.stderr)
 
     printed = 0
@@ -302,7 +302,7 @@ def _echo(
 
 
 def _warn_of_type_left_behind(graph: Graph, topic: str) -> None:
-    """Warn if nothing publishes a topic. Its type may come from a publisher with a wrong type, which has left."""
+    """Warn if nothing publishes a topic: its registered type may come from a publisher that has left."""
     if topic in graph.state().publishers:
         return
     type_ = graph.master.get_topic_types().get(topic)
@@ -312,7 +312,7 @@ def _warn_of_type_left_behind(graph: Graph, topic: str) -> None:
     )
 
 
-# --- arguments that several verbs take
+# --- arguments common to several verbs
 
 
 def _add_topic(parser: Parser) -> None:

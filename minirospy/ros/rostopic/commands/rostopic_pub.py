@@ -43,10 +43,10 @@ _CLOCK_SECONDS = 5.0
 
 
 class _PubParser(Parser):
-    """A parser that accepts negative numbers as values, despite the option `-1`."""
+    """A parser that accepts negative numbers as values although `-1` is an option."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Parse the arguments to a dict keyed by name. Accept negative numbers as values, and -1 as a rate."""
+        """Parse the arguments to a dict keyed by name, accepting negative numbers as values and -1 as a rate."""
         options = super().parse(
             [
                 _SHIELD + word
@@ -104,7 +104,7 @@ def _pub_parser() -> Parser:
     )
     add("--use-rostime", action="store_true", help="use rostime for time stamps, else walltime is used")
 
-    # Before Noetic, the option -s was named -K.
+    # Before Noetic, the option -s was called -K.
     parser.own_options().add_argument("-K", dest="substitute_keywords", action="store_true", help="as -s")
     return parser
 
@@ -159,8 +159,8 @@ class _Publishing(NamedTuple):
 
 
 def _publish(options: _Publishing, arguments: Arguments | None) -> None:
-    """Publish messages. ``arguments`` are the remapping arguments on the command line."""
-    # Imported here, because the other verbs do not need message classes.
+    """Publish messages. ``arguments`` holds the command line's remapping arguments."""
+    # imported here, because other verbs do not need message classes
     from minirospy.introspect.echo import fill_message
     from minirospy.introspect.publishing import publish_all, values_to_publish
 
@@ -168,7 +168,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
-        # Parse the values before starting the node, so that it reports a typo immediately.
+        # Parse the values before starting the node, to report typos immediately.
         values = _first_values(all_values, options)
         message = _filled(cls, values)
         state = graph.state()
@@ -179,7 +179,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
             raise UsageError(f"topic [{topic}]: {why}")
         else:
             warn_no_subscribers(topic, state.subscribers.keys() - {"/rosout"})
-    # Latch a single message for late subscribers; latch a stream of messages only on request.
+    # Latch a single message for late subscribers, but a stream of messages only on request.
     from_documents = bool(not options.args and (cls.__slots__ or options.file))
     lasting = options.once or options.latch or (options.rate is None and not from_documents)
     with tool_node("rostopic", arguments, ros_time=options.use_rostime) as node:
@@ -196,7 +196,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
             return
         messages: Iterable[Message] = itertools.repeat(message)
         if from_documents:
-            # Wait for subscribers to connect, because otherwise the first messages from a file would be lost.
+            # Wait for subscribers to connect: otherwise the first messages from a file would be lost.
             seconds = REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
             publisher.wait_for_subscriber(node.wait, seconds)
             messages = itertools.chain([message], map(filled, all_values))
@@ -239,7 +239,7 @@ def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> l
 
 
 def _ros_argument_error(text: str) -> str:
-    """Return ROS's error message for an argument that is not valid YAML. It includes PyYAML's own error."""
+    """Return ROS's error message for an argument that is not valid YAML, including PyYAML's error."""
     import yaml
 
     try:
@@ -257,7 +257,7 @@ def _filled(cls: type[Message], values: list[object]) -> Message:
         return fill_message(cls, values)
     except MessageException as error:
         if isinstance(error.__cause__, SerializationError):
-            raise  # ROS only detects these errors when it publishes, and does not print them
+            raise  # ROS detects these errors only when publishing, and does not print them
         text = f"ERROR: {error.__cause__ or error}\n\nArgs are: [{get_printable_message_args(cls())}]"
         raise WordedError(error, RosText(text)) from error
 

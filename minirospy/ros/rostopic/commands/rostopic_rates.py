@@ -117,7 +117,7 @@ def _delay_parser() -> Parser:
         "rostopic delay [options] /topic",
         ros_argparse="rostopic",
     )
-    # This is ROS's spelling.
+    # ROS's misspelling
     parser.add_argument("topic", help="topic name to be calcurated the delay", completer="topics")
     parser.add_argument(
         "-w",
@@ -164,7 +164,7 @@ def _measure(
 
 
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the global names of topics, given with or without a field; warn about topics without a publisher."""
+    """Return the topics' global names, given with or without a field; warn about topics without a publisher."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):

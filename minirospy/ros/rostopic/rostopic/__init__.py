@@ -122,12 +122,12 @@ __all__ = [
 
 NAME = "rostopic"
 _Topic = tuple[str, str, list[str]]
-# (topic, type, nodes), where the nodes publish or subscribe to the topic
+# (topic, type, nodes that publish or subscribe to the topic)
 _TopicRow = tuple[str, str, list[str]]
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """A ROSTopicIOException that is also a socket error, because programs expect one from ROS's get_topic_list."""
+    """A ROSTopicIOException and also a socket error, which programs expect from ROS's get_topic_list."""
 
 
 def get_topic_type(
@@ -155,7 +155,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Like get_topic_type(), but return the message class instead of the type name.
+    """Like get_topic_type(), but return the message class in place of the type name.
 
     Raise ROSTopicException if the class is not installed.
     """
@@ -179,7 +179,7 @@ def get_topic_list(master: masterapi.Master | None = None) -> tuple[list[_TopicR
 
 
 def find_by_type(topic_type: str) -> list[str]:
-    """Return the topics that have this type."""
+    """Return the topics of this type."""
     with _graph() as graph:
         return topics.find_topics_of_type(graph, topic_type)
 
@@ -197,7 +197,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat the step as the name of a field, one that no message has.
+        # Treat the step as a field name that no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def report(error: NotFoundError | IndexError) -> None:
@@ -237,7 +237,7 @@ def _slice_fault(field: str) -> str:
 
 
 def get_info_text(topic: str) -> str:
-    """Return a topic's type, publishers and subscribers in the format of `rostopic info`.
+    """Return a topic's type, publishers and subscribers, formatted like `rostopic info`.
 
     Raise ROSTopicException if the topic does not exist.
     """
@@ -253,7 +253,7 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """Return a node's URI, or `unknown address` with the node's name if the node is unknown.
+    """Return a node's URI, or `unknown address` with its name if the node is unknown.
 
     Raise ROSTopicIOException if the master does not respond.
     """
@@ -268,7 +268,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
 def create_publisher(
     topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
 ) -> tuple[Publisher[Message], type[Message]]:
-    """Return (publisher, message class) for a topic and a type name; call init_node if this process is not a node yet.
+    """Return (publisher, message class) for a topic and type name. Call init_node if this process is not a node yet.
 
     Raise ROSTopicException if the type is not installed.
     """
@@ -290,7 +290,7 @@ def create_publisher(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command. As in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
+    """Run the command and, as in ROS, exit the program if it fails. ``argv`` starts with the command's name."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
@@ -298,7 +298,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return a verb's function. Its argument is a command line that starts with the command's name and the verb."""
+    """Return a function that runs a verb, given a command line that starts with the command's name and the verb."""
 
     def call(argv: Sequence[str] = sys.argv) -> None:
         from minirospy.command.called import Raised, call_verb
@@ -321,7 +321,7 @@ _rostopic_cmd_type = _verb("type")
 
 
 def _fullusage() -> NoReturn:
-    """Print the list of commands, and exit with the status of a usage error."""
+    """Print the list of commands and exit with the status of a usage error."""
     _command([])
     raise AssertionError("a command without arguments is a usage error")
 
@@ -329,7 +329,7 @@ def _fullusage() -> NoReturn:
 def _rostopic_list_group_by_host(
     master: masterapi.Master, pubs: Sequence[_Topic], subs: Sequence[_Topic]
 ) -> tuple[dict[str, list[_Topic]], dict[str, list[_Topic]]]:
-    """Return two dicts keyed by host, of publishers and of subscribers, with rows (topic, type, nodes)."""
+    """Return the publishers and the subscribers as dicts from host to rows (topic, type, nodes)."""
     hosts: dict[str, str] = {}
 
     def grouped(rows: Sequence[_Topic]) -> dict[str, list[_Topic]]:
@@ -351,7 +351,7 @@ def _check_master() -> None:
 
 
 def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
-    """Return [topic, type] for every topic that is registered with the master."""
+    """Return [topic, type] for every topic registered with the master."""
     return master.getTopicTypes()
 
 
@@ -392,7 +392,7 @@ def _rostopic_type(topic: str) -> None:
 def _rostopic_echo(
     topic: str, callback_echo: CallbackEcho, bag_file: str | None = None, echo_all_topics: bool = False
 ) -> None:
-    """Pass a topic's messages, or one of their fields, to ``callback_echo`` until its ``done`` is True."""
+    """Pass a topic's messages or one of their fields to ``callback_echo`` until its ``done`` is True."""
     import rospy
 
     if bag_file:
@@ -423,7 +423,7 @@ def _rostopic_echo_bag(callback_echo: CallbackEcho, bag_file: str) -> None:
 
 
 def _rostopic_list_bag(bag_file: str, topic: str | None = None) -> None:
-    """Print a bag's topics; if ``topic`` is given, print the number and times of the messages on it and in its namespace.
+    """Print a bag's topics or, if ``topic`` is given, the count and times of the messages on it and in its namespace.
 
     Raise ROSTopicException if the file does not exist.
     """
@@ -465,7 +465,7 @@ def _rostopic_hz(
     use_wtime: bool = False,
     tcp_nodelay: bool = False,
 ) -> None:
-    """Print the rates of topics every second until shutdown, after waiting for each topic to be published."""
+    """Wait until each topic is published, then print the rates every second until shutdown."""
     import rospy
 
     from minirospy.ros.rostopic.rostopic.rates import ROSTopicHz
@@ -483,7 +483,7 @@ def _rostopic_hz(
 
 
 def _rostopic_bw(topic: str, window_size: int = -1) -> None:
-    """Print a topic's bandwidth every second until shutdown, after waiting for the topic to be published."""
+    """Wait until a topic is published, then print its bandwidth every second until shutdown."""
     import rospy
 
     from minirospy.ros.rostopic.rostopic.rates import ROSTopicBandwidth
@@ -500,7 +500,7 @@ def _rostopic_bw(topic: str, window_size: int = -1) -> None:
 
 
 def _rostopic_delay(topic: str, window_size: int = -1, tcp_nodelay: bool = False) -> None:
-    """Print the delay of a topic's stamped messages every second until shutdown, after waiting for the topic to be published."""
+    """Wait until a topic is published, then print the delay of its stamped messages every second until shutdown."""
     import rospy
 
     from minirospy.ros.rostopic.rostopic.rates import ROSTopicDelay
@@ -535,7 +535,7 @@ def _sub_rostopic_list(
     verbose: bool,
     indent: str = "",
 ) -> None:
-    """Print rows of (topic, type, nodes) like `rostopic list`, indented by ``indent``."""
+    """Print (topic, type, nodes) rows like `rostopic list`, indented by ``indent``."""
     if not verbose:
         chosen = [
             *([] if subscribers_only and not publishers_only else pubs),
@@ -563,12 +563,12 @@ def _print_counts(rows: Sequence[_Topic], word: str, indent: str) -> None:
 
 
 def _resource_name_package(name: str) -> str | None:
-    """Return the package in `pkg/Name`, or None if the name has no package."""
+    """Return the package in `pkg/Name`, or None if there is none."""
     return name.partition("/")[0] if "/" in name else None
 
 
 def _optparse_topic_only(cmd: str, argv: Sequence[str]) -> str:
-    """Return the global name of the only topic on a command line. If there is none or more than one, print the usage and exit."""
+    """Return the global name of the single topic on a command line; otherwise print the usage and exit."""
     from optparse import OptionParser
 
     parser = OptionParser(usage=f"usage: %prog {cmd} /topic", prog=NAME)
@@ -579,7 +579,7 @@ def _optparse_topic_only(cmd: str, argv: Sequence[str]) -> str:
 
 
 def _is_shutdown() -> bool:
-    """Return whether this process is a node that is shutting down; return False if the program has not imported rospy."""
+    """Return whether this process is a node that is shutting down; False if the program has not imported rospy."""
     rospy: Any = sys.modules.get("rospy")
     return rospy is not None and bool(rospy.is_shutdown())
 

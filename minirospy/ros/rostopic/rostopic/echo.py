@@ -63,7 +63,7 @@ class CallbackEcho:
     def callback(
         self, data: Message, callback_args: Mapping[str, object], current_time: Time | None = None
     ) -> None:
-        """Print a message. ``callback_args`` contains its ``topic`` and, if known, its ``type_information``."""
+        """Print a message. ``callback_args`` holds its ``topic`` and, if known, its ``type_information``."""
         if self.done or not self._wanted(data, str(callback_args["topic"])):
             return
         value = self.msg_eval(data) if self.msg_eval is not None else data
@@ -121,5 +121,5 @@ def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
 
 
 def create_value_transform(echo_nostr: bool, echo_noarr: bool) -> ValueTransform:
-    """Return a function that receives (value, type), and replaces strings or arrays with a placeholder."""
+    """Return a function that receives (value, type) and replaces strings or arrays with a placeholder."""
     return lambda value, type_: elided(value, str(type_ or ""), not echo_nostr, not echo_noarr)

@@ -53,7 +53,7 @@ class ROSTopicHz:
                 self._window(topic).add(now)
 
     def get_hz(self, topic: str | None = None) -> Statistics | None:
-        """Return (rate, minimum interval, maximum interval, standard deviation, messages).
+        """Return (rate, minimum interval, maximum interval, standard deviation, number of messages).
 
         Return None if no new message has arrived.
         """
@@ -61,7 +61,7 @@ class ROSTopicHz:
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
     def print_hz(self, topics: Sequence[str | None] = (None,)) -> None:
-        """Print the rates: two lines for a single topic, or a table for several topics."""
+        """Print the rates: two lines for one topic, a table for several."""
         print(rate_text({str(topic): self._report(topic) for topic in topics}))
 
     def _report(self, topic: str | None) -> Spread | None:
@@ -112,7 +112,7 @@ class ROSTopicDelay:
         self._window = DelayWindow(self.window_size)
 
     def callback_delay(self, msg: Stamped) -> None:
-        """Measure the delay of a message; log an error if it has no header."""
+        """Measure a message's delay; log an error if it has no header."""
         if not msg._has_header:
             import rospy
 
@@ -123,7 +123,7 @@ class ROSTopicDelay:
             self._window.add(now, msg.header.stamp.to_sec())
 
     def get_delay(self) -> Statistics | None:
-        """Return (mean, minimum, maximum, standard deviation, messages), or None if no new message has arrived."""
+        """Return (mean, minimum, maximum, standard deviation, number of messages), or None if there is no new message."""
         report = self._report()
         return report and (report.mean, report.min, report.max, report.std_dev, report.window)
 
@@ -139,7 +139,7 @@ class ROSTopicDelay:
 
 
 def _now() -> float:
-    # A subscriber has imported rospy by the time its first message arrives.
+    # By the time of its first message, a subscriber has imported rospy.
     from minirospy.client import get_time
 
     return get_time()

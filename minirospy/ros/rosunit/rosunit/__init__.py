@@ -34,7 +34,7 @@ __version__ = "1.0.0"
 
 
 def rosunitmain() -> None:
-    """Run the command `rosunit`, and exit."""
+    """Run the command `rosunit` and exit."""
     import sys
 
     from minirospy.ros.rostest.commands.rostest import rosunit

@@ -11,7 +11,7 @@ __all__ = [
     "print_unittest_summary",
 ]
 
-BARE_TIME_LIMIT = 60.0  # time limit in seconds for a test that is a separate program
+BARE_TIME_LIMIT = 60.0  # time limit in seconds for a test in a separate program
 TIMEOUT_SIGINT = 15.0  # seconds to wait after SIGINT before sending SIGTERM
 TIMEOUT_SIGTERM = 2.0  # seconds to wait after SIGTERM before sending SIGKILL
 
@@ -19,4 +19,4 @@ TIMEOUT_SIGTERM = 2.0  # seconds to wait after SIGTERM before sending SIGKILL
 class TestTimeoutException(Exception):
     """Raised if a test exceeds its time limit."""
 
-    __test__ = False  # prevents pytest from collecting this class as a test
+    __test__ = False  # prevents pytest from collecting this class

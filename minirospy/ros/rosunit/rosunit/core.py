@@ -42,7 +42,7 @@ def printerrlog(msg: str, *args: object) -> None:
 
 
 def makedirs_with_parent_perms(p: str) -> None:
-    """Create a folder and its parents with the owner and the permissions of the nearest existing parent."""
+    """Create a folder and its parents with the owner and permissions of the nearest existing parent."""
     path = os.path.abspath(p)
     parent = os.path.dirname(path)
     if os.path.exists(path) or parent == path:

@@ -41,7 +41,7 @@ python2 = False
 
 
 def invalid_char_replacer(m: re.Match[str]) -> str:
-    """Return the replacement text for a character that XML does not allow."""
+    """Return the replacement for a character that XML does not allow."""
     return f"&#x{ord(m.group(0)):04X};"
 
 

@@ -29,7 +29,7 @@ _running: list[Any] = []
 
 
 def start_coverage(packages: Sequence[str]) -> None:
-    """Start measuring test coverage, adding to earlier results. If the package coverage is missing, print a warning."""
+    """Start measuring coverage, adding to earlier results. Print a warning if the package coverage is missing."""
     try:
         import coverage  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
@@ -42,7 +42,7 @@ def start_coverage(packages: Sequence[str]) -> None:
 
 
 def stop_coverage(packages: Sequence[str], html: str | None = None) -> None:
-    """Stop measuring coverage and print that of ``packages``. With ``html``, also write a report to that folder."""
+    """Stop measuring coverage and print that of ``packages``. If ``html`` is given, also write a report to that folder."""
     if not _running:
         return
     measured = _running.pop()

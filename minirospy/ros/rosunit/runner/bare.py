@@ -29,7 +29,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Make Ctrl-C set the event; an exception could leave a new process running."""
+    """Make Ctrl-C set the yielded event, because an exception could leave a new process running."""
     noted = SignalSafeEvent()
     before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:
@@ -49,7 +49,7 @@ def run_bare(
     seconds: float,
     text: bool,
 ) -> tuple[Result, TestCaseResult]:
-    """Run a Python file or executable for at most ``seconds``; return the results of its tests and that of the whole run.
+    """Run a Python file or executable for at most ``seconds``; return its tests' results and the whole run's result.
 
     If ``text``, the test prints its results and writes no file, so the exit status determines the result.
     """
@@ -80,7 +80,7 @@ def run_bare(
 
 
 def _run(command: list[str], seconds: float) -> int | None:
-    """Return the exit status, or None if the time limit is reached. Raise MinirospyError on Ctrl-C."""
+    """Return the exit status, or None if the time limit is exceeded. Raise MinirospyError on Ctrl-C."""
     with interrupt_noted() as interrupted, guard_children(), subprocess.Popen(command) as popen:
         end = time.monotonic() + seconds
         while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:

@@ -50,7 +50,7 @@ class TestInfo:
         self.text = text
 
     def xml_element(self) -> ElementTree.Element:
-        """Return the error as an XML element of a test case."""
+        """Return the error as an XML element inside a test case."""
         element = ElementTree.Element(self.kind, {"type": self.type})
         element.text = filter_nonprintable_text(self.text)
         return element
@@ -61,21 +61,21 @@ class TestInfo:
 
 
 class TestError(TestInfo):
-    """An unexpected exception."""
+    """An unexpected exception in a test case."""
 
     kind = "error"
     word = "ERROR"
 
 
 class TestFailure(TestInfo):
-    """A failed assertion."""
+    """A failed assertion in a test case."""
 
     kind = "failure"
     word = "FAILURE"
 
 
 class TestCaseResult:
-    """One test case: its name and class, its duration in seconds, and its errors.
+    """A test case: its name and class, duration in seconds, and errors.
 
     ``skipped`` is the reason for not running the case.
     """
@@ -90,12 +90,12 @@ class TestCaseResult:
 
     @property
     def passed(self) -> bool:
-        """Return whether the case has neither errors nor failures."""
+        """Return whether the case has no errors and no failures."""
         return not self.errors and not self.failures
 
     @property
     def description(self) -> str:
-        """Return the lines about this case in the printed summary."""
+        """Return the case's lines for the printed summary."""
         if self.passed:
             return f"[{self.name}][passed]\n"
         return "".join(
@@ -105,7 +105,7 @@ class TestCaseResult:
 
     @property
     def line(self) -> str:
-        """Return the text to print after the case has run."""
+        """Return the line to print after running the case."""
         lines = [f"[Testcase: {self.name}] ... ok"]
         for info in (*self.failures, *self.errors):
             lines[0] = f"[Testcase: {self.name}] ... {info.word}!"
@@ -121,7 +121,7 @@ class TestCaseResult:
         self.failures.append(failure)
 
     def xml_element(self) -> ElementTree.Element:
-        """Return the case as an XML element of a test suite."""
+        """Return the case as an XML element inside a test suite."""
         attributes = {"classname": self.classname, "name": self.name, "time": f"{self.time:.4f}"}
         element = ElementTree.Element("testcase", attributes)
         if self.skipped is not None:
@@ -135,7 +135,7 @@ class TestCaseResult:
 
 
 class Result:
-    """A test suite's results: the counts, the captured output, and the cases."""
+    """A test suite's results: counts, captured output and cases."""
 
     def __init__(self, name: str, num_errors: int = 0, num_failures: int = 0, num_tests: int = 0) -> None:
         self.name = name
@@ -148,7 +148,7 @@ class Result:
         self.time: float = 0.0
 
     def accumulate(self, r: Result) -> None:
-        """Add another suite's results."""
+        """Add the results of another suite."""
         self.num_errors += r.num_errors
         self.num_failures += r.num_failures
         self.num_tests += r.num_tests
@@ -170,7 +170,7 @@ class Result:
         self.time += case.time
 
     def xml_element(self) -> ElementTree.Element:
-        """Return the root element of the file."""
+        """Return the XML file's root element."""
         attributes = {
             "errors": str(self.num_errors),
             "failures": str(self.num_failures),
@@ -185,7 +185,7 @@ class Result:
         return suite
 
     def xml(self) -> bytes:
-        """Return the file's content."""
+        """Return the XML file's content."""
         text: bytes = ElementTree.tostring(self.xml_element(), encoding="utf-8", xml_declaration=True)
         return text
 
@@ -201,7 +201,7 @@ class Result:
 
 
 def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
-    """Return the results in a file, with cases named ``package.rosunit-name/case``.
+    """Read the results in a file; name the cases ``package.rosunit-name/case``.
 
     If the file is invalid, print a warning and return no cases.
     """
@@ -225,7 +225,7 @@ def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
 
 
 def read_all(filter_: Sequence[str] = ()) -> Result:
-    """Read all results in the results folder, for the packages in ``filter_`` or for all packages.
+    """Read all results in the results folder, for the packages in ``filter_`` (default: all).
 
     Skip the results of rostest itself.
     """
@@ -267,12 +267,12 @@ def _read_suite(suite: ElementTree.Element, prefix: str, test_name: str) -> Resu
 
 
 def headline(text: str) -> str:
-    """Return a string padded with dashes to the line width."""
+    """Pad a string with dashes to the line width."""
     return text.ljust(_WIDTH, "-")
 
 
 def coloured(text: str, colour: str) -> str:
-    """Return a string wrapped in a terminal colour code."""
+    """Wrap a string in a terminal colour code."""
     return f"\x1b[{colour}m{text}\x1b[0m"
 
 
@@ -309,11 +309,11 @@ def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
     print(report(junit_results, runner_name))
 
 
-# --- single files
+# --- files with a single test result
 
 
 def filter_nonprintable_text(text: str) -> str:
-    """Escape the characters that XML does not allow, as in ``&#x001B;``."""
+    """Escape characters that XML does not allow, for example as ``&#x001B;``."""
     return NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
 
 
@@ -324,7 +324,7 @@ def failure_junit_xml(
     class_name: str = "Results",
     testcase_name: str = "test_ran",
 ) -> bytes:
-    """Return the content of a results file with one failed test, for a test that could not write its own file."""
+    """Return a results file with one failed test, for a test that could not write its own file."""
     suite, case = _single(test_name, 1, class_name, testcase_name)
     ElementTree.SubElement(case, "failure", {"message": message, "type": ""})
     if stdout is not None:
@@ -334,7 +334,7 @@ def failure_junit_xml(
 
 
 def success_junit_xml(test_name: str, class_name: str = "Results", testcase_name: str = "test_ran") -> bytes:
-    """Return the content of a results file with one passed test."""
+    """Return a results file with one passed test."""
     return ElementTree.tostring(_single(test_name, 0, class_name, testcase_name)[0])
 
 

@@ -44,7 +44,7 @@ __all__ = [
 XML_OUTPUT_FLAG = "--gtest_output=xml:"
 _LINE = "-" * 61
 
-# Folders of the modules whose lines are omitted from tracebacks.
+# Folders whose modules are omitted from tracebacks.
 _MACHINERY = {Path(unittest.__file__).parent, Path(__file__).parent}
 
 ExcInfo = tuple[type[BaseException], BaseException, TracebackType] | tuple[None, None, None]
@@ -85,14 +85,14 @@ def unitrun(
 def create_xml_runner(
     test_pkg: str, test_name: str, results_file: str | None = None, is_rostest: bool = False
 ) -> XMLTestRunner:
-    """Return a runner that writes ``results_file``, or rosunit's default file."""
+    """Return a runner that writes ``results_file`` (default: rosunit's file)."""
     file = Path(results_file or xml_results_file(test_pkg, test_name, is_rostest))
     begin_results(file)
     return XMLTestRunner(file)
 
 
 def begin_results(file: Path) -> None:
-    """Create the results file's folder, delete an earlier run's file, and print the file's path."""
+    """Create the results file's folder, delete the file of an earlier run and print its path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)
     print(f"[ROSUNIT] Outputting test results to {file.absolute()}", flush=True)
@@ -101,14 +101,14 @@ def begin_results(file: Path) -> None:
 def xml_results_file(
     test_pkg: str, test_name: str, is_rostest: bool = False, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` in the folder for test results."""
+    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` in the test results folder."""
     kind = "rostest" if is_rostest else "rosunit"
     name = test_name.replace("/", "_").replace(os.sep, "_")
     return os.path.join(results_dir(env), test_pkg, f"{kind}-{name}.xml")
 
 
 def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:
-    """Return the results name for a test file: ``test/hz.test`` in its package becomes ``test_hz``."""
+    """Return a test file's name for the results: ``test/hz.test`` in its package becomes ``test_hz``."""
     name = (
         test_file.removeprefix(pkg_dir).removeprefix(os.sep) if test_file.startswith(pkg_dir) else test_file
     )
@@ -116,7 +116,7 @@ def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:
 
 
 def print_unittest_summary(result: unittest.TestResult) -> None:
-    """Print a run's counts, and the names of the tests that did not pass."""
+    """Print a run's counts and the names of the tests that did not pass."""
     is_good = result.wasSuccessful()
     print(f"{_LINE}\nSUMMARY:")
     print(coloured(" * RESULT: SUCCESS", "32") if is_good else " * RESULT: FAIL")
@@ -136,7 +136,7 @@ def print_runner_summary(
 
 
 class XMLTestRunner:
-    """Runs tests, prints a line for each, and writes the results to a file (or stream) at the end.
+    """Runs tests, prints a line for each, and finally writes the results to a file or stream.
 
     The tests' output is written only to the file.
     """
@@ -145,7 +145,7 @@ class XMLTestRunner:
         self._stream = stream
 
     def run(self, test: unittest.TestSuite | unittest.TestCase) -> unittest.TestResult:
-        """Run the tests; return the result with unittest's own counts."""
+        """Run the tests; return the result with unittest's counts."""
         result = _Recorder(sys.stdout)
         started = time.perf_counter()
         with _captured() as (out, err):
@@ -164,7 +164,7 @@ class XMLTestRunner:
 
 
 class _Recorder(unittest.TestResult):
-    """A unittest result that also records each case for JUnit XML, and prints a line for each."""
+    """A unittest result that also records each case for JUnit XML and prints a line for it."""
 
     def __init__(self, terminal: TextIO) -> None:
         super().__init__()
@@ -229,7 +229,7 @@ class _Recorder(unittest.TestResult):
 
 
 def _case_of(test: unittest.TestCase) -> TestCaseResult:
-    # For example ``__main__.Case.test_x``, or ``setUpClass (__main__.Case)``.
+    # for example ``__main__.Case.test_x``, or ``setUpClass (__main__.Case)``
     name, _, place = test.id().partition(" (")
     where, _, last = name.rpartition(".")
     case = TestCaseResult(last)
@@ -238,7 +238,7 @@ def _case_of(test: unittest.TestCase) -> TestCaseResult:
 
 
 def _told(err: ExcInfo) -> tuple[str, str]:
-    """Return an exception's name, and its message with the traceback without unittest's own lines."""
+    """Return an exception's name, and its message with the traceback, omitting unittest's lines."""
     kind, error, trace = err
     if kind is None or error is None:
         return "", ""

@@ -21,7 +21,7 @@ __all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return an exit status as in minirospy.command.command."""
     return COMMAND.main(argv)
 
 
@@ -30,7 +30,7 @@ def _parser() -> Parser:
         "rosversion",
         "Print the version of a package, or the name of the ROS distribution.",
         "rosversion [-h] [-s] [-d] [-a] [package]",
-        # This is ROS's own text, although it confuses the two versions.
+        # ROS's own text, although it confuses the two versions.
         about="rosversion -d: Output the version of the given package\n"
         "rosversion package: Output the ROS distribution name",
         ros_argparse="rosversion",

@@ -55,7 +55,7 @@ def _parser(name: str) -> Parser:
         completer="launch_files",
     )
 
-    # ROS's roswtf has these options; they have no effect here.
+    # ROS's roswtf has these options, which have no effect here.
     parser.accept(
         "--all", help="run roswtf against all packages" if is_roswtf else "accepted, without effect"
     )
@@ -81,7 +81,7 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
     if machines and offline:
         raise Misuse(f"{machines[0]}: to try another machine needs the network")
 
-    # Suppress the log of the node that runs the checks: the checks themselves report these errors.
+    # Suppress the log of the node that runs the checks, because the checks report these errors themselves.
     logging.getLogger("minirospy").addHandler(logging.NullHandler())
     show = _show_json if json else _show
     counts = dict.fromkeys(Status, 0)
@@ -99,16 +99,16 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
 
 
 def _is_file(word: str) -> bool:
-    """Return whether an argument names a file rather than a machine."""
+    """Return whether an argument names a file, not a machine."""
     return "/" in word or word.endswith((".launch", ".test", ".xml")) or Path(word).is_file()
 
 
 def _wait_for_signal() -> None:
-    """Wait for Ctrl-C or SIGTERM, and let the listener unregister before the process exits."""
+    """Wait for Ctrl-C or SIGTERM, so that the listener can unregister before the process exits."""
     stop = threading.Event()
     for number in (*interrupt_signals(), signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    # Wait in slices, because on Windows signals do not interrupt a wait without a timeout.
+    # Wait in slices: on Windows, signals do not interrupt a wait without a timeout.
     while not stop.wait(0.5):
         pass
 
@@ -120,7 +120,7 @@ def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -
 
 
 def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
-    """Yield findings about whether a launch file loads and whether the programs that it starts exist."""
+    """Yield findings: whether a launch file loads and its programs exist."""
     from minirospy.base.errors import MinirospyError
     from minirospy.ros.roslaunch.launcher.command import node_command
     from minirospy.ros.roslaunch.launcher.load import load_files

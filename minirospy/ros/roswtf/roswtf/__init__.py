@@ -15,7 +15,7 @@ __all__ = [
 
 
 def roswtf_main() -> None:
-    """Run the command with this process's arguments, and exit."""
+    """Run the command with this process's arguments and exit."""
     import sys
 
     from minirospy.ros.roswtf.commands.doctor import roswtf

@@ -35,7 +35,7 @@ class WtfException(Exception):
 
 
 class WtfContext:
-    """The data that checks examine, and the ``warnings`` and ``errors`` that they report. Unknown attributes are None."""
+    """The data for checks to examine, and the ``warnings`` and ``errors`` they report. Unknown attributes are None."""
 
     __slots__ = _NAMES
     warnings: list[WtfError]
@@ -49,31 +49,31 @@ class WtfContext:
             setattr(self, name, [] if name in _LISTS else {} if name in ("env", "uri_node_map") else None)
 
     def as_dictionary(self) -> dict[str, Any]:
-        """Return a dict of the attributes, for a rule's message."""
+        """Return the attributes as a dict, for a rule's message."""
         return {name: getattr(self, name) for name in self.__slots__}
 
     @staticmethod
     def from_env(env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return a context that contains only the environment."""
+        """Return a context with only the environment."""
         return _Filled(env).made
 
     @staticmethod
     def from_package(pkg: str, env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return a package's context. Raise WtfException if the package or one of its dependencies does not exist."""
+        """Return a package's context. Raise WtfException if the package or a dependency does not exist."""
         filled = _Filled(env)
         filled.load_package(pkg)
         return filled.made
 
     @staticmethod
     def from_stack(stack: str, env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return a metapackage's context. Raise WtfException if the metapackage or one of its dependencies does not exist."""
+        """Return a metapackage's context. Raise WtfException if the metapackage or a dependency does not exist."""
         filled = _Filled(env)
         filled.load_stack(stack)
         return filled.made
 
     @staticmethod
     def from_roslaunch(roslaunch_files: Sequence[str], env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return the context for launch files and the package that contains them. Raise WtfException if a file is invalid."""
+        """Return the context for launch files and their package. Raise WtfException if a file is invalid."""
         for file in roslaunch_files:
             try:
                 load_config_default([file], None, assign_machines=False)
@@ -93,7 +93,7 @@ class WtfContext:
 
 
 class _Filled:
-    """Creates a context with the environment, and adds packages and metapackages to it."""
+    """Builds a context: the environment, plus packages and metapackages."""
 
     def __init__(self, env: Mapping[str, str] | None) -> None:
         env = os.environ if env is None else env
@@ -111,7 +111,7 @@ class _Filled:
         self.context = context
 
     def load_package(self, name: str) -> None:
-        """Set the attributes of a package, and of its metapackage if it has one."""
+        """Set a package's attributes, and its metapackage's if it has one."""
         context = self.context
         context.pkg = name
         try:
@@ -133,7 +133,7 @@ class _Filled:
             context.pkgs = packages
 
     def load_stack(self, name: str) -> None:
-        """Set the attributes of a metapackage."""
+        """Set a metapackage's attributes."""
         context = self.context
         context.stack = name
         try:

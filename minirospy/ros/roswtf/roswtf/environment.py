@@ -30,18 +30,18 @@ __all__ = [
 
 
 def paths(path: str | None) -> list[str]:
-    """Return the folders in the value of a variable such as PATH."""
+    """Return the folders listed in the value of a variable such as PATH."""
     return path.split(os.pathsep) if path else []
 
 
 def is_executable(path: str) -> int:
-    """Return the permission bits that allow a file to be executed, or 0. Raise OSError if the file does not exist."""
+    """Return a file's execute permission bits, or 0 if there are none. Raise OSError if the file does not exist."""
     mode = os.stat(path)[stat.ST_MODE]
     return mode & (stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
 
 
 def invalid_url(url: str | None) -> str | None:
-    """Return the error in a master's URI, or None if the URI is valid."""
+    """Return the error in a master URI, or None if it is valid."""
     if not url:
         return None
     scheme, _, rest = url.partition("://")
@@ -59,7 +59,7 @@ def invalid_url(url: str | None) -> str | None:
 
 
 def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
-    """Return the error in ROS_ROOT, or None."""
+    """Return the error in ROS_ROOT, or None if it is valid."""
     path = ctx.ros_root if ros_root is None else ros_root
     if os.path.basename(os.path.normpath(path)) in ("ros", "rosbuild"):
         return None
@@ -67,7 +67,7 @@ def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
 
 
 def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
-    """Return the error in a folder that ROS writes to, or None."""
+    """Return why ROS cannot write to a folder, or None if it can."""
     if path is None:
         return None
     if os.path.isfile(path):
@@ -76,17 +76,17 @@ def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
 
 
 def ros_home_check(ctx: Any) -> str | None:
-    """Return the error in ROS_HOME, or None."""
+    """Return the error in ROS_HOME, or None if it is valid."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_HOME"), "ROS_HOME")
 
 
 def ros_log_dir_check(ctx: Any) -> str | None:
-    """Return the error in ROS_LOG_DIR, or None."""
+    """Return the error in ROS_LOG_DIR, or None if it is valid."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_LOG_DIR"), "ROS_LOG_DIR")
 
 
 def ros_test_results_dir_check(ctx: Any) -> str | None:
-    """Return the error in ROS_TEST_RESULTS_DIR, or None."""
+    """Return the error in ROS_TEST_RESULTS_DIR, or None if it is valid."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_TEST_RESULTS_DIR"), "ROS_TEST_RESULTS_DIR")
 
 
@@ -98,20 +98,20 @@ def pythonpath_check(ctx: Any) -> str | None:
 
 
 def rosconsole_config_file_check(ctx: Any) -> bool | None:
-    """Return whether the file named in ROSCONSOLE_CONFIG_FILE is missing, or None if the variable is not set."""
+    """Return whether ROSCONSOLE_CONFIG_FILE names a missing file, or None if it is not set."""
     file = ctx.env.get("ROSCONSOLE_CONFIG_FILE")
     return None if file is None else not os.path.isfile(file)
 
 
 def path_check(ctx: Any) -> bool | None:
-    """Return True if ROS is installed system-wide, and PATH lists /usr/bin before ROS_ROOT; else None."""
+    """Return True if ROS is installed system-wide and PATH lists /usr/bin before ROS_ROOT, else None."""
     path = ctx.env["PATH"]
     system, ros = path.find("/usr/bin"), path.find(ctx.ros_root)
     return True if os.path.exists("/usr/lib/ros/") and 0 <= system < ros else None
 
 
 def ros_master_uri_hostname(ctx: Any) -> str | None:
-    """Return an error if the host in ROS_MASTER_URI is unknown, else None; other rules check the rest of the URI."""
+    """Return an error if the host in ROS_MASTER_URI is unknown, else None. Other rules check the rest of the URI."""
     host, colon, port = urlparse(ctx.ros_master_uri).netloc.partition(":")
     if not colon or ":" in port:
         return None
@@ -127,7 +127,7 @@ def _not_folders(path: str | None) -> list[str]:
 
 
 def _not_package_folders(path: str | None) -> list[str]:
-    # A catkin workspace adds the folder share and then a folder for stacks, which need not exist.
+    # A catkin workspace adds the folder share and a folder for stacks, which may be missing.
     return [
         each
         for each in _not_folders(path)
@@ -180,7 +180,7 @@ environment_errors: list[Rule] = [
 
 
 def wtf_check_environment(ctx: Any) -> None:
-    """Check the environment variables in a context and add the errors and warnings to the context."""
+    """Check a context's environment variables; add the errors and warnings to the context."""
     for rule in environment_warnings:
         warning_rule(rule, rule[0](ctx), ctx)
     for rule in environment_errors:

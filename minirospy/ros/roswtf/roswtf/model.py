@@ -6,7 +6,7 @@ __all__ = ["WtfError", "WtfWarning"]
 
 
 class WtfError:
-    """An error: its message, the message's template, and the check's return value."""
+    """An error: its message, the message's template and the check's return value."""
 
     def __init__(self, msg: str, format_msg: str | None = None, return_val: object = None) -> None:
         self.msg = msg

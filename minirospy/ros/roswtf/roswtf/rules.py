@@ -15,25 +15,25 @@ __all__ = ["error_rule", "warning_rule"]
 
 
 class Context(Protocol):
-    """The object that roswtf's rules examine."""
+    """The context that roswtf's rules examine."""
 
     errors: list[WtfError]
     warnings: list[WtfError]
 
     def as_dictionary(self) -> Mapping[str, object]:
-        """Return the values that a rule's message may contain."""
+        """Return the values for use in a rule's message."""
 
 
 Rule = tuple[Callable[..., object], str]
 
 
 def error_rule(rule: Rule, ret: object, ctx: Context) -> None:
-    """Add an error to the context if the rule's check returned a problem."""
+    """Add an error to the context if the rule's check found a problem."""
     _add(rule, ret, ctx, ctx.errors, WtfError)
 
 
 def warning_rule(rule: Rule, ret: object, ctx: Context) -> None:
-    """Add a warning to the context if the rule's check returned a problem."""
+    """Add a warning to the context if the rule's check found a problem."""
     _add(rule, ret, ctx, ctx.warnings, WtfWarning)
 
 

@@ -22,7 +22,7 @@ from std_msgs.msg import Header
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Values: TypeAlias = NDArray[Any]  # point values, of any type that a field can have
+    Values: TypeAlias = NDArray[Any]  # point values of any field type
 
 __all__ = [
     "_DATATYPES",
@@ -50,13 +50,13 @@ _DATATYPES: dict[int, tuple[str, int]] = {
 }
 """The format character and size in bytes, keyed by field datatype."""
 
-_BLOCK = 4_096  # number of points to read per step, small enough for the processor's cache
+_BLOCK = 4_096  # points to read per step, few enough for the processor's cache
 
-_FEW = 1_000  # number of points below which plain Python is faster than numpy
+_FEW = 1_000  # below this number of points, plain Python is faster than numpy
 
 
 class Column(NamedTuple):
-    """A field to read: its offset in the point, format character, bytes per value, and number of values."""
+    """A field to read: its offset in the point, format character, bytes per value and number of values."""
 
     offset: int
     format: str

@@ -29,7 +29,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 class ClientGoal(Generic[_R, _F]):
-    """A goal that was sent; created by :meth:`ActionClient.send`.
+    """A goal sent with :meth:`ActionClient.send`.
 
     ``async for`` over the goal yields feedback until the goal reaches a terminal state. ``await goal`` returns the result, or
     raises GoalError if the goal was not reached, or ROSInterruptException if the client or node was closed before that.
@@ -94,7 +94,7 @@ class ClientGoal(Generic[_R, _F]):
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
         elif self._is_known and self.state not in TERMINAL:
-            # The server no longer lists the goal, so it must have been restarted.
+            # A server that no longer lists the goal must have been restarted.
             self._end(GoalState.LOST, "the server does not know the goal any more", None)
 
     def _end(self, state: GoalState, text: str, result: _R | None) -> None:
@@ -212,7 +212,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         async for message in subscription:
             try:
                 take(message)
-            except DeserializationError as error:  # raised by a StatusList, which is parsed on demand
+            except DeserializationError as error:  # a StatusList is parsed, which may fail, on first access
                 self._node.log.error("a message on %s is ignored: %s", subscription.topic, error)
         for goal in list(self._goals.values()):
             goal._interrupt()
@@ -237,7 +237,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         return True
 
     def _status_link_ended(self) -> None:
-        """Check after SERVER_SECONDS whether the server is gone."""
+        """After SERVER_SECONDS, check whether the server is gone."""
         if goals := [goal for goal in self._goals.values() if goal._is_sent]:
             self._check_later(goals)
 
@@ -245,7 +245,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         asyncio.get_running_loop().call_later(SERVER_SECONDS, self._check_server, goals, self._statuses)
 
     def _check_server(self, goals: list[ClientGoal[_R, _F]], last: StatusList | None) -> None:
-        """Set ``goals`` to LOST, except those that a server lists in a status message newer than ``last``."""
+        """Mark ``goals`` as LOST, except those listed in a status message newer than ``last``."""
         if self._is_closed or self._node.is_shutdown:
             return
         statuses, is_connected = self._statuses, self._status.num_connections > 0
@@ -264,7 +264,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None and self._is_valid(status):
-            # Feedback arrives on a separate connection, so process the feedback that has already arrived first.
+            # Feedback uses a separate connection: first process the feedback that has already arrived.
             end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 

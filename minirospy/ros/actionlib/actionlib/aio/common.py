@@ -19,7 +19,7 @@ _G_co = TypeVar("_G_co", covariant=True)
 _R_co = TypeVar("_R_co", covariant=True)
 _F_co = TypeVar("_F_co", covariant=True)
 
-WAITING = 1000  # queue size in messages, for each of an action's topics and for a goal's unread feedback
+WAITING = 1000  # queue size in messages, per action topic and for each goal's unread feedback
 
 
 class _WithGoal(Protocol[_G_co]):
@@ -51,7 +51,7 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 
 
 class GoalError(MinirospyError):
-    """Raised if a goal ended without success.
+    """Raised if a goal ends without success.
 
     ``text`` and ``result`` (if any) come from the server; ``state`` is the final state.
 
@@ -67,7 +67,7 @@ class GoalError(MinirospyError):
 
 
 class ActionEnd(Handle):
-    """The base class of client and server. Manages their topics and the tasks that read them."""
+    """Base class of ActionClient and ActionServer: manages their topics and the tasks that read them."""
 
     def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)

@@ -218,7 +218,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
                 goal._step(GoalEvent.CANCEL_REQUEST)
                 goal._make_way()
         if cancel.id and cancel.id not in self.goals:
-            # The goal may arrive after the cancel request, so remember the request.
+            # A goal may arrive after the request to cancel it, so store the request.
             self._canceled_early[cancel.id] = self._node.now().to_nsec()
         self._last_cancel = max(self._last_cancel, stamp)
         self._changed.set()
@@ -268,7 +268,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         message = self._types.action_result(status=goal._status, result=result or self._types.result())
         message.header.stamp = now
         self._changed.set()
-        # Publishing fails while the node is shutting down.
+        # Publishing fails during shutdown.
         with contextlib.suppress(ROSException):
             await self._result.publish(message)
 

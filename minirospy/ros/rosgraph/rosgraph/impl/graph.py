@@ -17,12 +17,12 @@ _CALLER_ID = "/rosgraph"
 
 
 def topic_node(topic: str) -> str:
-    """Return the name of a topic's node in the graph: a space followed by the topic."""
+    """Return the name of the graph node that represents a topic: a space followed by the topic."""
     return " " + topic
 
 
 def node_topic(node: str) -> str:
-    """Return the topic for a name from :func:`topic_node`."""
+    """Return the topic for a name returned by :func:`topic_node`."""
     return node[1:]
 
 
@@ -39,7 +39,7 @@ class BadNode:
 
 
 class Edge:
-    """A directed edge from ``start`` to ``end``, for the topic ``label``."""
+    """A directed edge from ``start`` to ``end`` with the topic ``label``."""
 
     __slots__ = ["end", "key", "label", "rkey", "start"]
 
@@ -96,7 +96,7 @@ class EdgeList:
         return True
 
     def add_edges(self, start: str, dest: str, direction: str, label: str = "") -> bool:
-        """Add the edges for a row from getBusInfo (see :func:`edge_args`); return whether at least one is new."""
+        """Add the edges for a getBusInfo row (see :func:`edge_args`); return whether any is new."""
         added = [self.add(Edge(*each)) for each in edge_args(start, dest, direction, label)]
         return any(added)
 
@@ -105,12 +105,12 @@ class EdgeList:
         self._edges.pop(edge, None)
 
     def delete_all(self, node: str) -> None:
-        """Remove every edge that starts or ends at a node."""
+        """Remove all edges that start or end at a node."""
         self._edges = {each: None for each in self._edges if node not in (each.start, each.end)}
 
 
 def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[str, str, str]]:
-    """Return [(start, end, label)] for a row from getBusInfo.
+    """Return [(start, end, label)] for a getBusInfo row.
 
     The edge is reversed for direction ``i``. Direction ``b`` results in two edges, an unknown direction in none.
     """
@@ -119,7 +119,7 @@ def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[s
 
 
 class Graph:
-    """The nodes and topics in the namespaces ``node_ns`` and ``topic_ns``; empty until :meth:`update` is called.
+    """The nodes and topics in the namespaces ``node_ns`` and ``topic_ns``, empty until :meth:`update` is called.
 
     ``nn_nodes``: node names; ``nt_nodes``: topics, named by :func:`topic_node`; ``nn_edges``: from node to node;
     ``nt_edges``, ``nt_all_edges``: from node to topic and from topic to node; ``srvs``: service names.
@@ -148,11 +148,11 @@ class Graph:
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
-        """Return False, because ``bad_nodes`` never contains a node to query again."""
+        """Return False: ``bad_nodes`` never contains a node to query again."""
         return False
 
     def update(self) -> bool:
-        """Query the master, unless the last query is too recent; return whether the graph has changed."""
+        """Query the master, unless it was queried recently; return whether the graph has changed."""
         if time.time() - self.last_master_refresh < self.master_stale:
             return False
 
@@ -186,7 +186,7 @@ class Graph:
         return before != (self.nn_nodes, self.nt_nodes, self.srvs, self.nn_edges, self.nt_all_edges)
 
     def _side(self, table: list[tuple[str, list[str]]]) -> dict[str, list[str]]:
-        """Return the topics in the topic namespace, each with those of its nodes that are in the node namespace."""
+        """Return the topics in the topic namespace, each with its nodes in the node namespace."""
         kept = {
             topic: [node for node in nodes if in_namespace(node, self.node_ns)]
             for topic, nodes in table

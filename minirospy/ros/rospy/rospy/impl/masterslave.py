@@ -20,7 +20,7 @@ Answer = tuple[int, str, Any]
 
 
 class ROSHandler(XmlRpcHandler):
-    """The Slave API of the node ``name``.
+    """Serves the Slave API of the node ``name``.
 
     Each method's first argument is the caller's name; it returns (code, status message, value).
     """
@@ -35,7 +35,7 @@ class ROSHandler(XmlRpcHandler):
 
     @classmethod
     def remappings(cls, methodName: str) -> list[int]:
-        """Return the positions of a method's arguments that are names."""
+        """Return the indices of a method's arguments that are names."""
         return cls._remap_table.get(methodName, [])
 
     def getName(self, *args: object) -> Answer:
@@ -43,7 +43,7 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getName", args, value=self.name)
 
     def getUri(self, *args: object) -> Answer:
-        """Return the URI of the server that uses this handler, or None if none uses it yet."""
+        """Return the URI of the server that uses this handler, or None if there is none yet."""
         return self._call("getUri", args, value=self.uri)
 
     def getMasterUri(self, *args: object) -> Answer:
@@ -72,15 +72,15 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getSubscriptions", args)
 
     def paramUpdate(self, *args: object) -> Answer:
-        """Update a parameter's cached value."""
+        """Update a parameter in the cache."""
         return self._call("paramUpdate", args)
 
     def publisherUpdate(self, *args: object) -> Answer:
-        """Update the publishers of a topic."""
+        """Update a topic's publishers."""
         return self._call("publisherUpdate", args)
 
     def requestTopic(self, *args: object) -> Answer:
-        """Return the address at which this node serves a topic."""
+        """Return the address where this node serves a topic."""
         return self._call("requestTopic", args)
 
     def shutdown(self, *args: object) -> Answer:

@@ -11,7 +11,7 @@ __all__ = ["Registration", "get_service_manager", "get_topic_manager"]
 
 
 class Registration:
-    """The kinds of registration with the master."""
+    """The kinds of registrations with the master."""
 
     PUB = "pub"
     SUB = "sub"

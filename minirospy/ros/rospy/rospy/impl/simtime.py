@@ -7,7 +7,7 @@ __all__ = ["init_simtime"]
 
 
 def init_simtime() -> bool:
-    """Use the time on /clock if /use_sim_time is true, like init_node. Return whether the master responded."""
+    """Like init_node, use the time on /clock if /use_sim_time is true. Return whether the master responded."""
     try:
         start_clock()
     except ROSInitException:

@@ -45,5 +45,5 @@ ServiceImpl = Service  # the base class of Service in ROS
 
 
 def convert_return_to_response(response: object, response_class: type[Message]) -> Message:
-    """Convert a handler's return value to a response. Raise ServiceException if the value does not match the response type."""
+    """Convert a handler's return value to a response. Raise ServiceException if it does not match the response type."""
     return to_response(response_class, response)
