@@ -32,7 +32,7 @@ LAYERS = [
     {"core", "board"},
     {"base"},
 ]
-# Exceptions: `rosbag play --bridge` shows the bag in a browser.
+# Exceptions: `rosbag play --foxglove` shows the bag in a browser.
 UPWARDS = {("ros/rosbag/commands/rosbag_play.py", "web")}
 OPTIONAL_PACKAGES = [
     "ament_index_python", "angles", "camera_info_manager_py", "diagnostic_aggregator",
