@@ -15,6 +15,11 @@ READY := $(STAMP) $(OVERLAY)
 # As on a user's machine: processes keep what they compile, which makes thousands of them start faster, and buffer their output.
 unexport PYTHONDONTWRITEBYTECODE PYTHONUNBUFFERED
 
+# Written by processes that collect half of the tests each. They leave the compiled tests and the constants that hypothesis
+# finds in modules, which each of the four processes that run the tests would otherwise make for itself.
+COMPILED := $(VENV)/.compiled-core $(VENV)/.compiled-rest
+COMPILED_CORE := tests/core tests/ros tests/web
+
 # What needs no process of its own, and the first messages and calls between nodes: under a minute on two cores.
 CHECKED := tests/core/graph tests/core/wire tests/core/idl tests/introspect tests/overlay \
   tests/runtime/master/test_master.py tests/runtime/node/test_topics.py tests/runtime/node/test_services.py \
@@ -50,6 +55,7 @@ check: lint
 	@$(BIN)/python -m pytest -q -n 2 --dist worksteal $(CHECKED)
 
 test: $(READY)
+	@$(MAKE) --silent --no-print-directory -j 2 $(COMPILED)
 	@$(BIN)/python -m pytest -n 4 --dist worksteal --ignore=tests/interop --ignore=tests/windows
 
 interop: $(READY)
@@ -129,6 +135,16 @@ $(STAMP): $(PROGRAMS)
 	@echo "Installing what the tests and checks need into $(VENV) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "minirospy[dev]"
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
+
+# The run of the tests reports what cannot be collected.
+COLLECT := -$(BIN)/python -m pytest -p no:terminal -o addopts=--import-mode=importlib --collect-only
+$(VENV)/.compiled-core: $(READY)
+	@$(COLLECT) $(COMPILED_CORE)
+	@$(PYTHON) -c "open('$@', 'w').close()"
+
+$(VENV)/.compiled-rest: $(READY)
+	@$(COLLECT) --ignore=tests/interop --ignore=tests/windows $(COMPILED_CORE:%=--ignore=%)
+	@$(PYTHON) -c "open('$@', 'w').close()"
 
 # Written again when a module that programs import changes what it offers.
 $(OVERLAY): $(PROGRAMS) $(wildcard minirospy/ros/*.py minirospy/ros/*.json minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)

@@ -19,7 +19,7 @@ from minirospy.base.environment import Environment
 from minirospy.base.yaml_text import safe_load
 from minirospy.cli.completion import completers
 from minirospy.cli.completion.complete import candidates, main
-from minirospy.cli.registry import COMMANDS, Entry, console_scripts
+from minirospy.cli.registry import COMMANDS, console_scripts
 from minirospy.command.parser import completer_of
 from minirospy.command.verbs import Command, Family, Verb
 from minirospy.core.idl.load import Catalogue, message_class
@@ -137,39 +137,39 @@ LEAVES = [
 ]
 
 
-@pytest.mark.parametrize("entry", COMMANDS, ids=lambda entry: entry.target)
-def test_every_command_is_completed(entry: Entry) -> None:
+def test_every_command_is_completed() -> None:
     """A command has a grammar or a completer for its words; only `minirospy` and `complete` have neither."""
-    grammar = entry.load_grammar()
-    assert callable(entry.load_main())
-    assert grammar is None or isinstance(grammar, Command | Family)
-    assert (
-        grammar
-        or entry.completer
-        or entry.target
-        in (
-            "minirospy.cli.main:main",
-            "minirospy.cli.completion.complete:main",
-        )
-    )
-    assert not entry.completer or callable(getattr(completers, entry.completer))
+    for entry in COMMANDS:
+        grammar = entry.load_grammar()
+        assert callable(entry.load_main()), entry
+        assert grammar is None or isinstance(grammar, Command | Family), entry
+        assert (
+            grammar
+            or entry.completer
+            or entry.target
+            in (
+                "minirospy.cli.main:main",
+                "minirospy.cli.completion.complete:main",
+            )
+        ), entry
+        assert not entry.completer or callable(getattr(completers, entry.completer)), entry
 
 
-@pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
-def test_function_accepts_its_parsers_arguments(typed: str, leaf: Command | Verb) -> None:
-    parser = leaf.parser()
-    names = {
-        action.dest
-        for action in parser._actions
-        if action.dest != "help" and type(action).__name__ != "_Accepted"
-    }
-    parameters = inspect.signature(leaf.body).parameters.values()
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
-        return
-    taken = {parameter.name for parameter in parameters}
-    # Launch arguments and words for CMake are separated from the other words.
-    assert names <= taken
-    assert taken - names <= {"arguments", "args", "variables", "cmake_words"}
+def test_functions_accept_the_arguments_of_their_parsers() -> None:
+    for typed, leaf in LEAVES:
+        parser = leaf.parser()
+        names = {
+            action.dest
+            for action in parser._actions
+            if action.dest != "help" and type(action).__name__ != "_Accepted"
+        }
+        parameters = inspect.signature(leaf.body).parameters.values()
+        if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+            continue
+        taken = {parameter.name for parameter in parameters}
+        # Launch arguments and words for CMake are separated from the other words.
+        assert names <= taken, typed
+        assert taken - names <= {"arguments", "args", "variables", "cmake_words"}, typed
 
 
 def test_functions_with_many_arguments_take_a_record() -> None:
@@ -182,18 +182,19 @@ def test_functions_with_many_arguments_take_a_record() -> None:
         )
 
 
-@pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
-def test_every_verb_and_option_is_completed(typed: str, leaf: Command | Verb) -> None:
+def test_every_verb_and_option_is_completed() -> None:
     """A new argument that takes a value must name its completer (``nothing`` for none)."""
-    parser = leaf.parser()
-    assert tab(f"{typed} -") == [option for action in parser._actions for option in action.option_strings]
-    for action in parser._actions:
-        is_number = action.type in (int, float) or isinstance(action.type, FunctionType)
-        if action.nargs == 0 or action.choices is not None or is_number:
-            continue
-        name = completer_of(action)
-        assert name, f"{typed}: what completes {action.option_strings or action.dest}?"
-        assert callable(getattr(completers, name))
+    for typed, leaf in LEAVES:
+        parser = leaf.parser()
+        options = [option for action in parser._actions for option in action.option_strings]
+        assert tab(f"{typed} -") == options, typed
+        for action in parser._actions:
+            is_number = action.type in (int, float) or isinstance(action.type, FunctionType)
+            if action.nargs == 0 or action.choices is not None or is_number:
+                continue
+            name = completer_of(action)
+            assert name, f"{typed}: what completes {action.option_strings or action.dest}?"
+            assert callable(getattr(completers, name)), typed
 
 
 def test_choices_of_an_argument() -> None:

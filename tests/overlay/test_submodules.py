@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import os
@@ -31,16 +32,24 @@ RECORD: dict[str, list[str]] = json.loads((Path(__file__).parent / "submodules.j
 
 
 @pytest.mark.filterwarnings("ignore:roslib.rospack is deprecated")
-@pytest.mark.parametrize("module", RECORD["offered"])
-def test_submodule_of_real_ros_is_offered(module: str) -> None:
-    importlib.import_module(module)
+def test_submodules_of_real_ros_are_offered() -> None:
+    failed: dict[str, str] = {}
+    for module in RECORD["offered"]:
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            failed[module] = repr(error)
+    assert failed == {}
 
 
-@pytest.mark.parametrize("module", RECORD["not offered"])
-def test_module_that_is_listed_as_missing_is_missing(module: str) -> None:
+def test_modules_that_are_listed_as_missing_are_missing() -> None:
     """The list in docs/compatibility/modules.md is correct."""
-    with pytest.raises(ImportError):
-        importlib.import_module(module)
+    imported = []
+    for module in RECORD["not offered"]:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(module)
+            imported.append(module)
+    assert imported == []
 
 
 LOADED = {
