@@ -119,7 +119,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
 def read_response() -> None:
     """Read a response like the master's, which compiles the regular expressions for reading HTTP and XML-RPC.
 
-    Otherwise each node would compile them again, in a third of its CPU time.
+    Otherwise each node would compile them again, which takes some milliseconds.
     """
     from minirospy.core.wire import http, xmlrpc
 

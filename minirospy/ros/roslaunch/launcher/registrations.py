@@ -66,7 +66,7 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
     """
     if not nodes:
         return []
-    # Import it here: a launch starts sooner without it, and needs it only when a node has exited.
+    # Import this, and minirospy.introspect.nodes, here: a launch needs them only after a node has exited.
     from concurrent.futures import ThreadPoolExecutor
 
     try:
