@@ -303,9 +303,9 @@ def measure_large(meter: Meter, pictured: Callable[[Any, Any], int]) -> None:
     import rospy
     from sensor_msgs.msg import Image
 
-    from minirospy.runtime.transport import shared_memory
+    from minirospy.runtime.transport.shared_memory_trial import try_out
 
-    if why := shared_memory.try_out():
+    if why := try_out():
         print(f"large messages are not measured: no shared memory, because {why}")
         return
 

@@ -23,6 +23,7 @@ from minirospy.workspace.dependencies import CircularDependencyError
 from minirospy.workspace.manifest import naming_warning
 from minirospy.workspace.options import make_options
 from minirospy.workspace.packages import (
+    DIST_PACKAGES,
     OF_THE_WORKSHOP,
     Packages,
     built_in_roots,
@@ -30,7 +31,7 @@ from minirospy.workspace.packages import (
     is_python,
     package_name,
 )
-from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
+from minirospy.workspace.plan import Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
 from minirospy.workspace.stand_ins import StandIns, find_stand_ins

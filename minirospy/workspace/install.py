@@ -10,7 +10,8 @@ from pathlib import Path
 
 from minirospy.base.errors import BuildError
 from minirospy.workspace.build import Workspace, stand_in_files
-from minirospy.workspace.plan import DIST_PACKAGES, Install, Plan
+from minirospy.workspace.packages import DIST_PACKAGES
+from minirospy.workspace.plan import Install, Plan
 from minirospy.workspace.python_setup import read_python_setup
 from minirospy.workspace.stand_ins import find_stand_ins
 

@@ -12,8 +12,8 @@ import sys
 from pathlib import Path
 
 from minirospy.base.errors import BuildError
-from minirospy.workspace.packages import built_in_roots
-from minirospy.workspace.plan import DIST_PACKAGES, Plan
+from minirospy.workspace.packages import DIST_PACKAGES, built_in_roots
+from minirospy.workspace.plan import Plan
 
 __all__ = ["make_options"]
 

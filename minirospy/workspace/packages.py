@@ -18,6 +18,7 @@ from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
 from minirospy.base.errors import MinirospyError, NotFoundError
 
 __all__ = [
+    "DIST_PACKAGES",
     "OF_THE_WORKSHOP",
     "ROSBUILD_MANIFEST",
     "CrawlTime",
@@ -31,6 +32,9 @@ __all__ = [
     "why_ros_refuses",
     "with_prefix",
 ]
+
+DIST_PACKAGES = "lib/python3/dist-packages"
+"""The folder for Python packages in a devel or install folder, as in ROS on Debian and Ubuntu."""
 
 _MANIFEST = "package.xml"
 ROSBUILD_MANIFEST = "manifest.xml"  # of rosbuild packages; rosbuild preceded catkin

@@ -21,11 +21,9 @@ from minirospy.base.suggestions import did_you_mean
 from minirospy.workspace.cmake import keyword_arguments
 from minirospy.workspace.cmake_run import Command, run_cmake
 from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest, read_manifest
+from minirospy.workspace.packages import DIST_PACKAGES
 
-__all__ = ["DIST_PACKAGES", "Download", "Install", "Plan", "Test", "read_plan"]
-
-DIST_PACKAGES = "lib/python3/dist-packages"
-"""The folder for Python packages in a devel or install folder, as in ROS on Debian and Ubuntu."""
+__all__ = ["Download", "Install", "Plan", "Test", "read_plan"]
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
 _COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")

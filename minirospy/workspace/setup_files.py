@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.workspace import powershell
-from minirospy.workspace.plan import DIST_PACKAGES
+from minirospy.workspace.packages import DIST_PACKAGES
 
 __all__ = ["SHELLS", "SetUp", "assignments", "setup_files", "shell_text"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from minirospy.workspace.plan import DIST_PACKAGES
+from minirospy.workspace.packages import DIST_PACKAGES
 
 __all__ = ["stale_definitions", "warning_of_stale_definitions", "workspace_of"]
 

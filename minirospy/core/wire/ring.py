@@ -2,7 +2,7 @@
 
 The publisher writes a message into a *place* of the ring, once for all subscribers, and announces it on each subscriber's socket.
 A subscriber copies the message and releases the place. This module makes the decisions;
-:mod:`minirospy.runtime.transport.shared_memory` owns the memory. Source: docs/shared_memory.md.
+:mod:`minirospy.runtime.transport.ring_sender` owns the memory. Source: docs/shared_memory.md.
 """
 
 from __future__ import annotations

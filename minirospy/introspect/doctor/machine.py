@@ -18,7 +18,8 @@ from minirospy.base.errors import ManifestError, NotFoundError, NoThreadsAtEndEr
 from minirospy.base.installation import install_command
 from minirospy.introspect.doctor.findings import Finding, ok, problem, warning
 from minirospy.introspect.doctor.reach import MasterLocation, is_loopback, is_own_address
-from minirospy.runtime.transport import shared_memory
+from minirospy.runtime.transport.shared_memory import is_possible
+from minirospy.runtime.transport.shared_memory_trial import try_out
 from minirospy.workspace.hidden_modules import hiding_files
 from minirospy.workspace.stale import warning_of_stale_definitions, workspace_of
 
@@ -208,9 +209,9 @@ def check_shared_memory(environment: Environment) -> Iterator[Finding]:
         yield ok(
             "shared memory", f"off, by MINIROSPY_TRANSPORT={environment.transport}: messages use sockets"
         )
-    elif not shared_memory.is_possible():
-        yield ok("shared memory", f"none: {shared_memory.try_out()}; large messages use sockets")
-    elif trouble := shared_memory.try_out():
+    elif not is_possible():
+        yield ok("shared memory", f"none: {try_out()}; large messages use sockets")
+    elif trouble := try_out():
         yield warning(
             "shared memory",
             f"does not work: {trouble}; large messages use sockets, which is slower",

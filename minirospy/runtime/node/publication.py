@@ -17,6 +17,7 @@ from minirospy.core.wire.header import Header, serialize_header
 from minirospy.core.wire.tcpros import InterfaceType, check_subscriber, publisher_header
 from minirospy.runtime.transport import shared_memory, sockets
 from minirospy.runtime.transport.links import OutLink
+from minirospy.runtime.transport.ring_sender import SharedRing
 
 __all__ = ["Publication"]
 
@@ -54,7 +55,7 @@ class Publication:
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
         # the shared memory for large messages; created for the first subscriber that can read it
-        self._ring: shared_memory.SharedRing | None = None
+        self._ring: SharedRing | None = None
 
     @property
     def is_sending(self) -> bool:
@@ -107,7 +108,7 @@ class Publication:
         answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         loop = asyncio.get_running_loop()
         if shares_memory and fields.get("shared_memory") == "1" and shared_memory.may_share(sock):
-            self._ring = self._ring or shared_memory.SharedRing(loop)
+            self._ring = self._ring or SharedRing(loop)
             sender = self._ring.add(sock)
         else:
             sender = None

@@ -21,7 +21,7 @@ from minirospy.runtime.transport import shared_memory
 from minirospy.runtime.transport.sockets import FAMILIES, is_writable
 
 if TYPE_CHECKING:
-    from minirospy.runtime.transport.shared_memory import RingSender, Sharing
+    from minirospy.runtime.transport.ring_sender import RingSender, Sharing
 
 __all__ = ["OutLink"]
 

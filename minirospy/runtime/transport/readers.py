@@ -30,7 +30,7 @@ from minirospy.core.wire.framing import (
     parse_length,
     split_sizes,
 )
-from minirospy.runtime.transport.shared_memory import RingReceiver
+from minirospy.runtime.transport.ring_receiver import RingReceiver
 from minirospy.runtime.transport.sockets import (
     BUSY_POLL_SECONDS,
     FAMILIES,

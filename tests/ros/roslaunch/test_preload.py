@@ -529,18 +529,24 @@ def test_preloaded_process_ends_after_the_start(start: RoslaunchStart, master: s
     assert not preloaded_processes(psutil.Process(launch.process.pid))
 
 
-def test_modules_of_a_node_are_preloaded(tmp_path: Path, master: str) -> None:
+def test_forked_node_loads_no_module_and_compiles_no_pattern(tmp_path: Path, master: str) -> None:
     made = Runner(tmp_path, ROS_MASTER_URI=master)
-    text = """import sys
+    text = """import re, sys
 import rospy
 from std_msgs.msg import String
 loaded = set(sys.modules)
+patterns = []
+def record(pattern, flags=0, compile=re.compile):
+    patterns.append(pattern)
+    return compile(pattern, flags)
+re.compile = record
 rospy.init_node("node")
 rospy.Publisher("a", String, queue_size=1)
 rospy.Subscriber("a", String, print)
 print([name for name in sorted(set(sys.modules) - loaded) if name.startswith(("minirospy", "asyncio"))])
+print(patterns)
 rospy.signal_shutdown("")
 """
     result = made.forked(made.start(made.write(text)))
     made.preload.close()
-    assert result == Result(0, "[]\n", "")
+    assert result == Result(0, "[]\n[]\n", "")

@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import stat
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -27,6 +28,15 @@ from tests.ros.roslaunch.conftest import Start
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals between processes")
 
 NODE = '<node pkg="pkg" type="wait.py" name='
+
+
+def test_launcher_imports_little_before_it_starts_nodes() -> None:
+    code = (
+        "import sys, minirospy.ros.roslaunch.commands.roslaunch, minirospy.ros.roslaunch.launcher.runner; "
+        "print({'asyncio', 'concurrent.futures', 'minirospy.workspace.plan', 'yaml'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
 
 
 def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,12 +6,15 @@ import asyncio
 import contextlib
 import re
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 from xmlrpc.client import ServerProxy, dumps
 
+import psutil
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -25,8 +28,9 @@ from minirospy.runtime.master.replay import Replay, changes_to
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc import connection as connections
 from minirospy.runtime.rpc import server as rpc_server
-from minirospy.runtime.transport.access import Access, listening_lines
+from minirospy.runtime.transport.access import Access, listening_lines, own_addresses
 from minirospy.runtime.transport.loop import LoopThread
+from tests.waiting import wait_until
 
 DOCS = Path(__file__).parents[3] / "docs" / "master.md"
 
@@ -326,15 +330,37 @@ def test_the_start_up_line_warns_of_the_open_internet(monkeypatch: pytest.Monkey
     assert listening_lines("127.0.0.1", 1, Access()) == [
         "listening on 127.0.0.1:1, open to this machine alone"
     ]
-    monkeypatch.setattr(access, "_own_addresses", lambda: ["127.0.0.1", "192.168.1.5", "fe80::1%eth0"])
+    monkeypatch.setattr(access, "own_addresses", lambda: ["127.0.0.1", "192.168.1.5", "fe80::1%eth0"])
     assert len(listening_lines("0.0.0.0", 1, Access())) == 1
-    monkeypatch.setattr(access, "_own_addresses", lambda: ["127.0.0.1", "9.9.9.9", "2620:fe::9"])
+    monkeypatch.setattr(access, "own_addresses", lambda: ["127.0.0.1", "9.9.9.9", "2620:fe::9"])
     _, warning = listening_lines("0.0.0.0", 1, Access())
     assert warning.startswith("WARNING: the open internet reaches this master at 9.9.9.9, 2620:fe::9,")
     assert listening_lines("0.0.0.0", 1, Access(["10.0.0.0/8"])) == [
         "listening on 0.0.0.0:1, open to 10.0.0.0/8"
     ]
     assert len(listening_lines("9.9.9.9", 1, Access())) == 2
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems use psutil")
+def test_own_addresses_are_those_of_psutil() -> None:
+    def addresses_of_psutil() -> set[str]:
+        families = {socket.AF_INET, socket.AF_INET6}
+        found = [each for interface in psutil.net_if_addrs().values() for each in interface]
+        return {each.address.partition("%")[0] for each in found if each.family in families}
+
+    assert "127.0.0.1" in own_addresses()
+    # Another process may add an interface in the meantime.
+    wait_until(lambda: set(own_addresses()) == addresses_of_psutil())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems use psutil")
+def test_start_up_line_does_not_import_psutil() -> None:
+    code = (
+        "import sys; from minirospy.runtime.transport.access import Access, listening_lines; "
+        "listening_lines('0.0.0.0', 1, Access()); print('psutil' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
 
 
 class _Stranger(Access):

@@ -1,4 +1,4 @@
-"""runtime/transport/shared_memory: large messages through a ring, over real sockets, and every way back to the socket."""
+"""Large messages through a ring (runtime/transport/ring_sender, ring_receiver), and every way back to the socket."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, SplitFrame, se
 from minirospy.core.wire.ring import Step
 from minirospy.core.wire.tcpros import InterfaceType, subscriber_header
 from minirospy.runtime.node.publication import Publication
-from minirospy.runtime.transport import readers, shared_memory, sockets
+from minirospy.runtime.transport import readers, ring_sender, shared_memory, sockets
 from minirospy.runtime.transport.loop import LoopThread
-from minirospy.runtime.transport.shared_memory import RingReceiver
+from minirospy.runtime.transport.ring_receiver import RingReceiver
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.skipif(
@@ -342,7 +342,7 @@ def test_a_closed_connection_ends_its_memory(mouth: Mouth, is_publishers: bool) 
 
 
 def test_a_quiet_topic_gives_its_memory_back(loop: LoopThread, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
+    monkeypatch.setattr(ring_sender, "QUIET_SECONDS", 0.05)
     mouth = Mouth(loop)
     ear = Ear(mouth.connect())
     count = mouth.warm_up(ear, size=1_000_000)
@@ -372,7 +372,7 @@ def resident_bytes() -> int:
 
 
 def test_a_replaced_ring_gives_its_memory_back(loop: LoopThread, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
+    monkeypatch.setattr(ring_sender, "QUIET_SECONDS", 0.05)
     mouth = Mouth(loop)
     slow, fast = Ear(mouth.connect(name="/slow")), Ear(mouth.connect(name="/fast"))
     count = mouth.warm_up(slow, fast, size=200_000)
@@ -451,7 +451,7 @@ def test_a_killed_subscriber_gives_its_unread_messages_back(
             os.close(os.pidfd_open(os.getpid()))
         except (OSError, AttributeError):
             pytest.skip("pidfd_open is not available here")
-    monkeypatch.setattr(shared_memory, "QUIET_SECONDS", 0.05)
+    monkeypatch.setattr(ring_sender, "QUIET_SECONDS", 0.05)
     size = 200_000
     ear = Ear(mouth.connect(name="/fast"))
     count = mouth.warm_up(ear, size=size)
@@ -708,53 +708,6 @@ def test_a_connection_without_a_ring_says_why(mouth: Mouth, monkeypatch: pytest.
 def test_a_tcp_connection_says_why_it_has_no_ring(is_same_host: bool, why: str) -> None:
     with socket.socket() as sock:
         assert shared_memory.obstacle(sock, is_same_host=is_same_host) == why
-
-
-def open_files() -> set[str]:
-    """Return the open files of this process, except sockets and pipes, which other threads may open."""
-    found = set()
-    for number in os.listdir("/proc/self/fd"):
-        with contextlib.suppress(OSError):
-            found.add(f"{number} {os.readlink(f'/proc/self/fd/{number}')}")
-    return {each for each in found if "memfd:" in each or "eventfd" in each}
-
-
-def test_shared_memory_is_tried_out() -> None:
-    files = open_files()
-    assert shared_memory.try_out() == ""
-    assert not open_files() - files
-
-
-def forbidden(*_: Any) -> Any:
-    raise PermissionError(1, "Operation not permitted")
-
-
-@pytest.mark.parametrize(
-    ("owner", "name", "broken", "why"),
-    [
-        (os, "memfd_create", forbidden, "Operation not permitted"),
-        (os, "eventfd", forbidden, "Operation not permitted"),
-        (os, "posix_fallocate", no_memory, "no space left"),
-        (mmap, "mmap", no_map, "no mapping here"),
-        (RingReceiver, "take_offer", refuse, "a file that another process passes cannot be mapped"),
-        (RingReceiver, "read", lambda *_: b"other bytes", "a message did not arrive as it was sent"),
-    ],
-)
-def test_a_machine_without_shared_memory_is_found_out(
-    owner: Any, name: str, broken: Any, why: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    files = open_files()
-    monkeypatch.setattr(owner, name, broken)
-    assert shared_memory.try_out() == why
-    assert not open_files() - files
-
-
-def test_a_system_that_speaks_german_is_quoted_in_ascii(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_file(*_: Any) -> Any:
-        raise OSError(12, "Zu wenig Speicher verfügbar")
-
-    monkeypatch.setattr(os, "memfd_create", no_file)
-    assert shared_memory.try_out() == "Zu wenig Speicher verf?gbar"
 
 
 # --- peers that lie

@@ -20,7 +20,8 @@ from minirospy.ros.catkin.commands.test_results import Counts, results_below
 from minirospy.ros.rosunit.runner.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.download import download
-from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
+from minirospy.workspace.packages import DIST_PACKAGES
+from minirospy.workspace.plan import Plan, Test
 
 __all__ = ["run_tests"]
 

@@ -23,6 +23,7 @@ CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_V
 """Parameters that every launch sets, as in ROS."""
 
 _START_SECONDS = 60.0
+_POLL_SECONDS = 0.005  # between checks whether the started master responds
 
 
 class LaunchMaster:
@@ -90,7 +91,7 @@ class LaunchMaster:
                 raise MinirospyError(f"the master ended with status {process.exit_code}")
             if time.monotonic() > end:
                 raise MinirospyError(f"the master does not answer at {self._environment.master_uri}")
-            self._pause(0.02)
+            self._pause(_POLL_SECONDS)
 
         if self.run_id:
             # Set the run id explicitly: the launching program may have chosen it, and it names the log folder.

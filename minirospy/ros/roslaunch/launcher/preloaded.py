@@ -116,6 +116,18 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
     _kept.append(area)
 
 
+def read_response() -> None:
+    """Read a response like the master's, which compiles the regular expressions for reading HTTP and XML-RPC.
+
+    Otherwise each node would compile them again, which takes some milliseconds.
+    """
+    from minirospy.core.wire import http, xmlrpc
+
+    (message,) = http.HttpReader().feed(http.serialize_response(xmlrpc.serialize_response([1, "", 0])))
+    assert message.status == 200
+    xmlrpc.parse_response(message.body)
+
+
 def hides_module(folder: str, loaded: set[str]) -> bool:
     """Return whether an import of a top-level module in ``loaded`` could find a file in ``folder`` first."""
     with os.scandir(folder) as entries:
@@ -315,6 +327,7 @@ def main(fd: int) -> Order | None:
     if len(os.listdir("/proc/self/task")) > 1 or "minirospy.client" not in sys.modules:
         # a module has started a thread, or this is real rospy
         return None
+    read_response()
     gc.collect()
     gc.freeze()
     with contextlib.suppress(OSError):

@@ -12,11 +12,9 @@ import queue
 import sys
 import threading
 from collections.abc import Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 from minirospy.base.errors import MasterUnreachableError, RpcError
 from minirospy.introspect.graph import Graph, NodeAddress
-from minirospy.introspect.nodes import forget_node, has_exited
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
@@ -68,6 +66,9 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
     """
     if not nodes:
         return []
+    # Import this, and minirospy.introspect.nodes, here: a launch needs them only after a node has exited.
+    from concurrent.futures import ThreadPoolExecutor
+
     try:
         with Graph(MasterProxy(master_uri, "/roslaunch"), "roslaunch") as graph:
             state = graph.state()
@@ -86,6 +87,8 @@ def main(argv: Sequence[str]) -> int:
 
 
 def _unregister(graph: Graph, node: NodeAddress, state: SystemState) -> str:
+    from minirospy.introspect.nodes import forget_node, has_exited
+
     if not has_exited(graph, node, _ANSWER_SECONDS):
         return ""
     forget_node(graph, node, state)
