@@ -2,6 +2,6 @@
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# This package's modules import ROS 1 messages.
-# If ROS 2 is sourced, the ROS 2 packages with the same names would be found first.
+# The modules in this package import ROS 1 messages.
+# With a sourced ROS 2, Python would otherwise find the ROS 2 packages with the same names first.
 prefer_ros1()
