@@ -68,7 +68,7 @@ class Resource(NamedTuple):
 
 
 class SharedTopic(NamedTuple):
-    """A topic with one type. ``token`` describes its local use.
+    """A topic with a single type, shared with other bridges. ``token`` describes its local use.
 
     ``is_offered`` is True if other bridges publish it, ``is_wanted`` if they subscribe to it.
     """
@@ -85,7 +85,7 @@ class SharedTopic(NamedTuple):
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return two dicts keyed by topic name: the shared topics, and why other remote topics are ignored.
+    """Return two dicts keyed by topic name: the shared topics, and the reasons why other remote topics are ignored.
 
     A remote topic is ignored if its type differs. The local type takes precedence; without one, the first remote type does.
     """
@@ -106,7 +106,7 @@ def shared_topics(
 
 
 def parse_namespace(text: str) -> str:
-    """Return a namespace for keys. Raise BridgeError if ``text`` is not a single chunk."""
+    """Return the namespace used in keys. Raise BridgeError if ``text`` is not a single key chunk."""
     if text != EVERY_NAMESPACE and not _NAMESPACE.fullmatch(text):
         raise BridgeError(
             f"--ros1-keys {text}: is not a namespace of zenoh-bridge-ros1, as * or robot1: letters, digits, _ . and -"
