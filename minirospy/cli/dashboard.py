@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 _MASTER_SECONDS = 1.0  # timeout for connecting to a master, after which the page is served without one
-_OWN_MASTER_SECONDS = 30.0  # the same for a master on loopback, which responds late only if the machine is busy
+_OWN_MASTER_SECONDS = 30.0  # the same for a master on loopback, which is slow only on a busy machine
 
 Fields = Mapping[str, Sequence[str]]  # settings of a view, as in its link
 

@@ -21,7 +21,7 @@ __all__ = ["Line", "Program", "find_command"]
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_MAX_LINES = 20_000  # number of output lines kept: limits the memory for a program that prints in an endless loop
+_MAX_LINES = 20_000  # maximum number of output lines kept, for a program that prints endlessly
 _DIED = re.compile(r"\[([\w/.-]+?)(?:-\d+)?\] process has died \[pid \d+, exit code (-?\d+)")
 _LINE_OF_FILE = re.compile(r'^\s+File "(.+)", line (\d+)')
 _EXCEPTION = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Exit|Interrupt|Warning)?(:|$)")

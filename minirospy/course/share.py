@@ -19,8 +19,8 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["share"]
 
-_POLL_SECONDS = 0.2  # seconds between readings of the pins: changes are missed if an LED blinks faster than 2.5 Hz
-_BEAT_SECONDS = 3.0  # seconds between heartbeats: after three missed ones, the page marks the computer as gone
+_POLL_SECONDS = 0.2  # seconds between pin readings; changes are missed if an LED blinks faster than 2.5 Hz
+_BEAT_SECONDS = 3.0  # seconds between heartbeats; the page marks a computer as gone after missing three
 _ASK_SECONDS = 2.0  # timeout in seconds for calls to a master
 
 

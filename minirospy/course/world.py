@@ -43,7 +43,7 @@ _POLL_SECONDS = 0.02
 LAST_EFFECT_SECONDS = 1.0  # time after a program's exit in which its last actions can still take effect
 _KEPT_MESSAGES = 5000  # messages kept per topic: one minute at 80 Hz
 _STOP_SECONDS = 10.0  # timeout for a program after Ctrl-C
-_LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which itself waits up to 15 s for a node that ignores Ctrl-C
+_LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
 # ROS variables that the tested programs inherit. All others would describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (

@@ -100,7 +100,7 @@ class Simulator:
 
     def start(self) -> None:
         """Advertise the services and add the first turtle."""
-        with self._changing:  # a program that calls /spawn at this moment gets the second turtle, not the first
+        with self._changing:  # a program that calls /spawn meanwhile gets the second turtle
             self._services = [
                 rospy.Service("clear", Empty, self._clear),
                 rospy.Service("reset", Empty, self._reset),
