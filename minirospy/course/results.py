@@ -43,7 +43,7 @@ _MAX_LETTERS = 300  # maximum length of such a sentence
 _MAX_NAME = 60  # maximum length of a student's name
 MAX_KEY = 64  # maximum length of the parameter's last part; the page's classroom.js ignores longer ones
 _MAX_TIME = 4e9  # seconds since 1970, up to the year 2096: time.localtime rejects far larger values
-_SECONDS = 3.0  # timeout for the class's master: a check must not wait for a computer that has left
+_SECONDS = 3.0  # timeout for the class's master, whose computer may have been shut down
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Maximum number of messages in a window without a limit; it bounds the memory of a long measurement."""
+"""Number of messages in a window without a limit: bounds the memory of a long measurement."""
 
 
 _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Statistics of times in seconds: mean, minimum, maximum, standard deviation, and the number of messages."""
+    """Statistics of times, in seconds: mean, minimum, maximum and standard deviation, and the number of messages."""
 
     mean: float
     min: float
@@ -40,12 +40,12 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Return the rate in Hz; the times must be the periods between messages."""
+        """Return the rate in Hz, if the times are the periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 
 class Bandwidth(NamedTuple):
-    """The bandwidth in bytes per second, and statistics of the message sizes."""
+    """The bandwidth in bytes per second, and statistics of the message sizes in bytes."""
 
     rate: float
     mean: float
@@ -55,7 +55,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateWindow:
-    """Measures the periods between the newest ``size`` messages (0: no limit)."""
+    """Measures the periods between messages, for the newest ``size`` messages (0: no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
@@ -69,12 +69,12 @@ class RateWindow:
         if self._last is not None and time >= self._last:
             self._pauses.append(time - self._last)
         elif self._last is not None:
-            # The clock was set back, so earlier measurements cannot be compared with later ones.
+            # The clock was set back, so later times cannot be compared with earlier ones.
             self._pauses.clear()
         self._last = time
 
     def report(self) -> Spread | None:
-        """Return the statistics, or None if no message has arrived since the last report, or too few in total."""
+        """Return the statistics, or None if there are too few messages or none has arrived since the last report."""
         if self._arrived == self._reported or not self._pauses:
             return None
         self._reported = self._arrived
@@ -82,7 +82,7 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """Measures the sizes of the newest ``size`` messages."""
+    """Measures message sizes, for the newest ``size`` messages."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """Measures the delay from stamp to arrival, for the newest ``size`` messages (0: no limit)."""
+    """Measures the delay from a message's stamp to its arrival, for the newest ``size`` messages (0: no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)
