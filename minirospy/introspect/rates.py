@@ -111,7 +111,7 @@ class DelayWindow:
         self._reported = 0
 
     def add(self, time: float, stamp: float) -> None:
-        """Record a message with the stamp ``stamp`` that arrived at ``time``."""
+        """Record a message stamped ``stamp`` that arrived at ``time``, both in seconds."""
         self._arrived += 1
         self._delays.append(time - stamp)
 
@@ -124,7 +124,7 @@ class DelayWindow:
 
 
 def rate_text(reports: Mapping[str, Spread | None]) -> str:
-    """Return the text that `rostopic hz` prints once a second: two lines for a single topic, a table for several."""
+    """Return what `rostopic hz` prints once a second: two lines for a single topic, a table for several."""
     if len(reports) == 1:
         (report,) = reports.values()
         return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
@@ -137,12 +137,12 @@ def rate_text(reports: Mapping[str, Spread | None]) -> str:
 
 
 def delay_text(report: Spread | None) -> str:
-    """Return the text that `rostopic delay` prints once a second."""
+    """Return what `rostopic delay` prints once a second."""
     return f"average delay: {report.mean:.3f}\n\t{_extremes(report)}" if report else _NOTHING
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return the text that `rostopic bw` prints each second: two lines for one topic, a table for several, "" for none."""
+    """Return what `rostopic bw` prints once a second: two lines for one topic, a table for several, "" for none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Format a number of bytes in the unit that suits ``rate``."""
+    """Format a number of bytes, using the unit that suits ``rate``."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 
