@@ -278,7 +278,7 @@ class TopicPublisher:
             pass
 
     def publish(self, message: Message) -> None:
-        """Number the message's header and send the message. Raise MessageException if a value is invalid."""
+        """Set the sequence number in the message's header; send the message. Raise MessageException if a value is invalid."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence

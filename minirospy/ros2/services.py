@@ -153,7 +153,7 @@ class ServiceBridge:
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
-        """Open and close services to match both graphs; return whether any changed."""
+        """Open and close services to match both graphs. Return whether any of them changed."""
         return await self._table.update(await self._wanted(ros1))
 
     async def _wanted(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServiceLink]:
@@ -167,7 +167,7 @@ class ServiceBridge:
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Query a server for its connection header, because the ROS 1 master does not know service types."""
+        """Query a server for its connection header, because the master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -191,7 +191,7 @@ class ServiceBridge:
 
 
 class _InRos1:
-    """A ROS 2 service that the bridge offers in ROS 1."""
+    """A ROS 2 service, offered in ROS 1 by the bridge."""
 
     def __init__(
         self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # Make the running calls fail with an error.
+        # Makes the running calls fail with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -262,7 +262,7 @@ class _InRos1:
         return answered.result()
 
     async def _becomes_ready(self) -> bool:
-        """Wait for the server; return whether it is connected.
+        """Wait briefly for the server; return whether it is connected.
 
         This may take a moment for a service that was just discovered.
         """
@@ -276,7 +276,7 @@ class _InRos1:
 
 
 class _InRos2:
-    """A ROS 1 service that the bridge offers in ROS 2."""
+    """A ROS 1 service, offered in ROS 2 by the bridge."""
 
     def __init__(
         self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
@@ -322,7 +322,7 @@ class _InRos2:
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
-        """Forward a request. Put the response or error into ``answered``, a future that belongs to another thread."""
+        """Forward a request. Set the result or exception of ``answered``, a future that belongs to another thread."""
         try:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:
