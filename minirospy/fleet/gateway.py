@@ -93,7 +93,7 @@ class Gateway:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet if necessary, and forward topics and services until :meth:`close`.
+        """Connect to the fleet if necessary, and start to forward topics and services, until :meth:`close`.
 
         Raise BridgeError if the fleet cannot be joined, MasterUnreachableError or RpcError if a call to the master fails,
         or ROSInterruptException if the node is shut down first.

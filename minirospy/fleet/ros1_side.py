@@ -116,7 +116,7 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Forward topics and services until :meth:`close`.
+        """Start to forward topics and services, until :meth:`close`.
 
         Raise BridgeError if another node on this master already uses these keys, or MasterUnreachableError or RpcError if a
         call to the master fails.

@@ -150,7 +150,7 @@ class Ros2Bridge:
         self._is_closed = False
 
     async def start(self) -> None:
-        """Bridge both sides until :meth:`close`.
+        """Start to bridge both sides, until :meth:`close`.
 
         Raise MasterUnreachableError or RpcError if a call to the master fails.
         """

@@ -21,7 +21,7 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts in seconds for stopping a recording."""
+"""Timeouts in seconds for stopping a recording. After SIGINT, rosbag completes the file, possibly on a slow disk."""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Timeouts in seconds for stopping while no file is open.

@@ -457,7 +457,7 @@ def _cancel_action_goal(fields: Fields, id_: Id) -> Event:
 
 
 def _action(fields: Fields) -> tuple[str, Id]:
-    """Return an action's name, and the id that may be appended to it."""
+    """Return an action's name, and the id that a client may have appended to it."""
     action: str = _text(fields, "action")
     name, _, old_id = action.partition("#")
     return name, old_id or None
@@ -515,7 +515,7 @@ OPERATIONS = (
 def encode(
     fields: Fields, compression: Compression = "none", dump: Callable[[object], str] = dump_json
 ) -> str | bytes:
-    """Encode a message: as a string, or as bytes for CBOR. ``dump`` converts a value to JSON."""
+    """Encode a message as a string or, for CBOR, as bytes. ``dump`` encodes a value as JSON."""
     if compression in ("cbor", "cbor-raw"):
         return encode_cbor(fields)
     text = dump(fields)
@@ -530,7 +530,7 @@ def encode_messages(
     fragment_size: int | None,
     dump: Callable[[object], str] = dump_json,
 ) -> list[str | bytes]:
-    """Return the messages to send: the message itself, or its fragments if it is a string and a size is given."""
+    """Encode a message as one or more messages to send: fragments if it is a string and a fragment size is given."""
     data = encode(fields, compression, dump)
     if isinstance(data, bytes) or not fragment_size:
         return [data]
@@ -538,7 +538,7 @@ def encode_messages(
 
 
 def fragments(text: str, size: int, id_: Id) -> list[str]:
-    """Split text into fragments of ``size`` characters. Text that is not longer than that is returned as is.
+    """Split text into fragments of at most ``size`` characters. Return text of at most this length unchanged.
 
     The fragments are longer if there would be too many.
     """
@@ -568,7 +568,7 @@ def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
 
 
 def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
-    """Return the response to a call; if ``result`` is False, ``values`` is an error message."""
+    """Return the response to a service call. If ``result`` is False, ``values`` is an error message."""
     fields: dict[str, object] = {
         "op": "service_response",
         "service": service,
@@ -579,5 +579,5 @@ def service_response(service: str, values: object, id_: Id, *, result: bool) -> 
 
 
 def service_call(service: str, arguments: object, id_: str) -> dict[str, object]:
-    """Return the message that calls a service offered by the client."""
+    """Return the message that calls a client's service."""
     return {"op": "call_service", "id": id_, "service": service, "args": arguments}
