@@ -134,32 +134,32 @@ class FairTurns:
         self._new_expected = slice_  # expected seconds of a new client's job
         self._interactive = _FairQueue()
         self._bulk = _FairQueue()
-        self._bulk_credit = 0.0  # seconds owed to bulk clients, which go first while this is at least a slice
+        self._bulk_credit = 0.0  # seconds owed to bulk clients, which go first if this is at least a slice
         self._numbers = itertools.count()
-        self._is_running = False  # True while a client's work is running
+        self._is_running = False  # whether a client's work is running
         self._is_scheduled = False  # True from call_soon() until the callback runs
 
     def __len__(self) -> int:
-        """Return the number of clients whose work is queued."""
+        """Return the number of clients with queued work."""
         queues = self._interactive, self._bulk
         return sum(not entry.share.is_closed for queue in queues for entry in queue.entries)
 
     @property
     def is_busy(self) -> bool:
-        """Return whether a client is waiting for its turn."""
+        """Return whether any client is waiting for its turn."""
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
-        """Add a client; return its share, which gives it no advantage over clients that have been idle."""
+        """Add a client; return its share. It has no advantage over clients that have been idle."""
         self._interactive.update()
         return Share(work, self._interactive)
 
     def leave(self, share: Share) -> None:
-        """Stop running the client's work. Idempotent."""
+        """Stop running the work of a client. Idempotent."""
         share.is_closed = True
 
     def start(self, share: Share) -> bool:
-        """Run a client's work now or when it is its turn; return whether work is left. No effect while the client is queued."""
+        """Run a client's work, now or in its turn; return whether any work is left. No effect if the client is already queued."""
         if share.is_queued or share.is_closed:
             return share.is_queued
         if self._is_running or self.is_busy or not self._may_start_now():
@@ -182,7 +182,7 @@ class FairTurns:
         queue = self._queue_of(share)
         queue.update()
         if queue is not share.queue:
-            # A tag of one queue has no meaning in the other.
+            # The tags of one queue have no meaning in the other.
             share.queue = queue
             share.tag = queue.served
         share.is_queued = True
@@ -200,7 +200,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If several clients would end at the same tag, serve the one that has used the least time first.
+        # If several jobs would end at the same tag, the client that has used the least time comes first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 
@@ -215,7 +215,7 @@ class FairTurns:
             queue = self._next_queue()
             end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
-                # A new client's work is now expected to take longer than when this work was queued, so requeue it.
+                # A new client's job is now expected to take longer than when it was queued, so queue it again.
                 self._push(share, start)
                 continue
             share.is_queued = False
@@ -235,12 +235,12 @@ class FairTurns:
 
     def _update_bulk_credit(self, queue: _FairQueue, seconds: float) -> None:
         change = -seconds * (1 - BULK_SHARE) if queue is self._bulk else seconds * BULK_SHARE
-        # Bound the credit from above and below, so that time used long ago does not count.
+        # Limit the credit in both directions, so that time used long ago does not count.
         most = self._turn_seconds
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 
     def _run(self, share: Share, start: float) -> bool:
-        """Run some of a client's work, which starts at the tag ``start``. Return whether any is left."""
+        """Run some of a client's work, starting at the tag ``start``. Return whether any work is left."""
         if share.is_closed:
             return False
         end, before = self._clock() + self._slice, self._meter()
@@ -268,7 +268,7 @@ class FairTurns:
 
 
 def cpu_meter() -> Callable[[], float]:
-    """Return the clock of this thread's CPU time, or the monotonic clock if the CPU clock is too coarse (Windows: 16 ms).
+    """Return the clock of this thread's CPU time or, if that is too coarse (16 ms on Windows), the monotonic clock.
 
     By the monotonic clock, a client would also pay for other processes that use the processor during its work.
     """
