@@ -263,8 +263,7 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The sequence numbers restart when the robot reopens the topic,
-            # so a step back or a huge step forward does not mean lost messages.
+            # Ignore a step back or a huge step forward: the sequence numbers restart when the robot reopens the topic.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()

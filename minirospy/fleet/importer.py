@@ -435,8 +435,7 @@ class Importer:
             answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
             leaving = asyncio.ensure_future(left.wait())
             try:
-                # Stop waiting as soon as the robot has left.
-                # Zenoh itself ends a query only when the robot's token disappears, which can take minutes.
+                # Stop waiting as soon as the robot has left: Zenoh itself may take minutes to end the query.
                 await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
                 if not answering.done():
                     raise ServiceException(f"robot [{token.robot}] has left during the call")

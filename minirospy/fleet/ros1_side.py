@@ -83,8 +83,7 @@ class Ros1Side:
 
         ``hidden`` contains the names of robots whose topics are imported; ``namespace`` is the keys' namespace.
         """
-        # Exclude /rosout_agg, which repeats /rosout:
-        # forwarding both would return each log message to its own master.
+        # Exclude /rosout_agg, which repeats /rosout: forwarding both would return each log message to its own master.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace

@@ -112,9 +112,8 @@ class Throttle:
         """Return whether a message may be sent at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time instead of the current time:
-        # otherwise, a limit of 10 Hz would pass only 7.5 of 30 messages per second.
-        # After a pause, restart from the current time.
+        # Add the period to the due time: starting from ``now``, a limit of 10 Hz would pass only 7.5 of 30 messages per second.
+        # After a pause, the due time would be in the past, so use ``now``.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period

@@ -227,8 +227,8 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     # Use the node's name as caller_id, because the master removes only registrations of the caller.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # Topics are unregistered by the node's URI, services by their own URI.
-        # If the node's name still has the same URI after the services were looked up, they do not belong to a newer node.
+        # Topics are unregistered by the node's URI, services by the service's own URI.
+        # If the node's URI is unchanged after the services were looked up, these services do not belong to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:

@@ -170,8 +170,8 @@ def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Count
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # rospy's rows end with the messages and a connected flag,
-                # roscpp's with the messages' bytes, the messages and the flag.
+                # Each row ends with (messages, is connected) in rospy, and with (size of the messages,
+                # messages, is connected) in roscpp.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

@@ -136,8 +136,7 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Create the feedback subscription before the client,
-        # so that a server that has discovered the whole client has discovered the subscription, too.
+        # Create the feedback subscription before the client: a server that has discovered the client then knows both.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -319,8 +318,8 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # rclpy's constructor adds the server to the executor before it creates the logger,
-        # so the executor may call the server with a goal while there is no logger.
+        # Set the logger first: rclpy's constructor creates it only after adding the server to the executor,
+        # which may call the server.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,

@@ -303,8 +303,7 @@ def configured(options: NetworkOptions) -> Config:
         put("mode", "router" if listens else "peer" if options.scouts else "client")
     mode = json.loads(config.get_json("mode"))
     put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router tries to reconnect forever.
-    # A client without a router fails to open, and its caller tries again.
+    # A gateway reconnects to its router forever. A client without a router fails to open, and its caller tries again.
     for key, value in (
         ("connect/timeout_ms", CONNECT_MS if mode == "client" else -1),
         ("connect/exit_on_failure", mode == "client"),
@@ -313,8 +312,7 @@ def configured(options: NetworkOptions) -> Config:
         ("transport/unicast/accept_pending", 1000),
         # Keep-alive messages per lease of 10 s, one fewer than Zenoh's default, because TCP retransmits lost data.
         ("transport/link/tx/keep_alive", 3),
-        # Data in the kernel's buffer is sent before data of higher priority.
-        # With this buffer size, that takes about 0.3 s at 4 Mbit/s instead of 1.3 s.
+        # A small send buffer delays high-priority data less: about 0.3 s at 4 Mbit/s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
         # Do not send large messages to local gateways through /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),

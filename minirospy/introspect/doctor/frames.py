@@ -74,8 +74,7 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers stopped together with the node, so ``seen`` no longer changes.
-    # With simulated time, stamps cannot be compared with arrival times.
+    # The node's workers have stopped, so ``seen`` is final. In simulated time, stamps and arrival times cannot be compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 

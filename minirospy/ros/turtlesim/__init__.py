@@ -6,5 +6,5 @@ Source: http://wiki.ros.org/turtlesim.
 from minirospy.base.ros1_imports import prefer_ros1
 
 # The modules in this package import ROS 1 messages.
-# With a sourced ROS 2, Python would otherwise find the ROS 2 packages with the same names first.
+# Otherwise, if ROS 2 is sourced, Python would first find the ROS 2 message packages with the same names.
 prefer_ros1()

@@ -246,8 +246,7 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # A step publishes all messages with the same time.
-        # After a seek, the messages at the current time have been shown but not published.
+        # A step publishes all messages with the same time. After a seek, those at the current time have not been published yet.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:

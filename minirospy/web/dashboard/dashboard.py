@@ -73,8 +73,7 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         self.codes.close()
         async with AsyncExitStack() as closing:
-            # Close the parts in reverse order, each of them even if another fails.
-            # Players use the bridge's graph until their sessions end.
+            # Close all parts, in reverse order, even if one fails: players use the bridge until their sessions end.
             for part in (
                 self._tools,
                 self._board,

@@ -287,8 +287,7 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # Protects the attributes below: a command, sent on the loop,
-        # and the guard's zero velocity must not be published concurrently.
+        # Protects the attributes below: a command and the guard's zero velocity must not be published concurrently.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))

@@ -321,9 +321,8 @@ class JsonEndpoint(Generic[_S]):
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
     """Wait for an event, until the loop's clock is past ``end``."""
-    # Do not use asyncio.wait_for, which may lose a cancellation that coincides with the event before Python 3.12.
-    # Loops may run timers early by the clock's resolution, so add it:
-    # otherwise, a caller that compares times would spin until the clock advances.
+    # Do not use asyncio.wait_for: before Python 3.12, it may lose a cancellation that coincides with the event.
+    # Loops may run timers early by the clock's resolution: without adding it, callers that compare times would spin.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + CLOCK_SECONDS, event.set) if end < math.inf else None
     try:

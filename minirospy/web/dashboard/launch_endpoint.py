@@ -129,8 +129,8 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return only complete lines, because the data may end within a character.
-        # Exceptions are very long lines, and the last line after the node has exited.
+        # Return complete lines, except for a very long line or the last line of an exited node: the data may
+        # end within a character.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]

@@ -370,8 +370,7 @@ class Connection:
     def framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
-            # Queue at most one pong, even for a client that does not read:
-            # only the newest ping needs one (RFC 6455, 5.5.3).
+            # Queue at most one pong, even if the client does not read: only the newest ping needs one (RFC 6455, 5.5.3).
             self.stream(_PONG, (frame_head(_PONG, len(event.data)), event.data), newest_only=True)
         elif event:
             self._deliver(event)
@@ -418,8 +417,8 @@ class Connection:
     def _parse_head(self) -> None:
         try:
             request = self._websocket.next_request()
-            # Raises ValueError if the target or Origin is not a URL, or the query has a thousand fields:
-            # refuse the client, so that it does not remain connected.
+            # A ValueError, for an invalid target or Origin or a query with a thousand fields, must not leave
+            # the client connected.
             found = self._admitted(read_head(request)) if request else None
         except ValueError as error:
             found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")

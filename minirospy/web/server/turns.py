@@ -37,9 +37,9 @@ NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which a client's expected time per job decays after a shorter job
 IMMEDIATE_SHARE = 0.5  # fraction of the time that work may use without being queued
 # Maximum length of an interactive client's burst of work, in slices (1 ms in total).
-# A request takes 0.1 to 0.5 ms; 64 kB of empty frames take 100 ms.
-# A new client starts with one slice, and gets another after each short burst.
-# If 250 new clients flood the server, each gets one slice, and then the server's other clients come first.
+# A request takes 0.1 to 0.5 ms to handle; 64 kB of empty frames take 100 ms.
+# A new client starts with one slice, and gets one more after each short burst.
+# Therefore, if 250 new clients flood the server, its other clients are served after one slice for each of them.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients, which lets interactive clients use 200 ms before bulk clients get another slice
 MAX_DEBT_TURNS = 10
@@ -235,7 +235,7 @@ class FairTurns:
 
     def _update_bulk_credit(self, queue: _FairQueue, seconds: float) -> None:
         change = -seconds * (1 - BULK_SHARE) if queue is self._bulk else seconds * BULK_SHARE
-        # Limit the credit in both directions, so that time used long ago does not count.
+        # Clamp the credit, so that it does not accumulate over time.
         most = self._turn_seconds
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 

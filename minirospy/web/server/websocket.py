@@ -181,6 +181,5 @@ def _select(
 
 
 # The library logs frames, and headers with tokens, at level DEBUG.
-# This logger is outside the logging hierarchy and drops everything below CRITICAL,
-# so these messages never appear, whatever the logging configuration.
+# These must never be logged, so use a separate logger that drops everything below CRITICAL.
 _QUIET = logging.Logger(__name__, logging.CRITICAL)
