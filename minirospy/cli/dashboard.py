@@ -468,7 +468,7 @@ async def _is_reachable(uri: str) -> bool:
 
 
 def end_with_stdin() -> None:
-    """Start a thread that ends this process, as by SIGTERM, when its standard input closes."""
+    """Start a thread that terminates this process, like SIGTERM, when its standard input is closed."""
     import os
     import signal
     import threading

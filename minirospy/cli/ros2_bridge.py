@@ -140,7 +140,7 @@ def _ros2_bridge(
 
     async def start(node: Node) -> Ros2Bridge | _Listing:
         loop = asyncio.get_running_loop()
-        # Open Zenoh in a thread: it blocks while a router does not respond.
+        # Open Zenoh in a thread, because that blocks while a router does not respond.
         opened = loop.run_in_executor(None, open_side, BRIDGE_PREFIX) if zenoh else None
         side = await opened if opened else open_side(BRIDGE_PREFIX)
         bridge = Ros2Bridge(node, side, options, catalogue)

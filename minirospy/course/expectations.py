@@ -32,7 +32,7 @@ __all__ = ["EXPECTATIONS", "Outcome", "Trial", "expect"]
 
 _LOG_LINE = re.compile(r"\[ *(?:DEBUG|INFO|WARN|ERROR|FATAL)\] \[(?:WallTime: )?(\d+\.\d+)[^\]]*\]:? (.*)")
 _CLOSE = 0.01  # relative tolerance when floating-point numbers are compared
-_RATE_SECONDS = 3.0  # default time over which a rate is measured
+_RATE_SECONDS = 3.0  # seconds over which a rate is measured, unless the exercise specifies them
 
 
 class Outcome(NamedTuple):

@@ -123,14 +123,14 @@ class ServiceToken(NamedTuple):
 
 
 class Want(NamedTuple):
-    """A reader's request for a topic that its local nodes subscribe to."""
+    """A request for a topic by another gateway (the reader) whose local nodes subscribe to it."""
 
     topic: str
     reader: str
 
 
 class Offer(NamedTuple):
-    """A writer's offer to publish a topic that the robot subscribes to."""
+    """An offer of messages for a topic by another gateway (the writer) whose local nodes publish it."""
 
     topic: str
     writer: str
@@ -261,12 +261,12 @@ def parse_service(key: str) -> ServiceToken | None:
 
 
 def want_key(robot: str, gateway: str, want: Want) -> str:
-    """Return the key of a reader's token."""
+    """Return the key of the token with which a gateway requests a topic from a robot."""
     return f"{ROOT}/want/{robot}/{gateway}/{mangled(want.topic)}/{want.reader}"
 
 
 def parse_want(key: str) -> Want | None:
-    """Parse the key of a reader's token."""
+    """Parse the key of a token with which a gateway requests a topic."""
     match _chunks(key, "want"):
         case [_, _, topic, reader]:
             name = unmangled(topic)
@@ -276,7 +276,7 @@ def parse_want(key: str) -> Want | None:
 
 
 def offer_key(robot: str, gateway: str, offer: Offer) -> str:
-    """Return the key of a writer's token."""
+    """Return the key of the token with which a gateway offers a robot messages for a topic."""
     flags = "l" if offer.is_latched else "-"
     type_ = mangled(offer.type)
     return (
@@ -285,7 +285,7 @@ def offer_key(robot: str, gateway: str, offer: Offer) -> str:
 
 
 def parse_offer(key: str) -> Offer | None:
-    """Parse the key of a writer's token."""
+    """Parse the key of a token with which a gateway offers messages for a topic."""
     match _chunks(key, "offer"):
         case [_, _, topic, writer, type_, md5sum, flags]:
             name = unmangled(topic)

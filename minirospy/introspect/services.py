@@ -47,7 +47,7 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and its providers, of which the one registered last receives the calls."""
+    """A service and its providers. The provider registered last receives the calls."""
 
     name: str
     nodes: tuple[str, ...]

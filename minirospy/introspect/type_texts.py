@@ -99,7 +99,7 @@ class TypeTexts:
             with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
                 header = await self.header_of(topic, publisher)
                 text = header.get("message_definition", "")
-                # An empty definition is valid only for a message without fields, which has this md5sum.
+                # An empty definition is valid only for a message without fields, which always has this md5sum.
                 if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":
                     return InterfaceType(header["type"], header["md5sum"], text)
         return None

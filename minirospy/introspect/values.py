@@ -186,7 +186,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML parses an unquoted word as a string: it has only letters, digits, / and _, and no special meaning."""
+    """Return whether YAML reads an unquoted word as a string: only letters, digits, / and _, without a special meaning."""
     return (
         len(word) > 1
         and word.isascii()

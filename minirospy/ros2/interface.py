@@ -63,7 +63,7 @@ class Ros2Probe(Protocol):
 
 
 class Reachable(Protocol):
-    """A client of a service or an action. Methods may be called from any thread."""
+    """A client for a service or an action. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
@@ -78,7 +78,7 @@ class Reachable(Protocol):
 
 
 class Ros2Client(Reachable, Protocol):
-    """A client of a service. Methods may be called from any thread."""
+    """A client for a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
         """Send a request as CDR; return a future for the response as CDR, which may fail with BridgeError."""
@@ -96,7 +96,7 @@ class Ros2Goal(Protocol):
 
 
 class Ros2ActionClient(Reachable, Protocol):
-    """A client of an action. Methods may be called from any thread."""
+    """A client for an action. Methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return a future for the accepted goal, or for None if the goal is rejected.
@@ -175,7 +175,7 @@ class Ros2Side(Protocol):
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service. A thread calls ``answer`` with each request as CDR; it returns a future for the response.
+        """Offer a service. A thread calls ``answer`` with each request as CDR; ``answer`` returns a future for the response.
 
         The call fails if the future raises MinirospyError.
         """

@@ -22,7 +22,7 @@ _O = TypeVar("_O", bound="OpenLink")
 
 
 class OpenLink(Protocol):
-    """A link that forwards messages, calls or goals from :meth:`open` to :meth:`close`, which is called in any case."""
+    """A link that forwards messages, calls or goals from :meth:`open` to :meth:`close`. ``close`` is always called."""
 
     async def open(self) -> None: ...
 

@@ -333,7 +333,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service that the bridge offers. It is excluded from the services of other nodes until it is closed."""
+    """A service that the bridge offers. Until closed, it is not listed among the services of other nodes."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls

@@ -84,7 +84,7 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # The last message of each publisher, keyed by the id() of its connection header, of which each connection has one.
+        # The last message of each publisher, keyed by the id() of the connection header; each connection has one header object.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
         self._has_connected = asyncio.Event()  # set when a publisher has connected; cleared before a wait

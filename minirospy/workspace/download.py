@@ -57,7 +57,7 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file. It gets its final name only when it is complete."""
+    """Download a file under a temporary name, and rename it when it is complete."""
     # Import this here, because it takes as long as a whole build without downloads.
     from http.client import HTTPException
     from urllib.request import Request, urlopen

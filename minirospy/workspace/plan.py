@@ -66,7 +66,7 @@ _BEFORE = {
 }
 """Commands that catkin requires before certain other commands. The order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
-"""Packages that define CMake's message macros, of which one must be found before the macros are used."""
+"""Packages that define CMake's message macros. CMake must find one of them before the macros are used."""
 _CMAKE_VERSION = "3.25.1"  # CMake version that CMakeLists.txt files see
 
 

@@ -116,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute: those that were not set are empty classes."""
+    """A module that has every attribute. Attributes that were not set are empty classes."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):

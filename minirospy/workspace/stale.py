@@ -13,7 +13,7 @@ _SEPARATOR = "=" * 80  # precedes each nested type's definition in a full defini
 
 
 def workspace_of(package: Path) -> Path | None:
-    """Return the workspace, with a ``devel`` folder, whose ``src`` contains a package, or None."""
+    """Return the workspace that has the package in ``src`` and also has a ``devel`` folder, or None."""
     for folder in package.parents:
         if folder.name == "src" and (folder.parent / "devel").is_dir():
             return folder.parent

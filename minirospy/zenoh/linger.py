@@ -53,7 +53,7 @@ class LingerRemover:
 
 
 def _removes(number: int, file: os.stat_result) -> bool:
-    """Remove SO_LINGER from a socket if Zenoh has set it; return whether this was the case."""
+    """Remove SO_LINGER from a socket if Zenoh has set it; return whether it was removed."""
     if not stat.S_ISSOCK(file.st_mode):
         return False
     with socket.socket(fileno=os.dup(number)) as sock:

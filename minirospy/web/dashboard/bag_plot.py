@@ -142,7 +142,7 @@ def _read(
             subtrahend = bag_series.field_path(
                 minus.path, {each.topic for each in other.connections.values()}
             )
-            # Read the subtrahend beyond the range's end, as far as the difference needs it.
+            # Read the subtrahend beyond both ends of the range, as needed for the difference.
             before = None if start is None else _start_before(other, subtrahend, start, on_time)
             around = bag_series.points(other, [subtrahend], before, None, on_time)
             difference = bag_series.differences((point for _, point in found), (point for _, point in around))

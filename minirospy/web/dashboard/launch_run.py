@@ -28,7 +28,7 @@ _MAX_LINES = 2000
 
 
 class NodeState(NamedTuple):
-    """A node in a launch: starting, running, ending, exited (with ``status``), failed (it could not be started) or stopped.
+    """The state of a node in a launch: starting, running, ending, exited (with ``status``), failed (to start) or stopped.
 
     ``starts``: the number of starts; ``respawns``: whether it is restarted when it exits.
     """
@@ -43,7 +43,7 @@ class NodeState(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """A launch's state: starting, running, stopping or ended. ``error`` is the error that ended it, or ""."""
+    """The state of a launch: starting, running, stopping or ended. ``error`` is the error that ended it, or ""."""
 
     id: int
     package: str

@@ -120,7 +120,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return the type of each topic as a dict; it is ``*`` if all subscribers of a topic accept any type."""
+        """Return a dict from topic to type. The type is ``*`` if all subscribers of a topic accept any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 

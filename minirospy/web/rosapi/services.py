@@ -81,7 +81,7 @@ _ACTION_TOPICS = ("cancel", "feedback", "goal", "result", "status")
 
 
 class Rosapi:
-    """Provides the ``/rosapi/...`` services on a node. They report only names that the filters allow."""
+    """Provides the ``/rosapi/...`` services on a node. The services report only names that the filters allow."""
 
     def __init__(self, node: Node, filters: Filters | None = None) -> None:
         self.node = node

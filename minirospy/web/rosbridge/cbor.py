@@ -30,7 +30,7 @@ TYPED_ARRAYS = {
 """Dict from element type to (tag, format character) of its arrays."""
 
 _MAX_VALUES = 1_000_000
-"""Maximum number of values in a client's message, in which a tagged array counts as one."""
+"""Maximum number of values in a client's message. A tagged array counts as one value."""
 
 _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
 

@@ -253,7 +253,7 @@ class RosbridgeSession:
         except REFUSALS as error:
             self._failed(event, error)
             return None
-        # If a fragment has completed an operation, that is a separate operation with its own event.
+        # If a fragment completes an operation, this operation has its own event.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:

@@ -417,8 +417,7 @@ class Connection:
     def _parse_head(self) -> None:
         try:
             request = self._websocket.next_request()
-            # A ValueError, for an invalid target or Origin or a query with a thousand fields, must not leave
-            # the client connected.
+            # A ValueError (invalid target or Origin, or a query with a thousand fields) must not leave the client connected.
             found = self._admitted(read_head(request)) if request else None
         except ValueError as error:
             found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")

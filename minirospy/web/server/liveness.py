@@ -44,7 +44,7 @@ class Liveness:
         """Return what to do with the client now."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
-        # Only an unanswered ping counts: after a suspension of the machine, the last data is old in any case.
+        # After a suspension of the machine, the last data is old even if no ping is unanswered, so check for a ping.
         if self._is_pinged and now - self.received > self._silent_seconds:
             return Verdict.SILENT
         if is_full:

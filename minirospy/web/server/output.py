@@ -43,7 +43,7 @@ class Output:
         self._loop = loop
         self._on_written = on_written
         self._file: FileSender | None = None  # the file that is being sent
-        # pieces that the pipe has not sent yet, of which the client's share counts the large ones
+        # pieces that the pipe has not sent yet; the client's share counts only the large ones
         self._in_pipe: list[Piece] = []
         self._is_scheduled = False  # set by schedule() until the next iteration of the loop
         self._is_closing = False  # set by close_when_sent()

@@ -69,7 +69,7 @@ class Share:
 
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
-        self.queue = queue  # the queue in which the client is: that of interactive or of bulk clients
+        self.queue = queue  # the queue that contains the client: interactive or bulk
         # seconds used, at least the queue's tag when the client last became active
         self.tag = queue.served
         self.weight = 1.0  # set when the client's rights are known
@@ -150,7 +150,7 @@ class FairTurns:
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
-        """Add a client; return its share. It has no advantage over clients that have been idle."""
+        """Add a client; return its share. Clients that have been idle have no disadvantage compared with the new one."""
         self._interactive.update()
         return Share(work, self._interactive)
 

@@ -127,7 +127,7 @@ class WebSocket:
         return len(self._frames.reader.buffer) + len(self._fragments)
 
     def discard_unfinished(self) -> None:
-        """Discard what has been received of incomplete frames and messages."""
+        """Discard the received parts of incomplete frames and messages."""
         self._frames.reader.buffer.clear()
         self._fragments.clear()
 

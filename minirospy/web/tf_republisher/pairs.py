@@ -31,7 +31,7 @@ class FramePair:
         self._sent: Transform | None = None
 
     def is_to_be_sent(self, transform: Transform) -> bool:
-        """Return whether a transform differs enough from the one sent last; if so, record it as sent."""
+        """Return whether a transform differs enough from the last one that was sent. If so, record it as sent."""
         if not (
             self._sent is None
             or not self._angle

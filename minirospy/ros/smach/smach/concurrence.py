@@ -39,7 +39,7 @@ class Concurrence(Container):
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
         child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
     ) -> None:
-        """Create the container. ``outcome_map`` maps an outcome to a dict from label to that state's outcome.
+        """Create the container. ``outcome_map`` maps each outcome of the container to a dict {label: outcome of that state}.
 
         ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states).
         If it returns a true value, the other states are preempted.

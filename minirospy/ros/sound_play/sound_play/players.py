@@ -24,7 +24,7 @@ def _powershell(script: str) -> list[str]:
     return ["-NoProfile", "-NonInteractive", "-Command", script]
 
 
-# The file is the last argument, except for PowerShell, whose script contains it.
+# The file is the last argument, except in the PowerShell command, where the script contains it.
 PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
     "paplay": lambda file, volume: [f"--volume={round(volume * 65536)}", file],
     "pw-play": lambda file, volume: [f"--volume={volume:.3f}", file],

@@ -84,7 +84,7 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArra
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, float, float]:
-    """Return the three Euler angles of a rotation matrix, 3x3 or larger. They are not unique; one solution is returned.
+    """Return three Euler angles for a rotation matrix, 3x3 or larger. If there are several solutions, return one.
 
     Raise KeyError if ``axes`` is unknown.
     """
@@ -134,7 +134,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
 
 
 def rotation_rows(quaternion: Sequence[float] | NDArray[numpy.float64]) -> list[list[float]]:
-    """Return the rows of a quaternion's 3x3 matrix. It need not be normalized; a zero quaternion gives the identity."""
+    """Return the rows of the 3x3 matrix for a quaternion of any length; a zero quaternion gives the identity."""
     x, y, z, w = (float(each) for each in quaternion[:4])
     square = x * x + y * y + z * z + w * w
     if square < EPSILON:
