@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 _MASTER_SECONDS = 1.0  # timeout for connecting to a master, after which the page is served without one
-_OWN_MASTER_SECONDS = 30.0  # the same for a master on loopback, which is slow only on a busy machine
+_OWN_MASTER_SECONDS = 30.0  # timeout for a master on loopback, which is slow only on a busy machine
 
-Fields = Mapping[str, Sequence[str]]  # settings of a view, as in its link
+Fields = Mapping[str, Sequence[str]]  # a view's settings, as written in its link
 
 
 class Serving(NamedTuple):

@@ -20,7 +20,7 @@ from minirospy.course.world import World
 __all__ = ["Finding", "Report", "check", "words_of"]
 
 START_SECONDS = 15.0  # timeout for a node to register, on a slow laptop with a virus scanner
-OWN_START_SECONDS = 60.0  # the same for the exercise's own programs, which the check needs
+OWN_START_SECONDS = 60.0  # timeout for a program of the exercise itself, without which nothing is checked
 EXIT_SECONDS = 1.0  # time between a failed program's traceback and its exit
 _LAST_LINES = 8  # number of lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # time that `click` holds a button: more than two periods of 10 Hz polling

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 __all__ = ["Arrival", "World"]
 
 _POLL_SECONDS = 0.02
-LAST_EFFECT_SECONDS = 1.0  # after this, nothing that a program did before its exit can still have an effect
+LAST_EFFECT_SECONDS = 1.0  # seconds after a program's exit in which its last actions can still take effect
 _KEPT_MESSAGES = 5000  # messages kept per topic: one minute at 80 Hz
 _STOP_SECONDS = 10.0  # timeout for a program after Ctrl-C
-_LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
+_LAUNCH_STOP_SECONDS = 25.0  # timeout for roslaunch, which itself gives a node up to 15 s after Ctrl-C
 # ROS variables that the tested programs inherit. All others would describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (
@@ -164,7 +164,7 @@ class World:
             if needs_work and self._work_has_ended():
                 end = min(end, time.monotonic() + LAST_EFFECT_SECONDS * self.patience)
             if time.monotonic() >= end:
-                # Call it once more, because the last poll may be long ago on a busy machine.
+                # Call ``holds`` once more, because the last poll may be long ago on a busy machine.
                 return holds()
             time.sleep(_POLL_SECONDS)
         return True

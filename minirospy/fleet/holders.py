@@ -14,7 +14,7 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # equals Zenoh's default lease, after which it closes a silent link
+HOLD_SECONDS = 10.0  # seconds to hold a name: Zenoh's default lease, after which it closes a silent link
 # maximum number of held names of robots that have left; limited because peers choose the names
 MAX_HOLDS = 5_000
 

@@ -297,7 +297,7 @@ class FleetNetwork:
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # To a query with wildcards, a peer replies under its own key.
+        # A peer replies under its own key to a query with wildcards.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:

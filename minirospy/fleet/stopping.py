@@ -28,7 +28,7 @@ _HEADER = 16
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the message that commands zero velocity in place of ``body``, or None if that is already zero or invalid."""
+    """Return ``body`` with all velocities set to zero, or None if they already are zero or ``body`` is invalid."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -144,7 +144,7 @@ class CommandStream:
         )
 
     def _stop(self) -> None:
-        """Publish zero velocity if a stream has ended with another velocity. The caller must hold the lock."""
+        """Publish zero velocity if a stream has ended with a nonzero velocity. The caller must hold the lock."""
         rest, is_stream = self._rest, self._deadline < math.inf
         self._rest, self._deadline = None, math.inf
         if rest is not None and is_stream:

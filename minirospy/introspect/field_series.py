@@ -45,7 +45,7 @@ class Slice(NamedTuple):
 
 
 class Named(NamedTuple):
-    """An array element selected by name: the element's index is that of ``name`` in the message's array ``name``."""
+    """An array element selected by name: the message's array of strings ``name`` contains its name at the same index."""
 
     name: str
 

@@ -58,7 +58,7 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """Return the types that match ``name``: with a package, only itself; without, all types of that name.
+        """Return the types that match ``name``: ``pkg/Name`` matches one type, ``Name`` the types of this name in all packages.
 
         Raise NotFoundError with similar names if no type matches.
         """

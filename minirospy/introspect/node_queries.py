@@ -84,7 +84,7 @@ class NodeQueries(Generic[_Key, _Found]):
             is_late = True
 
     def refresh(self, key: _Key) -> None:
-        """Query a key again, because its node may respond differently now. Keep the old result until then.
+        """Query a key again, because its node may respond differently now. Keep the old result until the node has responded.
 
         ``arrived_late`` is called if the new result differs from the old one.
         """

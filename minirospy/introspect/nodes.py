@@ -104,7 +104,7 @@ def node_hosts(graph: Graph) -> dict[str, str]:
 
 
 def nodes_on(graph: Graph, machine: str) -> list[str]:
-    """Return the nodes on the machine with a name or address. Raise NotFoundError if there are none."""
+    """Return the nodes on a machine, given by its name or address. Raise NotFoundError if there are none."""
     hosts = node_hosts(graph)
     found = [node for node, host in hosts.items() if _is_same_host(host, machine)]
     if not found:
@@ -134,7 +134,7 @@ def neighbours(state: SystemState) -> dict[str, Neighbours]:
 
 
 def find_node(graph: Graph, name: str) -> NodeAddress:
-    """Return the node with a global name, and its URI. Raise NotFoundError, with similar names, if it does not exist."""
+    """Return the node ``name`` (a global name) and its URI. Raise NotFoundError, with similar names, if it does not exist."""
     uri = graph.node_uri(name)
     if uri is None:
         raise NotFoundError("node", name, list_nodes(graph))
@@ -142,7 +142,7 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 
 
 def node_detail(graph: Graph, name: str) -> NodeDetail:
-    """Return what the master knows about the node with a global name. Raise NotFoundError if it is not registered."""
+    """Return what the master knows about the node ``name`` (a global name). Raise NotFoundError if it is not registered."""
     state = graph.state()
     # Use only types that publishers have registered: rosnode prints "unknown type" for a topic without publishers.
     types = dict(graph.master.get_published_topics())

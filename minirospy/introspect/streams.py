@@ -40,7 +40,7 @@ _POLL_SECONDS = 0.1
 _WAITING = 64  # maximum number of messages queued for the thread that reads
 
 _SLICE = 0.05 if sys.platform == "win32" else 3600.0
-"""Maximum seconds per wait of the main thread, short on Windows, where Ctrl-C does not interrupt a wait.
+"""Maximum seconds per wait of the main thread.
 
 On Windows Ctrl-C does not interrupt a wait, so waits there are split into short slices.
 """

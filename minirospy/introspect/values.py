@@ -117,7 +117,7 @@ def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
 
 
 def parse_arguments(words: Sequence[str]) -> list[object]:
-    """Parse a message's values from command-line arguments. An empty one becomes an empty string, unlike in YAML (null)."""
+    """Parse a message's values from command-line arguments. An empty argument becomes an empty string, not null as in YAML."""
     return [parse_value(word) if word else "" for word in words]
 
 

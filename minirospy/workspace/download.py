@@ -58,7 +58,7 @@ def _is_right(wanted: Download) -> bool:
 
 def _fetch(wanted: Download) -> None:
     """Download a file under a temporary name, and rename it when it is complete."""
-    # Import this here, because it takes as long as a whole build without downloads.
+    # Import these modules here, because importing them takes as long as a whole build without downloads.
     from http.client import HTTPException
     from urllib.request import Request, urlopen
 

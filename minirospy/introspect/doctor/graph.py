@@ -318,7 +318,7 @@ def _stats(slave: SlaveProxy) -> tuple[object, ...]:
 
 
 def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
-    """Return the types that nodes report for a topic, each with these nodes."""
+    """Return the types that nodes report for a topic, each with the nodes that report it."""
     types: dict[str, set[str]] = {}
     for name, answer in answers.items():
         for table in (answer.publications, answer.subscriptions):

@@ -44,7 +44,7 @@ _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """A context manager. While active, a node is registered that publishes a latched message.
+    """Context manager that registers a node; the node publishes a latched message.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """

@@ -206,7 +206,7 @@ def host_port(uri: str) -> tuple[str, int]:
 def read_topic(
     uri: str, topic: str, caller_id: str, timeout: float = CONNECT_SECONDS, *, wait: bool = False
 ) -> tuple[Header, bytes]:
-    """Return a publisher's connection header and, with ``wait``, its first message. ``uri`` is that of its Slave API.
+    """Return the connection header of the publisher with Slave API ``uri`` and, with ``wait``, its first message.
 
     Each step may take ``timeout`` seconds. Raise RpcError if the call fails, WireError if its data is invalid, or
     OSError if the connection fails.

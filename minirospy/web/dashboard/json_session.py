@@ -281,7 +281,7 @@ class JsonEndpoint(Generic[_S]):
         self.left(session)
 
     def left(self, session: _S) -> None:
-        """Remove a session that has ended."""
+        """Do nothing; subclasses override this method to handle the end of a session."""
 
     def changed(self) -> None:
         """Notify all sessions that something has changed. Must be called on the loop."""

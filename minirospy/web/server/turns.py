@@ -150,7 +150,7 @@ class FairTurns:
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
-        """Add a client; return its share. Clients that have been idle have no disadvantage compared with the new one."""
+        """Add a client; return its share, which starts with the same tag as the shares of idle clients."""
         self._interactive.update()
         return Share(work, self._interactive)
 
