@@ -19,7 +19,7 @@ __all__ = ["BRACKETS", "arithmetic", "degrees", "radians"]
 BRACKETS = r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)"  # matches (...) after `rad`, with at most one nested level
 
 _MAX_LENGTH = (
-    200  # maximum length in characters; longer ones may exceed limits of Python's parser
+    200  # maximum length of an expression, in characters; longer ones may exceed limits of Python's parser
 )
 _MAX_BITS = 1_100  # maximum size of an integer; larger than any float, so it is an error in ROS, too
 _MAX_PLACES = 400  # maximum argument of round(): a float has fewer decimal places

@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Process feedback first that has already arrived, because it uses another connection.
+        # Process feedback that has already arrived first, because it uses another connection.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

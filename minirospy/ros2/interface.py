@@ -50,14 +50,14 @@ class Ros2Handle(Protocol):
 
 
 class Ros2Probe(Protocol):
-    """Sends a client's servers requests without effect. Methods may be called from any thread."""
+    """Sends requests that have no effect to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request; return a future for the response. After it, the servers no longer lose responses to the client."""
+        """Send a request; return a future for the response. Once that has arrived, no response to the client is lost any more."""
 
     def close(self) -> None: ...
 

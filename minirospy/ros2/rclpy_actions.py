@@ -318,8 +318,7 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # Set the logger first: rclpy's constructor creates it only after adding the server to the executor,
-        # which may call the server.
+        # Set the logger early: the server may be called before rclpy's constructor has created a logger.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,

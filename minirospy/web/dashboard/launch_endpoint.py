@@ -129,8 +129,7 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return complete lines, except for a very long line or the last line of an exited node: the data may
-        # end within a character.
+        # The data may end within a character, so return complete lines, except for a very long or a last line.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]
