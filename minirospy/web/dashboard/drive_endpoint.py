@@ -47,7 +47,7 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""Seconds without a command after which the topics of a client that holds a control are stopped, because it may be lost."""
+"""Seconds without a command after which a client that holds a control counts as lost, and its topics are stopped."""
 
 _log = logging.getLogger(__name__)
 

@@ -320,7 +320,7 @@ class JsonEndpoint(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event, until the loop's clock is past ``end``."""
+    """Wait for an event, or until the loop's clock is past ``end``."""
     # Do not use asyncio.wait_for: before Python 3.12, it may lose a cancellation that coincides with the event.
     # Loops may run timers early by the clock's resolution: without adding it, callers that compare times would spin.
     loop = asyncio.get_running_loop()

@@ -175,7 +175,7 @@ class FoxgloveEndpoint:
             self._updating = self.graph.spawn(self._update())
 
     async def _update(self) -> None:
-        """Advertise new channels and services, and remove old ones, until the graph does not change meanwhile."""
+        """Advertise new channels and services, and remove old ones. Repeat this if the graph changes meanwhile."""
         while self._is_outdated:
             self._is_outdated = False
             new_services, removed_services = self.services.update(self.graph)

@@ -135,7 +135,7 @@ class Parameters:
 
 
 def _is_affected(wanted: str, name: str, value: object) -> bool:
-    """Return whether a change of ``name`` may affect the parameter ``wanted`` without ``value`` showing the new value."""
+    """Return whether a change of ``name`` may change the parameter ``wanted`` to a value that ``value`` does not contain."""
     if name.startswith(wanted.rstrip("/") + "/"):
         return True
     if not isinstance(value, dict):

@@ -194,7 +194,7 @@ def asset_head(request_id: int) -> bytes:
 
 
 def asset_failure(request_id: int, why: str) -> bytes:
-    """Return the frame which reports that a file is not available."""
+    """Return the frame that reports that a file is not available."""
     text = why.encode("utf-8", "replace")
     return _ASSET_HEAD.pack(4, request_id, 1, len(text)) + text
 
