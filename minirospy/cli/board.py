@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""The person's step per key press, in metres. Also the width of a map cell, and half of its height."""
+"""Distance that the person moves per key press, in metres. Also the width of a map cell, and half its height."""
 
-_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead and to each side
+_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead of the scanner and to each side
 
-_START: Position = (0.6, 0.0)  # initial position of the person
+_START: Position = (0.6, 0.0)  # initial position of the person in front of the scanner
 
 _STEPS = {"up": (_STEP, 0.0), "down": (-_STEP, 0.0), "left": (0.0, _STEP), "right": (0.0, -_STEP)}
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set the variable, which the nodes also read, so that the nodes and the verbs open the same board.
+        # Set this variable for the nodes, so that they open the same board as the verbs.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
@@ -55,7 +55,7 @@ def _missing_name() -> int:
 
 
 class Picture:
-    """A rich renderable that draws a board: its LEDs, its buttons, the motion sensor's person, and other pins in use."""
+    """A rich renderable that draws a board: its LEDs, its buttons, the person at the motion sensor, and other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state
@@ -101,7 +101,7 @@ class Picture:
 
 
 def _map(person: Position, ascii_only: bool) -> list[Text]:
-    """Return a map of the floor in front of the scanner, seen from above. Shows the scanner's two fields and the person."""
+    """Return a top view of the floor in front of the scanner, with the scanner's two fields and the person."""
     from rich.text import Text
 
     body = Circle(*person)
@@ -166,7 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the previous drawing, or below it if the terminal cannot move the cursor (TERM=dumb)."""
+    """Yield a function that draws over the previous drawing, or below it if TERM=dumb, where the cursor cannot move up."""
     from rich.live import Live
 
     if console.is_dumb_terminal:
@@ -204,7 +204,7 @@ def _press(pin: Sequence[int]) -> None:
         for each in pin:
             board.press(each)
             used = board.state().pins[each]
-            # The user may have connected a button to an input with a pull resistor.
+            # An input with a pull resistor may have a button that the user has connected.
             if each not in BUTTONS and (used.function is Function.OUT or used.pull == Pull.OFF):
                 part = f"it is wired to a {LEDS[each]} LED" if each in LEDS else "nothing is wired to it"
                 warn(

@@ -263,11 +263,11 @@ def _check_range(name: str, value: int, low: int, high: int) -> None:
 
 
 def _given_token(option: str, given: str | None, variable: str) -> str:
-    """Return the token from an option, else from an environment variable, or "" if neither is set."""
+    """Return the token from an option or, if that is not given, an environment variable; return "" if neither is set."""
     if given is None:
         return os.environ.get(variable, "")
     if not given:
-        # The argument may be an unset shell variable; that must not open the bridge to everybody.
+        # The argument may be an unset shell variable, which must not open the bridge to everybody.
         raise Misuse(f"--{option} wants a token of 8 to 200 characters, and got an empty one")
     return given
 
@@ -292,7 +292,7 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
         # localhost may resolve to ::1, where another user's server would receive the token.
-        # With a certificate this cannot happen, because it identifies the server.
+        # A certificate rules this out, because it identifies the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     served = {"Foxglove protocol": listener}

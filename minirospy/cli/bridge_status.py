@@ -17,18 +17,18 @@ _Json = Any
 
 
 class _Token(NamedTuple):
-    """A token. ``is_kept``: it was read from ROS_HOME, where this user's bridges store their tokens."""
+    """A token. ``is_kept`` is true if it was read from ROS_HOME, where this user's bridges store their tokens."""
 
     text: str
     is_kept: bool
 
 
 class _NoBridgeError(BridgeError):
-    """No bridge responds on a port."""
+    """Raised if no bridge responds on a port."""
 
 
 def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
-    """Print the status of the local bridges on these ports; return the exit status.
+    """Print the status of the local bridges on the given ports; return the exit status.
 
     Raise BridgeError if no bridge responds, or one refuses access.
     """
@@ -92,7 +92,7 @@ def _token(given: str) -> _Token:
 
 
 def _fetch(port: int, token: _Token) -> _Json:
-    """Return the JSON from a bridge's status page."""
+    """Fetch a bridge's status page and return its JSON."""
     import http.client
     import ssl
 

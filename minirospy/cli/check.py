@@ -125,7 +125,7 @@ def _check(
     if one_master is not None:
         from minirospy.cli.completion.shell import shell_name
 
-        # SHELL names the login shell, which need not be the one that evaluates the lines; all shells of Unix take those of sh.
+        # SHELL names the login shell. The lines may be evaluated by another one, but all Unix shells accept sh's syntax.
         in_cmd = sys.platform == "win32" and "SHELL" not in os.environ
         one_master = shell_name(one_master or ("bat" if in_cmd else "sh"))
     if join is not None or name is not None:
@@ -202,14 +202,14 @@ def _run(word: str, work: list[str], patience: float, record: Record, master_uri
 
 
 def _print_variables(record: Record, shell: str) -> None:
-    """Print the lines that make a shell use the class's master, in the student's own namespace."""
+    """Print lines that select the class's master and the student's namespace when a shell evaluates them."""
     from minirospy.base.environment import split_uri
     from minirospy.introspect.doctor.reach import own_address_towards
     from minirospy.workspace.setup_files import assignments
 
     variables = {
         "ROS_MASTER_URI": record.master,
-        # The master has just answered, so there is a route to it.
+        # The master has just responded, so there is a route to it.
         "ROS_IP": own_address_towards(split_uri(record.master)[0]),
         "ROS_NAMESPACE": record.class_parameter.rpartition("/")[2],
     }
@@ -238,12 +238,12 @@ def _ask(question: str) -> str:
 def _tell(finding: Finding) -> None:
     from minirospy.base.escape import escaped
 
-    # A finding may contain output of the student's program.
+    # A finding may contain output from the student's program, so escape control characters.
     print(escaped(str(finding)), flush=True)
 
 
 def _conclude(report: Report) -> None:
-    """Print the last lines of programs that failed, and the result."""
+    """Print the last lines of output from failed programs, and the result."""
     from minirospy.base.escape import escaped
 
     for name, lines in report.output.items():

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
-_MASTER_SECONDS = 1.0  # to connect to a master before the page is served without one
-_OWN_MASTER_SECONDS = 30.0  # the same on loopback, which is slow only if the machine is busy
+_MASTER_SECONDS = 1.0  # timeout for connecting to a master, after which the page is served without one
+_OWN_MASTER_SECONDS = 30.0  # timeout for a master on loopback, which is slow only on a busy machine
 
-Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
+Fields = Mapping[str, Sequence[str]]  # a view's settings, as written in its link
 
 
 class Serving(NamedTuple):
-    """Options of all commands that open the page: the address and port of the page, and the clients that may connect."""
+    """Options shared by all commands that open the page: its address and port, and the clients that may connect."""
 
     port: int | None
     no_browser: bool
@@ -40,7 +40,7 @@ class Serving(NamedTuple):
 
     @property
     def bound(self) -> str:
-        """Return the address to listen on."""
+        """Return the address to bind."""
         return self.address or ("0.0.0.0" if self.listen else "127.0.0.1")
 
 
@@ -50,7 +50,7 @@ def dashboard(argv: Sequence[str] | None = None) -> int:
 
 
 def __getattr__(name: str) -> Any:
-    """Return the function for an rqt command (``rqt_plot``) or its Command (``RQT_PLOT``), from COMMANDS."""
+    """Return the function for an rqt command (``rqt_plot``) or its Command (``RQT_PLOT``), created from COMMANDS."""
     command = COMMANDS.get(name.lower())
     if command is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -58,7 +58,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command. It may be started as a node by a launch file, so the arguments may contain remappings."""
+    """Run a command. A launch file may start it as a node, so the arguments may contain remappings."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)
@@ -118,7 +118,7 @@ def _parser(name: str, what: str) -> Parser:
 
 
 def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None:
-    """Accept an rqt option that has no effect on the dashboard's page."""
+    """Add an rqt option that is accepted but has no effect."""
     if takes_value:
         parser.add_argument(
             *words, dest="ignored", metavar="X", help="accepted, without effect", completer="nothing"
@@ -196,7 +196,7 @@ def _window(
     add_arguments: Callable[[Parser], None] | None = None,
     chosen: Callable[..., tuple[str, Fields]] | None = None,
 ) -> Command:
-    """Return the command that opens an rqt window.
+    """Return the command that opens the page in place of an rqt window.
 
     ``what`` describes the window. ``add_arguments`` adds the command's arguments; ``chosen`` converts them to the view
     and its settings.
@@ -341,13 +341,13 @@ def _serve(
     from minirospy.web.dashboard.waiting_page import WaitingPage
     from minirospy.web.serve import run
 
-    # Bags named on the command line may be in any folder, not only below the working folder.
+    # The user may name a bag in any folder, not only below the working folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     if not is_loopback(serving.bound) and not listen:
         raise Misuse(f"--address {serving.address} lets other machines connect: add --listen")
     tokens = _tokens(Environment.read().home, must_be_kept=listen, must_be_new=embeds)
-    # A proxy makes the clients of other machines look like clients of this one.
+    # Behind a proxy, clients on other machines appear to be local.
     requires_token = listen or bool(serving.host_name)
     access = Access(
         hosts=(*host_names(), *serving.host_name),
@@ -359,7 +359,7 @@ def _serve(
     )
 
     class Started:
-        """Opens the dashboard on the given port. The default is PORT, or any free port if PORT is in use.
+        """Opens the dashboard on the given port (default: PORT, or any free port if PORT is in use).
 
         Until there is a master, a page without data is served on the port.
         """
@@ -371,7 +371,7 @@ def _serve(
             self._opened: list[Dashboard] = []
 
         async def wait(self) -> None:
-            """If nothing listens at the master's address, serve the page without data. Return without waiting for a master."""
+            """If nothing listens at the master's address, serve a page without data. Do not wait for a master."""
             if await _is_reachable(self._node.master_uri):
                 return
             for each in ports:
@@ -468,7 +468,7 @@ async def _is_reachable(uri: str) -> bool:
 
 
 def end_with_stdin() -> None:
-    """Start a thread that ends this process, as by SIGTERM, when its standard input closes."""
+    """Start a thread that terminates this process, like SIGTERM, when its standard input is closed."""
     import os
     import signal
     import threading
@@ -482,7 +482,7 @@ def end_with_stdin() -> None:
 
 
 def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
-    """Return this user's tokens. Unless ``must_be_kept`` is set, return new ones if they cannot be stored in ROS_HOME.
+    """Return this user's tokens. If they cannot be stored in ROS_HOME, create new ones, unless ``must_be_kept`` is set.
 
     ``must_be_new``: return tokens that only this process uses, because a saved notebook contains its token.
 
@@ -510,9 +510,9 @@ def _announce(serving: Serving, port: int, view: str, fields: Fields, tokens: To
     address = serving.bound
     is_any = address in ("0.0.0.0", "::")
     encrypted = bool(serving.cert)
-    # Do not use localhost: a browser may try ::1 first, and another user's program may listen on this port there.
+    # Avoid localhost: a browser may try ::1 first, where another user's program may listen on this port.
     host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
-    # A local user's link has the same rights as the user's own programs.
+    # The link for the local browser has the same rights as the user's own programs.
     own = tokens.read if serving.read_only else tokens.write
     address_of = partial(link, host, port, view, fields, encrypted=encrypted)
     here = address_of(token=own)
@@ -534,7 +534,7 @@ def _announce(serving: Serving, port: int, view: str, fields: Fields, tokens: To
 
 
 def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
-    """Open the link with a one-time code instead of the token. Return False if there is no browser. Call this on the loop."""
+    """Open the link with a one-time code in place of the token. Return False if there is no browser. Call this on the loop."""
     import asyncio
 
     from minirospy.web.dashboard.browser import open_link
@@ -546,7 +546,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Check a second late, so that the code has certainly expired by the clock of Codes.
+    # Check one second late, so that the code has certainly expired according to the clock of Codes.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 

@@ -30,15 +30,13 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""Seconds for which the button is held, and for which it is then left released.
+"""Seconds for which the button is held, and then left released.
 
 Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
 """
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0
-"""Timeout in seconds, long enough for a Raspberry Pi, or for Windows with a virus scanner. A failed launch ends the wait
-early.
-"""
+"""Timeout in seconds: enough for a Raspberry Pi, or for Windows with a virus scanner. A failed launch ends the wait."""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",
@@ -89,7 +87,7 @@ def _demo(presses: int | None) -> int:
 
 
 def _is_dumb() -> bool:
-    """Return whether the output is a terminal that cannot move the cursor back, for example an editor's."""
+    """Return whether stdout is a terminal that cannot move the cursor back, such as the one in an editor."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -97,7 +95,7 @@ def _is_dumb() -> bool:
 
 @contextlib.contextmanager
 def _exit_on_signals() -> Iterator[None]:
-    """Raise SystemExit at SIGTERM, and at SIGHUP except under nohup, so that the ``finally`` blocks stop roslaunch.
+    """Raise SystemExit on SIGTERM, and on SIGHUP except under nohup, so that ``finally`` blocks stop roslaunch.
 
     Further signals do not interrupt them.
     """
@@ -124,7 +122,7 @@ def _exit_on_signals() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _own_world() -> Iterator[Path]:
-    """Set up a separate master port and board, so that the demo affects no other programs; yield a folder for its files."""
+    """Set up a separate master port and board, so that the demo does not affect other programs. Yield a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
         os.environ["MINIROSPY_LOCAL"] = "1"
         os.environ["ROS_MASTER_URI"] = f"http://localhost:{_free_port()}"
@@ -150,7 +148,7 @@ def _free_port() -> int:
 
 @contextlib.contextmanager
 def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run roslaunch with the workshop's launch file; at the end, stop roslaunch and its nodes with SIGINT."""
+    """Run roslaunch with the workshop's launch file. On exit, stop roslaunch and its nodes with SIGINT."""
     command = [
         sys.executable,
         "-m",
@@ -184,7 +182,7 @@ def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) -> None:
-    """Press the button until the LED lights, which shows that both nodes are connected.
+    """Press the button until the LED lights up, which shows that both nodes are connected.
 
     Raise MinirospyError if that takes too long.
     """
@@ -203,14 +201,14 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release the button. Return the seconds until the LED followed, or None if it did not."""
+    """Press or release the button. Return the seconds until the LED followed, or None if it did not follow."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
 
 
 def _wait_for(board: Board, level: int, timeout: float) -> int | None:
-    """Wait until the LED has ``level`` and return the level, or None after ``timeout`` seconds."""
+    """Wait until the LED's level is ``level`` and return it, or return None after ``timeout`` seconds."""
     watch = board.watch([LED], timeout=timeout)
     if board.get(LED) == level:
         return level
@@ -230,7 +228,7 @@ def _rest(launch: subprocess.Popen[bytes], show: _Lines | _Picture, seconds: flo
 
 
 class _Lines:
-    """Prints one line per key press, for output that is not a terminal or cannot be redrawn in place."""
+    """Prints one line per key press, for output that is not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)

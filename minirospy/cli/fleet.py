@@ -227,7 +227,7 @@ def _gateway(
     options = GatewayOptions(name, imports or not name, namespace, network, rules)
 
     async def start(node: Node) -> Gateway:
-        # Pass the gateway's log to the node's log.
+        # Route the gateway's log to the node's log.
         logging.getLogger("minirospy.fleet").parent = node.log
         return Gateway(node, options)
 
@@ -334,7 +334,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
             parameters.set_parameter(graph, name, machine)
             print(f"robot [{robot}]: only machine {machine} is shown (parameter {name})")
             return 0
-        # If no machine was chosen, there is nothing to delete.
+        # There is nothing to delete if no machine has been chosen.
         with contextlib.suppress(NotFoundError):
             parameters.delete_parameter(graph, name)
     print(f"robot [{robot}]: the machine that came first is shown")
@@ -342,7 +342,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 
 
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
-    """Return the network endpoints to connect to and to listen on.
+    """Return the network options with the endpoints to connect to and to listen on.
 
     Raise BridgeError if the library is missing, Misuse if an endpoint is invalid.
     """

@@ -28,7 +28,7 @@ What follows is passed on as it is: options of Python (-m, -c, -i), the file, it
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return the program's exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # Leave SIGINT unchanged: the program decides which signals it ignores.
+    # Do not handle SIGINT here: the program decides which signals it ignores.
     return run("minirospy python", lambda: _python(words), heeds_interrupts=False)
 
 

@@ -21,7 +21,7 @@ __all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "console_scripts", "find_scri
 
 
 class Entry(NamedTuple):
-    """A command: its module and its names.
+    """A command's module, function and names.
 
     ``script`` is the console script, ``verb`` the word after `minirospy`; either may be empty. The help does not show a
     verb without a summary. ``grammar`` is the name of the Command or Family in ``module``; a command that parses its
@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 
     @property
     def target(self) -> str:
-        """The console script's function, in the syntax of an entry point."""
+        """Return the console script's function in entry-point syntax, ``module:function``."""
         return f"minirospy.{self.module}:{self.function}"
 
     def load_main(self) -> Callable[[Sequence[str] | None], int]:
@@ -93,7 +93,7 @@ COMMANDS = (
           "what is wrong here, in the network, in the graph (as roswtf)"),
     Entry("cli.check", "main", "COMMAND", "", "check", "check your program for an exercise of the course"),
     Entry("cli.completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),
-    # Shells call this command; users do not.
+    # Called by shells, not by users.
     Entry("cli.completion.complete", "main", "", "", "complete"),
     Entry("ros.rosmaster.commands.master", "roscore", "ROSCORE", "roscore"),
     Entry("ros.rosmaster.commands.master", "rosmaster", "ROSMASTER", "rosmaster"),
@@ -133,12 +133,12 @@ SHELL_FUNCTIONS = {
 
 
 def console_scripts() -> dict[str, str]:
-    """Return a dict from console script to function, for ``project.scripts`` in the project's metadata."""
+    """Return the console scripts, as a dict from name to function, for ``project.scripts`` in the package metadata."""
     return {entry.script: entry.target for entry in COMMANDS if entry.script}
 
 
 def find_script(name: str) -> Entry | None:
-    """Return the command whose console script is ``name``, or None if there is none."""
+    """Return the command with the console script ``name``, or None if there is none."""
     return next((entry for entry in COMMANDS if entry.script == name), None)
 
 

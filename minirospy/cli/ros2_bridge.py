@@ -126,7 +126,7 @@ def _ros2_bridge(
         known = known.with_(parse_rules(Path(rules).read_text(encoding="utf-8"), rules))
     if connect and not zenoh:
         raise Misuse("--connect is for --zenoh")
-    # Check the domain before waiting for a master: the backends are opened only after that wait.
+    # Check the domain first: the backends are not opened until a master has been found.
     parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
     catalogue = Catalogue(Packages().folders())
     open_side = _zenoh(known, catalogue, connect) if zenoh else _rclpy()
@@ -140,14 +140,14 @@ def _ros2_bridge(
 
     async def start(node: Node) -> Ros2Bridge | _Listing:
         loop = asyncio.get_running_loop()
-        # Open Zenoh in a thread: it blocks while a router does not respond.
+        # Open Zenoh in a thread, because that blocks while a router does not respond.
         opened = loop.run_in_executor(None, open_side, BRIDGE_PREFIX) if zenoh else None
         side = await opened if opened else open_side(BRIDGE_PREFIX)
         bridge = Ros2Bridge(node, side, options, catalogue)
         return _Listing(bridge, node) if list else bridge
 
     name = f"{BRIDGE_PREFIX}_list" if list else BRIDGE_PREFIX
-    # ROS 1 message classes must be imported before ROS 2's packages with the same names.
+    # Import ROS 1 message classes before ROS 2's packages with the same names.
     return run(name, (), start, lambda _: None, imports_messages=False)
 
 
@@ -186,7 +186,7 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
 
 
 class _Listing:
-    """Prints the connections that the bridge would make, once ROS 2 has discovered its nodes; then stops the node."""
+    """Prints the connections that the bridge would make after ROS 2 has discovered its nodes, then stops the node."""
 
     def __init__(self, bridge: Ros2Bridge, node: Node) -> None:
         self._bridge = bridge

@@ -84,8 +84,8 @@ WINDOWS = (
 
 
 def view_of_plugin(plugin: str) -> str:
-    """Return the view for a name passed to `rqt --standalone`. Raise UsageError if there is none."""
-    # Imported here, because every command imports this module.
+    """Return the view for the plugin name given to `rqt --standalone`. Raise UsageError if there is none."""
+    # Import this here to keep start-up fast: every command imports this module.
     from minirospy.base.errors import UsageError
     from minirospy.web.dashboard.views import VIEWS
 
@@ -101,7 +101,7 @@ def view_of_plugin(plugin: str) -> str:
 
 
 def write_packages(folder: Path) -> list[str]:
-    """Write each window's ROS package below a folder; return the packages' names."""
+    """Write the ROS package of each window into ``folder``; return the packages' names."""
     from xml.sax.saxutils import escape
 
     names = []

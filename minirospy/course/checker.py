@@ -19,11 +19,11 @@ from minirospy.course.world import World
 
 __all__ = ["Finding", "Report", "check", "words_of"]
 
-START_SECONDS = 15.0  # for a node to register, on a slow laptop with a virus scanner
-OWN_START_SECONDS = 60.0  # for a program of the exercise itself, without which it cannot be checked
-EXIT_SECONDS = 1.0  # from the traceback to the end of a program that fails
-_LAST_LINES = 8  # lines of a program's output in a report
-_PRESS_SECONDS = 0.25  # for which `click` holds a button; longer than two periods of 10 Hz polling
+START_SECONDS = 15.0  # timeout for a node to register, on a slow laptop with a virus scanner
+OWN_START_SECONDS = 60.0  # timeout for a program of the exercise itself, without which nothing is checked
+EXIT_SECONDS = 1.0  # time between a failed program's traceback and its exit
+_LAST_LINES = 8  # number of lines of a program's output in a report
+_PRESS_SECONDS = 0.25  # time that `click` holds a button: more than two periods of 10 Hz polling
 _REPEAT_HERTZ = 10.0  # rate of published messages, unless the exercise specifies one
 
 
@@ -49,7 +49,7 @@ class Finding(NamedTuple):
 
 @dataclass
 class Report:
-    """The result of a check. ``output``: the last lines of each program that failed, by the program's name."""
+    """The result of a check. ``output`` maps the name of each failed program to its last lines."""
 
     exercise: Exercise
     findings: list[Finding] = field(default_factory=list)
@@ -57,7 +57,7 @@ class Report:
 
     @property
     def passed(self) -> bool:
-        """Return whether every expectation holds."""
+        """Return whether all expectations hold."""
         return bool(self.findings) and all(finding.holds for finding in self.findings)
 
     @property
@@ -67,7 +67,7 @@ class Report:
 
 
 def words_of(exercise: Exercise, words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Split the words after an exercise's name into (programs, answers). The default programs are those that the page names.
+    """Split the words after an exercise's name into programs and answers. By default, the programs are those on its page.
 
     Raise UsageError if there are too many words, or if there is no program and the page names none.
     """
@@ -99,7 +99,7 @@ def check(
     patience: float = 1.0,
     tell: Callable[[Finding], object] = lambda _: None,
 ) -> Report:
-    """Run the student's programs through an exercise and return the report. Pass each finding to ``tell`` immediately.
+    """Run an exercise's steps with the student's programs; return the report. Pass each finding to ``tell`` immediately.
 
     All time limits are multiplied by ``patience``. Raise NotFoundError if a program does not exist, UsageError if it cannot be
     run.
@@ -123,7 +123,7 @@ def check(
 
 
 class _Run:
-    """One run through the steps of an exercise."""
+    """A single run through the steps of an exercise."""
 
     def __init__(
         self,
@@ -139,7 +139,7 @@ class _Run:
         self._report = report
         self._tell = tell
         self._after = ""
-        self._reported: set[str] = set()  # programs whose exit or errors are already in the report
+        self._reported: set[str] = set()  # programs whose exit or error has already been reported
 
     def run(self) -> None:
         steps = list(self._exercise.steps)
@@ -154,7 +154,7 @@ class _Run:
         self._judge_programs()
 
     def _expect(self, step: Step) -> bool:
-        """Add the finding for an expectation. If it fails because a program has exited, add none and return False."""
+        """Check an expectation and add a finding. If it fails because a program has exited, return False and add none."""
         text = sentence(step, self._after, self._trial.world.patience)
         outcome = expect(self._trial, step)
         if not outcome.holds and not self._judge_programs():
@@ -184,7 +184,7 @@ class _Run:
         return True
 
     def _start(self, step: Step) -> bool:
-        """Start the student's programs, or one that belongs to the exercise, and wait until each has registered a node."""
+        """Start the student's programs or one of the exercise's, and wait until each has registered a node."""
         world = self._trial.world
         if step.subject == "work":
             words = self._programs
@@ -195,7 +195,7 @@ class _Run:
         for word in words:
             before = world.nodes()
             program = world.start(word, is_work=step.subject == "work" or isinstance(step.subject, int))
-            # A small ``patience`` applies to the student's program only: the exercise needs its own programs in any case.
+            # A reduced ``patience`` applies only to the student's programs, because the check needs the exercise's own ones.
             seconds = START_SECONDS if program.is_work else OWN_START_SECONDS / min(1.0, world.patience)
             has_started = partial(_has_started, world, before, program)
             runs = world.wait_until(has_started, seconds, needs_work=program.is_work)
@@ -220,12 +220,12 @@ class _Run:
         return True
 
     def _judge_programs(self) -> bool:
-        """Report the student's programs that have exited or printed a traceback. Return False if one has exited too early."""
+        """Report student programs that have exited or printed a traceback. Return False if one has exited too early."""
         is_fine = True
         ends_itself = self._exercise.ends
         for program in self._trial.work:
             if program.status is None and program.name not in self._reported and program.fault():
-                # A traceback is printed before the exit.
+                # The traceback is printed before the program exits, so wait for the exit.
                 self._trial.world.wait_until(partial(_has_ended, program), EXIT_SECONDS)
             status = program.status
             if status is not None:
@@ -267,7 +267,7 @@ class _Run:
 
 
 def _has_started(world: World, before: set[str], program: Program) -> bool:
-    """Return whether a new node is registered, or the program has already exited."""
+    """Return whether a new node has registered, or the program has already exited."""
     return bool(world.nodes() - before) or program.status is not None
 
 
@@ -303,7 +303,7 @@ def _ended_finding(program: Program, status: int, fault: str, exercise: Exercise
 
 
 def _judge_stop(world: World, report: Report, tell: Callable[[Finding], object]) -> bool:
-    """Report the student's programs that had to be killed. Return True if there are none."""
+    """Report student programs that ignored Ctrl-C and had to be killed. Return True if there are none."""
     stubborn = [each for each in world.programs if each.is_work and each.ignored_interrupt]
     for program in stubborn:
         finding = Finding(
@@ -328,7 +328,7 @@ def _programs(exercise: Exercise) -> str:
 
 
 def _topics(steps: Iterable[Step]) -> list[str]:
-    """Return the topics that the check subscribes to from its start."""
+    """Return the topics to which the check subscribes at its start."""
     found = [step.subject for step in steps if step.kind in ("message", "rate", "span")]
     found += [
         step.options[key]

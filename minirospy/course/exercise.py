@@ -31,7 +31,7 @@ __all__ = [
 
 FOLDER = Path(__file__).parent / "exercises"
 
-# Kinds of steps that need a ROS master.
+# Kinds of step that need a ROS master.
 GRAPH_KINDS = frozenset(
     {
         "node",
@@ -49,14 +49,14 @@ GRAPH_KINDS = frozenset(
         "log",
     }
 )
-_NAMED_KINDS = GRAPH_KINDS - {"log"} | {"package"}  # kinds whose subject is a ROS name
+_NAMED_KINDS = GRAPH_KINDS - {"log"} | {"package"}  # kinds of step whose subject is a ROS name
 
-# Default time limit of an expectation: a program starts within this time on a slow laptop.
+# Default time limit of an expectation in seconds, enough to start a program on a slow laptop.
 DEFAULT_SECONDS = 10.0
-MAX_HERTZ = 1000.0  # maximum rate of published messages
-MAX_SECONDS = 3600.0  # maximum time limit
+MAX_HERTZ = 1000.0  # maximum publishing rate of messages, in Hz
+MAX_SECONDS = 3600.0  # maximum time limit of a step, in seconds
 
-# Each kind of step, with the options that only this kind accepts.
+# Options of each kind of step that no other kind accepts.
 ACTIONS: Mapping[str, frozenset[str]] = {
     "start": frozenset(),
     "stop": frozenset(),
@@ -92,7 +92,7 @@ EXPECTATIONS: Mapping[str, frozenset[str]] = {
     "answer": frozenset({"equals", "rate", "host_of", "tolerance"}),
     "rostest": frozenset(),
 }
-_PARAMETER_RANGES = ("message", "runs_along")  # kinds that accept `between: {param: /name}`
+_PARAMETER_RANGES = ("message", "runs_along")  # kinds of step that accept `between: {param: /name}`
 _NAMES = {"type": "std_msgs/Int32", "field": "data", "rate": "/scan", "host_of": "/scan"}  # shown in errors
 _LEVELS = ("debug", "info", "warn", "error", "fatal")
 _OPTIONS = frozenset({"within", "hint", "says"})
@@ -111,12 +111,12 @@ _REQUIRED = {
 
 
 class ExerciseError(SourceError):
-    """Raised if an exercise's file cannot be read; ``file`` is its path."""
+    """Raised if an exercise's file is unreadable or invalid; ``file`` is its path."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One action or expectation.
+    """One step of an exercise: an action or an expectation.
 
     ``kind`` is a key of ACTIONS or EXPECTATIONS, and ``subject`` is its value. ``options`` are the step's other options.
     ``within`` is the time limit in seconds. ``hint`` is printed if the expectation fails. ``says`` replaces the generated
@@ -138,7 +138,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Work:
-    """A program or launch file that the student writes. ``default``: PACKAGE/PROGRAM as on the course's page, or empty."""
+    """A program or launch file to be written by the student. ``default`` is the course page's PACKAGE/PROGRAM, or empty."""
 
     about: str
     default: str = ""
@@ -146,7 +146,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Exercise:
-    """An exercise. ``page``: the page of the course that describes it.
+    """An exercise. ``page`` is the course page that describes it.
 
     ``live``: watch the student's own master and board, and start nothing. ``ends``: the programs may exit by themselves.
     """
@@ -163,7 +163,7 @@ class Exercise:
 
     @property
     def questions(self) -> int:
-        """Return the number of answers that the student must give."""
+        """Return how many answers the student must give."""
         return sum(step.kind == "answer" for step in self.steps)
 
 
@@ -191,7 +191,7 @@ def find_exercise(word: str) -> Exercise:
 
 
 def read_exercise(path: Path) -> Exercise:
-    """Read an exercise's file. Raise ExerciseError if it cannot be read."""
+    """Read an exercise's file. Raise ExerciseError if it is unreadable or invalid."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -202,7 +202,7 @@ def read_exercise(path: Path) -> Exercise:
 
 
 def parse_exercise(text: str, file: str) -> Exercise:
-    """Return the exercise in a YAML text. Raise ExerciseError, which states the fault and the correct form."""
+    """Parse an exercise in YAML. Raise ExerciseError, which states the fault and the correct form."""
     import yaml
 
     try:
@@ -215,7 +215,7 @@ def parse_exercise(text: str, file: str) -> Exercise:
 
 
 class _Reader:
-    """Converts YAML values to an exercise. Each error names the file and the location in it."""
+    """Converts YAML values to an exercise. Its errors state the file and the location in it."""
 
     def __init__(self, file: str) -> None:
         self._file = file
@@ -272,7 +272,7 @@ class _Reader:
         words = {str(key): value for key, value in found.items()}
         known = {**ACTIONS, **EXPECTATIONS}
         kinds = [key for key in words if key in known]
-        # `rate` and `message` are kinds of steps, but also options of other kinds.
+        # `rate` and `message` are both kinds of step and options of other kinds.
         if len(kinds) > 1:
             kinds = [
                 kind for kind in kinds if not any(kind in known[other] for other in kinds if other != kind)
@@ -302,7 +302,7 @@ class _Reader:
         )
 
     def _check(self, kind: str, words: Mapping[str, Any], place: str) -> None:
-        """Check values whose faults would otherwise be found only while the student's program is running."""
+        """Check values in advance whose faults would otherwise appear only while the student's program is running."""
         subject = words[kind]
         if kind in ("press", "release", "click", "led") and not _is_pin(subject):
             raise self._error(f"{place}: [{subject}] is not a pin: BCM numbers are 0 to 53")

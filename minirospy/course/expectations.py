@@ -32,11 +32,11 @@ __all__ = ["EXPECTATIONS", "Outcome", "Trial", "expect"]
 
 _LOG_LINE = re.compile(r"\[ *(?:DEBUG|INFO|WARN|ERROR|FATAL)\] \[(?:WallTime: )?(\d+\.\d+)[^\]]*\]:? (.*)")
 _CLOSE = 0.01  # relative tolerance when floating-point numbers are compared
-_RATE_SECONDS = 3.0  # default time over which a rate is measured
+_RATE_SECONDS = 3.0  # seconds over which a rate is measured, unless the exercise specifies them
 
 
 class Outcome(NamedTuple):
-    """The result of an expectation. If it does not hold, ``observed`` describes what was observed instead."""
+    """The result of an expectation. If it failed, ``observed`` describes what happened instead."""
 
     holds: bool
     observed: str = ""
@@ -44,7 +44,7 @@ class Outcome(NamedTuple):
 
 @dataclass
 class Trial:
-    """The state of a check: its surroundings, the time of the last action, and the student's answers not used yet."""
+    """The state of a check: its world, the time of the last action, and the student's answers that have not been used."""
 
     world: World
     since: float = field(default_factory=time.monotonic)
@@ -53,12 +53,12 @@ class Trial:
 
     @property
     def work(self) -> list[Program]:
-        """Return the student's programs."""
+        """Return the programs written by the student."""
         return [program for program in self.world.programs if program.is_work]
 
 
 def expect(trial: Trial, step: Step) -> Outcome:
-    """Wait for an expectation. An error of the graph, such as a node that has exited, counts as a failure."""
+    """Wait until an expectation holds or times out. A graph error, such as an exited node, counts as a failure."""
     try:
         return EXPECTATIONS[step.kind](trial, step)
     except BoardError:
@@ -89,7 +89,7 @@ def _lit(world: World) -> list[int]:
 
 
 def _why_dark(trial: Trial, pins: list[int]) -> str:
-    """Return an explanation for dark LEDs, such as a pin that is not an output, or another pin that was used instead."""
+    """Explain why LEDs are dark, for example because a pin is not an output, or another pin was used instead."""
     states = trial.world.board.state().pins
     inputs = [pin for pin in pins if states[pin].function is Function.IN]
     if not inputs:
@@ -190,7 +190,7 @@ def _message(trial: Trial, step: Step) -> Outcome:
 
 
 def _values(world: World, arrival: Arrival, path: str) -> list[object]:
-    """Return the value of a message's field as a list; empty if an array on the path is too short."""
+    """Return the value of a message's field as a list, which is empty if an array on the path is too short."""
     try:
         return [world.value(arrival, path)]
     except IndexError:
@@ -198,7 +198,7 @@ def _values(world: World, arrival: Arrival, path: str) -> list[object]:
 
 
 def _with_parameters(world: World, options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Replace each ``{param: /name}`` in an expectation by the parameter's value, or for a range by 70 to 140 % of it.
+    """Replace each ``{param: /name}`` with the parameter's value or, for a range, with 70 to 140 % of it.
 
     Raise NotFoundError if the parameter is not set, or if it must be a number and is not.
     """
@@ -233,7 +233,7 @@ def _rate(trial: Trial, step: Step) -> Outcome:
             each.time for each in world.arrivals(topic) if each.time >= max(start, time.monotonic() - seconds)
         ]
         found = (len(window) - 1) / (window[-1] - window[0]) if len(window) > 1 else 0.0
-        # Measure over the whole time, so that a short burst does not pass.
+        # Measure over the full time, so that a short burst does not pass.
         return time.monotonic() - start >= seconds and len(window) > 2 and bool(low <= found <= high)
 
     if world.wait_until(fits, max(step.within, seconds + 1)):
@@ -270,7 +270,7 @@ def _service(trial: Trial, step: Step) -> Outcome:
         }
         return Outcome(False, f"no node does; the services are {_listed(known)}")
     found = service_type(world.graph, name)
-    # The type may be in the student's own package.
+    # Accept a type without a package, because it may be in the student's own package.
     accepted = type_ in (None, found) or ("/" not in str(type_) and found.partition("/")[2] == type_)
     return Outcome(True) if accepted else Outcome(False, f"its type is {found}")
 
@@ -278,7 +278,7 @@ def _service(trial: Trial, step: Step) -> Outcome:
 def call(trial: Trial, step: Step) -> object:
     """Wait for a service and call it; return the response. Raise NotFoundError or ServiceException if that fails."""
     world, name = trial.world, step.subject
-    # The service may be that of a program that belongs to the exercise.
+    # The service may belong to one of the exercise's own programs.
     world.wait_until(lambda: name in world.graph.state().services, step.within, needs_work=False)
     type_ = service_type(world.graph, name)
     request = fill_request(type_, [step.options.get("request", {})])
@@ -338,7 +338,7 @@ def _log_entry(line: Line) -> tuple[float, str] | None:
 
 
 def _in_order(expected: list[str], texts: list[str]) -> list[int] | None:
-    """Return the indexes in ``texts`` at which the expected texts occur in this order, or None if they do not."""
+    """Return the indexes at which the expected texts occur in ``texts``, in this order, or None if they do not."""
     places: list[int] = []
     for each in expected:
         start = places[-1] + 1 if places else 0
@@ -381,7 +381,7 @@ def _exits(trial: Trial, step: Step) -> Outcome:
 
 
 def _package(trial: Trial, step: Step) -> Outcome:
-    # Create a new object each time, because the lookup caches folders.
+    # Create a new Packages each time, because it caches the folders that it finds.
     is_there = step.options["is"]
     holds = trial.world.wait_until(lambda: (step.subject in Packages().names()) == is_there, step.within)
     return Outcome(holds, f"it is {'still there' if not is_there else 'not there'}")
@@ -453,12 +453,12 @@ def _rostest(trial: Trial, step: Step) -> Outcome:
 
 
 def _printed(trial: Trial) -> list[Line]:
-    """Return the lines that the student's programs have printed, in order of arrival."""
+    """Return the output lines of the student's programs, in order of arrival."""
     return sorted((line for program in trial.work for line in program.lines), key=lambda line: line.time)
 
 
 def _or_ended(trial: Trial, fits: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a condition that is also true once all the student's programs have exited and their output is complete."""
+    """Return a condition that is also true if all the student's programs have exited and their output is complete."""
 
     def holds() -> bool:
         has_ended = bool(trial.work) and all(each.status is not None for each in trial.work)

@@ -21,22 +21,22 @@ __all__ = ["Line", "Program", "find_command"]
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_MAX_LINES = 20_000  # lines kept, for a program that prints in an endless loop
+_MAX_LINES = 20_000  # maximum number of output lines kept, for a program that prints endlessly
 _DIED = re.compile(r"\[([\w/.-]+?)(?:-\d+)?\] process has died \[pid \d+, exit code (-?\d+)")
 _LINE_OF_FILE = re.compile(r'^\s+File "(.+)", line (\d+)')
 _EXCEPTION = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Exit|Interrupt|Warning)?(:|$)")
-_KILL_SECONDS = 5.0  # wait for a killed process, and for the end of its output
+_KILL_SECONDS = 5.0  # timeout for a killed process to exit, and for its output to end
 
 
 class Line(NamedTuple):
-    """A line of a program's output, and its time of arrival in seconds of the monotonic clock."""
+    """A line of program output, with its time of arrival in seconds of the monotonic clock."""
 
     text: str
     time: float
 
 
 def find_command(word: str, packages: Packages) -> list[str]:
-    """Return the command line that starts a FILE or a PACKAGE/PROGRAM; launch files are started by roslaunch.
+    """Return the command that starts a FILE or a PACKAGE/PROGRAM, through roslaunch for a launch file.
 
     Raise NotFoundError, with similar names, if it does not exist, or UsageError if it is not a program.
     """
@@ -56,9 +56,9 @@ def find_command(word: str, packages: Packages) -> list[str]:
 
 def _command_of(path: Path) -> list[str]:
     if path.name.endswith(_LAUNCH):
-        # Nodes without output="screen" print to files; the check needs their output.
+        # Without --screen, nodes without output="screen" would print to files, but the check needs their output.
         return [sys.executable, "-m", "minirospy.ros.roslaunch.commands.roslaunch", "--screen", str(path)]
-    # An empty file without a shebang may still be meant as a Python program; its name shows that.
+    # An empty file without a shebang is a Python program if its name ends in .py.
     if is_python(path):
         return [sys.executable, str(path.resolve())]
     if os.access(path, os.X_OK) and path.suffix not in (".txt", ".yaml", ".md"):
@@ -67,7 +67,7 @@ def _command_of(path: Path) -> list[str]:
 
 
 class Program:
-    """A running program. ``name``: its file's name. ``is_work``: whether the student wrote it."""
+    """A program started by the check. ``name`` is its file name; ``is_work`` is true if the student wrote it."""
 
     def __init__(self, command: Sequence[str], environ: Mapping[str, str], *, is_work: bool) -> None:
         self.name = Path(command[-1]).name
@@ -102,21 +102,21 @@ class Program:
 
     @property
     def lines(self) -> list[Line]:
-        """Return what the program has printed so far."""
+        """Return the lines that the program has printed so far."""
         with self._lock:
             return list(self._lines)
 
     @property
     def ended_after(self) -> float:
-        """Return the run time of a program that has exited, in seconds."""
+        """Return how long a program ran before it exited, in seconds."""
         return self._end - self.started
 
     def wait_for_output(self) -> None:
-        """Wait until the output of a program that has exited is complete."""
+        """Wait until all output of an exited program has been read."""
         self._reader.join(_KILL_SECONDS)
 
     def stop(self, patience: float) -> None:
-        """Send Ctrl-C and wait. If the program does not exit in time, kill it and its children. Idempotent."""
+        """Send Ctrl-C and wait. If the program does not exit within ``patience`` seconds, kill its process group. Idempotent."""
         if self.status is None:
             windows = sys.platform == "win32"
             interrupt = signal.CTRL_BREAK_EVENT if windows else signal.SIGINT  # type: ignore[attr-defined,unused-ignore]
@@ -129,7 +129,7 @@ class Program:
         self._kill()
 
     def fault(self) -> str:
-        """Return a sentence about an error in a program's output: a traceback, or a node in a launch file that died.
+        """Describe an error found in the program's output: a traceback, or a launch file's node that died.
 
         Return an empty string if there is none.
         """
@@ -147,7 +147,7 @@ class Program:
         return [line.text for line in self.lines if line.text.strip()][-count:]
 
     def _kill(self) -> None:
-        """Kill the program if it is still running, and all remaining processes in its group."""
+        """Kill the program if it still runs, and all other processes in its group."""
         if sys.platform != "win32":
             with contextlib.suppress(OSError):
                 os.killpg(self.process.pid, signal.SIGKILL)
@@ -171,7 +171,7 @@ class Program:
 
 
 def exception_in(lines: Sequence[str]) -> str:
-    """Return the last exception in a program's output with its location, as ``NameError: ... (my_led.py, line 12)``.
+    """Return the last exception in a program's output and its location: ``NameError: ... (my_led.py, line 12)``.
 
     Return an empty string if there is none.
     """
@@ -181,7 +181,7 @@ def exception_in(lines: Sequence[str]) -> str:
         if "Traceback (most recent call last)" in text:
             in_traceback, place = True, ""
         elif match := _LINE_OF_FILE.match(text):
-            # Python prints a SyntaxError without the line `Traceback`.
+            # Python prints a SyntaxError without a `Traceback` line.
             in_traceback = True
             if not _is_library(match[1]) or not place:
                 place = f"{Path(match[1]).name}, line {match[2]}"
@@ -192,7 +192,7 @@ def exception_in(lines: Sequence[str]) -> str:
 
 
 def _is_library(file: str) -> bool:
-    """Return whether a file in a traceback belongs to minirospy or Python, not to the student."""
+    """Return whether a file named in a traceback belongs to minirospy or Python rather than to the student."""
     parts = Path(file).parts
     return (
         "minirospy" in parts

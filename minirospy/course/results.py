@@ -38,17 +38,17 @@ __all__ = [
 ]
 
 CLASS_PARAMETER = "/minirospy_class"
-_MAX_FAILURES = 5  # sentences of a failed check that the teacher sees
-_MAX_LETTERS = 300  # characters of such a sentence
-_MAX_NAME = 60  # characters of a student's name
-MAX_KEY = 64  # characters of the parameter's last part; the page's classroom.js ignores longer ones
-_MAX_TIME = 4e9  # seconds since 1970, in the year 2096: time.localtime refuses far larger values
-_SECONDS = 3.0  # timeout for the class's master: a check must not wait for a computer that has left
+_MAX_FAILURES = 5  # maximum number of sentences about a failed check that the teacher sees
+_MAX_LETTERS = 300  # maximum length of such a sentence
+_MAX_NAME = 60  # maximum length of a student's name
+MAX_KEY = 64  # maximum length of the parameter's last part; the page's classroom.js ignores longer ones
+_MAX_TIME = 4e9  # seconds since 1970, up to the year 2096: time.localtime rejects far larger values
+_SECONDS = 3.0  # timeout for the class's master, whose computer may have been shut down
 
 
 @dataclass(frozen=True)
 class Result:
-    """The last result of one exercise.
+    """The latest result of one exercise.
 
     ``time``: seconds since 1970 (0: unknown). ``failures``: the sentences of the expectations that failed. ``ever``: whether the
     exercise has ever been passed.
@@ -62,7 +62,7 @@ class Result:
 
 @dataclass
 class Record:
-    """The results of this computer, the student's name, and the URI of the class's master (empty: see `class_master`)."""
+    """This computer's results, the student's name, and the URI of the class's master (empty: see `class_master`)."""
 
     path: Path
     student: str = ""
@@ -71,7 +71,7 @@ class Record:
 
     @classmethod
     def read(cls, environment: Environment) -> Record:
-        """Read the record. An unreadable file counts as empty, because it must not make a check fail."""
+        """Read the record. Treat an unreadable file as empty, so that it does not make a check fail."""
         record = cls(environment.home / "minirospy_class.json")
         try:
             found = json.loads(record.path.read_text(encoding="utf-8"))
@@ -86,14 +86,14 @@ class Record:
 
     @property
     def class_parameter(self) -> str:
-        """Return the name of this computer's parameter on the class's master."""
+        """Return the name of the parameter for this computer on the class's master."""
         return f"{CLASS_PARAMETER}/{parameter_key(self.student or default_name())}"
 
     def add(self, report: Report) -> None:
         """Add the result of a check."""
         name = report.exercise.name
         before = self.results.get(name)
-        # The output of a student's program may contain control characters, which XML-RPC cannot transmit.
+        # A student program's output may contain control characters, which XML-RPC cannot transmit.
         failures = tuple(
             escaped(f"{each.sentence}: {each.observed}")[:_MAX_LETTERS] for each in report.failures
         )
@@ -105,7 +105,7 @@ class Record:
         )
 
     def write(self) -> None:
-        """Write the file atomically. Raise MinirospyError if that fails."""
+        """Write the record to its file atomically. Raise MinirospyError if that fails."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name)
@@ -116,7 +116,7 @@ class Record:
             raise MinirospyError(f"{self.path} cannot be written: {error.strerror}") from error
 
     def to_parameter(self) -> dict[str, object]:
-        """Return the record as a parameter's value. ``number`` is an exercise's position in the course."""
+        """Return the record as a parameter value. ``number`` is the exercise's position in the course."""
         numbers = {name: number for number, name in enumerate(built_in_names())}
         return {
             "student": self.student or default_name(),
@@ -135,7 +135,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Student:
-    """A row of the class's table: one computer's results. ``key``: the last part of its parameter's name."""
+    """A row of the class's table: one computer's results. ``key`` is the last part of the computer's parameter name."""
 
     key: str
     name: str
@@ -143,7 +143,7 @@ class Student:
 
 
 def default_name() -> str:
-    """Return the name for the class's table if the student has not given one: the board's or the computer's."""
+    """Return a default for the student's name in the class's table: the name of the board or the computer."""
     return os.environ.get("MINIROSPY_BOARD") or socket.gethostname().partition(".")[0]
 
 
@@ -169,7 +169,7 @@ def join(record: Record, uri: str, name: str) -> None:
 
 
 def class_master(record: Record, environment: Environment) -> str:
-    """Return the URI of the class's master: from `--join`, or from ROS_MASTER_URI if that is on another computer.
+    """Return the URI of the class's master: given by `--join`, or ROS_MASTER_URI if that is on another computer.
 
     Return an empty string if there is none. A master on this computer belongs to the student, and the results must not appear
     there: `rosparam list` would show parameters that the pages of the course do not mention.
@@ -180,7 +180,7 @@ def class_master(record: Record, environment: Environment) -> str:
 
 
 def publish(record: Record, environment: Environment) -> str:
-    """Send the record to the class's master. Return its URI, or an empty string if there is no such master.
+    """Send the record to the class's master; return the master's URI, or an empty string if there is none.
 
     Raise MasterUnreachableError only if the student has joined a class whose master does not respond.
     """
@@ -197,10 +197,10 @@ def publish(record: Record, environment: Environment) -> str:
 
 
 def send(record: Record, uri: str) -> None:
-    """Send the record to a master. Raise MasterUnreachableError if it does not respond."""
+    """Send the record to the master at ``uri``. Raise MasterUnreachableError if it does not respond."""
     master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=_SECONDS)
     try:
-        # Set each part separately, to keep the state that share.py stores under the same parameter.
+        # Set each part separately, to preserve the state that share.py stores under the same parameter.
         for part, value in record.to_parameter().items():
             master.set_param(f"{record.class_parameter}/{part}", value)
     finally:
@@ -208,7 +208,7 @@ def send(record: Record, uri: str) -> None:
 
 
 def parameter_key(name: str) -> str:
-    """Convert a name to the last part of a parameter's name: letters, digits and underscores, starting with a letter.
+    """Convert a name to a parameter name's last part: letters, digits and underscores, starting with a letter.
 
     It has at most ``MAX_KEY`` characters. A checksum keeps names apart that differ only in other characters, such as Jörg
     and Jürg, or after the cut.
@@ -223,7 +223,7 @@ def parameter_key(name: str) -> str:
 
 
 def gather(uri: str) -> list[Student]:
-    """Return the students whose results are on a master, sorted by name. Raise MasterUnreachableError if it does not respond.
+    """Return the students with results on a master, sorted by name. Raise MasterUnreachableError if it does not respond.
 
     Values that are not records are skipped; any node may have set them.
     """
@@ -245,7 +245,7 @@ def gather(uri: str) -> list[Student]:
 
 
 def class_table(students: list[Student], names: list[str]) -> list[list[str]]:
-    """Return the class's table with its header. A cell is yes, no (not passed yet), or empty (not tried)."""
+    """Return the class's table, including its header. Cells are "yes", "no" (not passed yet), or empty (not tried)."""
     used = [name for name in names if any(name in student.results for student in students)]
     used += sorted({name for student in students for name in student.results} - set(names))
     marks = {student.key: [_mark(student.results.get(name)) for name in used] for student in students}
@@ -269,5 +269,5 @@ def _result_of(found: Mapping[str, object]) -> Result:
 
 
 def _time_of(found: object) -> float:
-    """Return a time, or 0 (unknown) for an invalid value, which any node may have set."""
+    """Return a valid time, or 0 (unknown) for an invalid value: any node may have set the parameter."""
     return float(found) if isinstance(found, int | float) and 0 <= found < _MAX_TIME else 0.0

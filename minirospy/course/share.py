@@ -19,13 +19,13 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["share"]
 
-_POLL_SECONDS = 0.2  # between pin readings; if an LED blinks faster than 2.5 Hz, some changes are missed
-_BEAT_SECONDS = 3.0  # between heartbeats; after three missed ones, the page marks a computer as gone
-_ASK_SECONDS = 2.0  # timeout for calls to a master
+_POLL_SECONDS = 0.2  # seconds between pin readings; changes are missed if an LED blinks faster than 2.5 Hz
+_BEAT_SECONDS = 3.0  # seconds between heartbeats; the page marks a computer as gone after missing three
+_ASK_SECONDS = 2.0  # timeout in seconds for calls to a master
 
 
 def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:
-    """Send the state of the board and the number of nodes until ``ended()`` is true.
+    """Send the board's state and the number of nodes to the class's master until ``ended()`` is true.
 
     Raise MasterUnreachableError if the class's master does not respond at the start; later failures are retried.
     """
@@ -47,7 +47,7 @@ def share(record: Record, environment: Environment, ended: Callable[[], bool] = 
                     "nodes": _nodes(environment),
                     "beat": beat,
                 }
-                # The teacher's computer may be briefly unreachable: retry at the next heartbeat.
+                # The teacher's computer may be briefly unreachable, so retry at the next heartbeat.
                 with contextlib.suppress(MasterUnreachableError, RpcError):
                     master.set_param(f"{record.class_parameter}/now", state)
                     sent = pins
@@ -56,7 +56,7 @@ def share(record: Record, environment: Environment, ended: Callable[[], bool] = 
 
 
 def _nodes(environment: Environment) -> list[str]:
-    """Return the names of at most ten nodes on the student's own master."""
+    """Return the names of at most ten nodes that are registered with the student's own master."""
     master = MasterProxy(environment.master_uri, "/check_share", timeout=_ASK_SECONDS)
     try:
         state = master.get_system_state()

@@ -16,9 +16,9 @@ from minirospy.course.results import Record
 
 __all__ = ["write_snapshot"]
 
-_MAX_FILE_BYTES = 1_000_000  # larger files, such as bags, models and videos, are left out
+_MAX_FILE_BYTES = 1_000_000  # files larger than this, such as bags, models and videos, are left out
 _MAX_FILES = 2000
-MAX_BYTES = 50_000_000  # total size of the files before compression, because a snapshot is sent by e-mail
+MAX_BYTES = 50_000_000  # maximum total size of the files before compression: a snapshot is sent by e-mail
 _LEFT_OUT = frozenset(
     {".git", "__pycache__", "node_modules", ".venv", "venv", "build", "devel", "install", "logs"}
 )
@@ -35,7 +35,7 @@ _DOCTOR_SECONDS = 60.0
 
 
 def write_snapshot(file: Path, environment: Environment) -> tuple[int, dict[str, str]]:
-    """Write the snapshot; return the number of the workspace's files in it, and the reasons by file that is left out.
+    """Write a snapshot. Return the number of workspace files in it, and a dict of the omitted files with the reasons.
 
     A file is left out if it cannot be read, or if it, or all files together, would be too large. The workspace is the folders
     of ROS_PACKAGE_PATH. Hidden files, which may be keys and passwords, and build folders are left out. Raise MinirospyError if
@@ -44,11 +44,11 @@ def write_snapshot(file: Path, environment: Environment) -> tuple[int, dict[str,
     roots = [root for root in environment.package_path if root.is_dir() and os.access(root, os.W_OK)]
     if not roots:
         raise MinirospyError("no workspace is known in this terminal: `source WORKSPACE/devel/setup.bash`")
-    # Each list is complete before the snapshot exists, which may be in the workspace itself.
+    # Complete the lists before creating the snapshot, because it may be in the workspace itself.
     left_out: dict[str, str] = {}
     listed = [(root, _files(root, left_out)) for root in roots]
     try:
-        # A zip file cannot store dates before 1980: use 1980-01-01 instead.
+        # A zip file cannot store dates before 1980; 1980-01-01 is stored instead.
         archive = zipfile.ZipFile(file, "x", zipfile.ZIP_DEFLATED, strict_timestamps=False)
     except FileExistsError:
         raise MinirospyError(f"{file} exists: name another file") from None
@@ -77,17 +77,17 @@ def _not_written(file: Path, error: OSError | ValueError) -> MinirospyError:
 
 
 def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]], left_out: dict[str, str]) -> int:
-    """Add the files of the workspace's folders; return their number. Add the others to ``left_out``, with the reason."""
+    """Add the files in the workspace's folders; return their number. Add omitted files to ``left_out``, with the reason."""
     count, total = 0, 0
     for number, (root, files) in enumerate(listed, 1):
         prefix = root.parent.name if len(listed) == 1 else f"{number}_{root.parent.name}"
         for path in files:
-            # Read the whole file first: one that vanishes, or is written to, must not leave half an entry.
+            # Read the whole file first, so that a file that vanishes or changes does not leave half an entry.
             try:
                 name = f"{prefix}/{path.relative_to(root).as_posix()}"
                 name.encode()
                 info = zipfile.ZipInfo.from_file(path, name, strict_timestamps=False)
-                # Do not read what is left out: a folder may have many large files.
+                # Do not read files that are left out, because a folder may have many large ones.
                 if _fits(info.file_size, count, total):
                     with path.open("rb") as stream:
                         data = stream.read(_MAX_FILE_BYTES + 1)
@@ -113,7 +113,7 @@ def _fits(size: int, count: int, total: int) -> bool:
 
 
 def _files(root: Path, left_out: dict[str, str]) -> list[Path]:
-    """Return the files below a folder, sorted, without links out of it. Add unreadable folders to ``left_out``."""
+    """Return the sorted files below a folder; do not follow links out of it. Add unreadable folders to ``left_out``."""
 
     def note(error: OSError) -> None:
         left_out[str(error.filename)] = _unreadable(error)

@@ -27,7 +27,7 @@ def sentence(step: Step, after: str = "", patience: float = 1.0) -> str:
 
 
 def action_phrase(step: Step) -> str:
-    """Return the phrase for an action, such as "button 1 is pressed", or an empty string if the action has no visible effect."""
+    """Return the phrase for an action, such as "button 1 is pressed", or "" if the action has no visible effect."""
     subject = step.subject
     match step.kind:
         case "press" | "click":
@@ -50,12 +50,12 @@ def action_phrase(step: Step) -> str:
 
 
 def button_name(pin: int) -> str:
-    """Return a button's name: its number on the board, or its pin."""
+    """Return a button's name: its number on the board, if it has one, or its pin."""
     return f"button {BUTTONS.index(pin) + 1} (GPIO {pin})" if pin in BUTTONS else f"the button at GPIO {pin}"
 
 
 def leds_text(pins: Sequence[int]) -> str:
-    """Return names for LEDs, such as "the LEDs at GPIO 2 and 3 are lit", or "no LED is lit"."""
+    """Describe the lit LEDs, as in "the LEDs at GPIO 2 and 3 are lit" or "no LED is lit"."""
     if not pins:
         return "no LED is lit"
     if len(pins) == 1:
@@ -65,7 +65,7 @@ def leds_text(pins: Sequence[int]) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value in YAML syntax, on one line, with at most 80 characters."""
+    """Return a value as YAML on one line of at most 80 characters."""
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, dict):
@@ -85,7 +85,7 @@ def _untimed_sentence(step: Step) -> str:
     options = step.options
     of_type = f" with the type {options['type']}" if options.get("type") else ""
     between = options.get("between", (0, 0))
-    # A range may depend on a parameter, whose value is known only during the check.
+    # A range may refer to a parameter, whose value is not known before the check.
     low, high = between if not isinstance(between, dict) else (0, 0)
     expected = f"between {low:g} and {high:g}" if "between" in options else shown(options.get("equals"))
     match step.kind:

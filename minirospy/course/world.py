@@ -40,16 +40,16 @@ if TYPE_CHECKING:
 __all__ = ["Arrival", "World"]
 
 _POLL_SECONDS = 0.02
-LAST_EFFECT_SECONDS = 1.0  # after this, nothing that a program did before its exit can still have an effect
-_KEPT_MESSAGES = 5000  # messages kept per topic: a minute of a topic with 80 Hz
-_STOP_SECONDS = 10.0  # wait for a program after Ctrl-C
-_LAUNCH_STOP_SECONDS = 25.0  # the same for roslaunch, which waits up to 15 s for a node that ignores Ctrl-C
-# ROS variables that the tested programs inherit; all others describe the student's own master and network.
+LAST_EFFECT_SECONDS = 1.0  # seconds after a program's exit in which its last actions can still take effect
+_KEPT_MESSAGES = 5000  # messages kept per topic: one minute at 80 Hz
+_STOP_SECONDS = 10.0  # timeout for a program after Ctrl-C
+_LAUNCH_STOP_SECONDS = 25.0  # timeout for roslaunch, which itself gives a node up to 15 s after Ctrl-C
+# ROS variables that the tested programs inherit. All others would describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (
     "2",
     "1",
-)  # the guardian's timeouts after SIGINT and SIGTERM, if the check itself was killed
+)  # the guardian's timeouts after SIGINT and SIGTERM if the check itself is killed
 
 _numbers = itertools.count(1)
 
@@ -88,7 +88,7 @@ class _Repeat:
 
 
 class World:
-    """The surroundings of one check, as a context manager. All time limits are multiplied by ``patience``.
+    """The environment of one check, as a context manager. All time limits are multiplied by ``patience``.
 
     With ``work_ends``, the student's programs are expected to exit by themselves.
     ``board`` is the virtual board, ``environment`` the programs' environment, ``programs`` all started programs, in order.
@@ -137,7 +137,7 @@ class World:
         self._stack.close()
 
     def start(self, word: str, *, is_work: bool) -> Program:
-        """Start a program. Raise NotFoundError if it does not exist, UsageError if it is not a program."""
+        """Start a program. Raise NotFoundError if the file does not exist, UsageError if it is not a program."""
         command = find_command(word, self._packages)
         program = Program(command, self.environ, is_work=is_work)
         self.programs.append(program)
@@ -154,7 +154,7 @@ class World:
                     self._tell_guardian(f"-{program.process.pid}")
 
     def wait_until(self, holds: Callable[[], bool], seconds: float, *, needs_work: bool = True) -> bool:
-        """Poll until ``holds()`` is true or ``seconds``, times the patience, have passed. Return whether it is true.
+        """Poll ``holds()`` until it is true, or ``seconds`` multiplied by the patience have passed. Return its last value.
 
         Stop earlier if all of the student's programs have exited, unless they are expected to, or the condition does not need
         them (``needs_work``).
@@ -164,18 +164,18 @@ class World:
             if needs_work and self._work_has_ended():
                 end = min(end, time.monotonic() + LAST_EFFECT_SECONDS * self.patience)
             if time.monotonic() >= end:
-                # On a busy machine the last poll may be long ago.
+                # Call ``holds`` once more, because the last poll may be long ago on a busy machine.
                 return holds()
             time.sleep(_POLL_SECONDS)
         return True
 
     def _work_has_ended(self) -> bool:
-        """Return whether no program of the student's runs any more, although one should."""
+        """Return whether all student programs have exited although at least one should be running."""
         work = [program for program in self.programs if program.is_work]
         return bool(work) and not self._work_ends and all(each.status is not None for each in work)
 
     def nodes(self) -> set[str]:
-        """Return the names of the nodes on the master, except the check's own."""
+        """Return the names of the registered nodes, except the check's own."""
         state = self.graph.state()
         found = {node for table in state for nodes in table.values() for node in nodes}
         return found - {self.node.name, "/rosout"}
@@ -185,7 +185,7 @@ class World:
         return list(self._arrivals.get(topic, ()))
 
     def value(self, arrival: Arrival, path: str) -> object:
-        """Return the value of a message's field.
+        """Return the value of a field in a received message.
 
         Raise NotFoundError if there is no such field, IndexError if an array is too short.
         """
@@ -194,7 +194,7 @@ class World:
         )
 
     def publish(self, topic: str, type_: str, values: object, rate: float) -> None:
-        """Publish a message at ``rate`` Hz until the next one on this topic. If the rate is 0, publish once, latched.
+        """Publish a message at ``rate`` Hz until the next one on this topic. If the rate is 0, publish it once and latched.
 
         Raise NotFoundError if the type does not exist, MessageException if the values do not match it.
         """
@@ -237,7 +237,7 @@ class World:
             tempfile.TemporaryDirectory(prefix="minirospy-check-", ignore_cleanup_errors=True)
         )
         name = f"check-{os.getpid()}-{next(_numbers)}"
-        # The variable makes the board's server exit with its last client. It is set for the programs, too.
+        # This variable makes the board's server exit with its last client. The programs inherit it.
         os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
         self._stack.callback(os.environ.pop, "MINIROSPY_BOARD_TEMPORARY", None)
         environ = {

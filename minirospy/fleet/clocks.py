@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 __all__ = ["ClockOffset", "Delay", "Ping", "offset_of"]
 
-_SHARE = 0.1  # weight of the newest message's delay in the mean delay
+_SHARE = 0.1  # weight of the newest message in the mean delay
 
 
 class Ping(NamedTuple):
-    """A ping: the local times when the request was sent and the reply received, and the peer's time in the reply."""
+    """A ping: the local times of the request and the reply, and the peer's time in the reply."""
 
     sent: int
     theirs: int
@@ -20,7 +20,7 @@ class Ping(NamedTuple):
 
 
 class ClockOffset(NamedTuple):
-    """The offset of a peer's clock. Subtract ``offset`` from the peer's times to get local times.
+    """The offset of a peer's clock: subtract ``offset`` from the peer's times to get local times.
 
     The error of the offset is at most half the round trip.
     """
@@ -31,14 +31,14 @@ class ClockOffset(NamedTuple):
 
 @dataclass
 class Delay:
-    """The mean (exponentially weighted) and maximum delay of a topic's messages."""
+    """The exponentially weighted mean and the maximum of the delays of a topic's messages."""
 
     mean: float = 0.0
     longest: int = 0
     count: int = 0
 
     def add(self, delay: int) -> None:
-        """Record a message's delay. A negative delay, possible if the offset is inexact, counts as 0."""
+        """Record a message's delay. Count a negative delay, which an inexact clock offset can cause, as 0."""
         delay = max(0, delay)
         self.mean = delay if not self.count else self.mean + _SHARE * (delay - self.mean)
         self.longest = max(self.longest, delay)
@@ -46,7 +46,7 @@ class Delay:
 
 
 def offset_of(pings: Iterable[Ping]) -> ClockOffset | None:
-    """Return the peer's clock offset, or None if there was no reply. The reply with the shortest round trip is used."""
+    """Return the offset of the peer's clock, from the reply with the shortest round trip, or None without a reply."""
     best = min(pings, key=lambda ping: ping.received - ping.sent, default=None)
     if best is None:
         return None

@@ -20,14 +20,14 @@ _Token = TypeVar("_Token", TopicToken, ServiceToken)
 __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MAX_GATEWAYS = 5_000
-MAX_NAMES = 2_000  # maximum number of topics, and separately of services, that a gateway may announce
-# maximum number of topics and services of all gateways together; they take some 100 MiB
+MAX_NAMES = 2_000  # maximum number of topics, and of services, that a gateway may announce
+# maximum number of topics and services of all gateways, which use about 100 MiB
 MAX_TOKENS = 200_000
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that is shown to other gateways. ``duplicates`` are further claims to its name; they are ignored."""
+    """A robot shown by other gateways. ``duplicates`` are further claims to its name, which are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]
@@ -36,7 +36,7 @@ class Robot:
 
 
 class Refused(NamedTuple):
-    """A gateway that is not shown, because its name is taken.
+    """A gateway that is not shown, because another gateway holds its name.
 
     ``holder`` is the claim that has the name, or had it until recently.
     """
@@ -58,17 +58,17 @@ class _Gateway:
 
 
 class FleetContents:
-    """Tracks the tokens that currently exist, and the robots that they announce."""
+    """Tracks the existing liveliness tokens and the robots that they announce."""
 
     def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
-        """Create an empty table.
+        """Create a table without tokens.
 
         ``allows(robot)`` returns whether a robot is of interest; ``clock`` returns monotonic seconds.
         """
         self.holders = Holders(clock)
         self.waiting: tuple[Refused, ...] = ()
         """The gateways that :meth:`robots` omitted because another gateway holds their name."""
-        self.refused = 0  # number of ignored tokens
+        self.refused = 0  # number of tokens ignored so far
         self.refusal = ""  # why the most recent token was ignored
         self._count = 0
         self._allows = allows
@@ -90,7 +90,7 @@ class FleetContents:
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
             if gateway.claim not in (None, token):
-                # A gateway declares only one claim while it runs, so a different second claim comes from another peer.
+                # A gateway declares a single claim, so a different second claim comes from another peer.
                 return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
             changed = gateway.claim is None
             if changed:
@@ -99,7 +99,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway whose only name was rejected: nothing would remove it.
+        # Do not store a gateway whose only name was rejected, because nothing would remove it.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed
@@ -114,7 +114,7 @@ class FleetContents:
         if gateway is None:
             return False
 
-        # If a topic's flags change, the new token arrives before the old one is removed. Remove a token only if it is equal.
+        # If a topic's flags change, the new token arrives before the old one is removed: do not remove the new one.
         if isinstance(token, Claim):
             if gateway.claim != token:
                 return False
@@ -135,11 +135,11 @@ class FleetContents:
 
     @property
     def gateways(self) -> set[str]:
-        """Return the gateways that have tokens."""
+        """Return the gateways that have any tokens."""
         return {gateway for _, gateway in self._gateways}
 
     def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
-        """Return a dict of robots keyed by name, each as announced by the name's holder. Ignore ``lost`` gateways."""
+        """Return the robots, keyed by name, as announced by the gateway that holds each name. Ignore ``lost`` gateways."""
         there = [
             (gateway.order, gateway.claim)
             for gateway in self._gateways.values()

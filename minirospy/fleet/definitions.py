@@ -25,15 +25,15 @@ __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
 ANSWER_SECONDS = 10.0
-# maximum total number of characters of all cached definitions; those of ROS's own packages have 3 million
+# maximum total length of the cached definitions, in characters; those of all ROS packages have 3 million
 MAX_CHARACTERS = 64 << 20
-# maximum number of concurrent queries, in total and per gateway; a query without a reply times out after ANSWER_SECONDS
+# maximum number of concurrent queries, in total and per gateway; each times out after ANSWER_SECONDS
 MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
 def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
-    """Return the specs in a full definition. Raise DefinitionError if the definition is invalid or has another md5sum."""
+    """Return the specs in a full definition. Raise DefinitionError if the definition is invalid or its md5sum differs."""
     specs, found = checked_text(name, text)
     if found != md5sum:
         raise DefinitionError(name, 1, f"its md5sum is {found}, not {md5sum}")
@@ -41,7 +41,7 @@ def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
 
 
 class Definitions:
-    """Caches the types that this gateway knows. It generates no message classes, because messages stay serialized."""
+    """Caches message definitions. Generates no message classes, because the gateway forwards serialized messages."""
 
     def __init__(self, node: Node, network: FleetNetwork) -> None:
         self.texts = TypeTexts(node)
@@ -63,7 +63,7 @@ class Definitions:
         await self.texts.close()
 
     def learn(self, name: str, md5sum: str, text: str) -> None:
-        """Store the definition from a publisher's connection header."""
+        """Store the definition of a type, as found in a publisher's connection header."""
         if not text or (name, md5sum) in self._known or len(self._known) >= _MOST:
             return
         if self._known_characters + len(text) <= MAX_CHARACTERS:
@@ -91,7 +91,7 @@ class Definitions:
         """
         text = await self.text(name, md5sum)
         if not text and gateway and md5sum != _NO_FIELDS:
-            # Query each gateway separately, so that one that does not respond delays only its own topics.
+            # Query each gateway separately, so that an unresponsive one delays only its own topics.
             key = name, md5sum, gateway
             task = self._finding.get(key)
             if task is None:
@@ -101,7 +101,7 @@ class Definitions:
         return InterfaceType(name, md5sum, text)
 
     async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
-        """Return the rewriter for a type's frame ids. Return None if the type has no frame ids or is not known."""
+        """Return the rewriter for the frame ids in messages of a type, or None if the type has none or is unknown."""
         key = name, md5sum
         if key not in self._rewriters:
             text = await self.text(name, md5sum)
@@ -121,7 +121,7 @@ class Definitions:
         if share is None:
             share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
         try:
-            # Acquire the gateway's own share first, so that one that does not respond cannot occupy all query slots.
+            # Acquire the gateway's own share first, so that an unresponsive gateway cannot occupy all query slots.
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]

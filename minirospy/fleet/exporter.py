@@ -42,13 +42,11 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 MAX_WANTED, MAX_READERS = 10_000, 1_000
-"""Maximum number of topics that readers may request, and of readers per topic. Limits what a peer can make this process
-allocate.
-"""
+"""Maximum number of topics that peers may request, and of readers per topic: limits the memory that peers can use."""
 
 
 class Exporter:
-    """Announces one robot's graph to the fleet. Runs on the node's loop."""
+    """Announces the graph of one robot to the fleet. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -62,7 +60,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """Create the exporter. ``hidden`` contains the names of the imported robots; their topics are not announced again."""
+        """Create the exporter. ``hidden`` returns the names of the imported robots, whose topics are not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -85,7 +83,7 @@ class Exporter:
         self._declared: list[Deferred] = []
 
     async def start(self) -> None:
-        """Start announcing the robot; continue until :meth:`close`.
+        """Start announcing the robot's graph until :meth:`close`.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -135,7 +133,7 @@ class Exporter:
     def _announce(self) -> None:
         keys = {topic_key(each) for each in self.graph.topics.values()}
         keys |= {service_key(each) for each in self.graph.services.values()}
-        # Declare new tokens before removing old ones, so that a topic always has a token even while its flags change.
+        # Declare new tokens before removing old ones, so that a topic has a token even while its flags change.
         for key in keys - self._tokens.keys():
             self._tokens[key] = self._network.declare_token(key)
         for key in self._tokens.keys() - keys:
@@ -192,8 +190,8 @@ class Exporter:
             )
 
     async def _adjust(self) -> None:
-        """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Iterate over a copy: closing awaits the master, and concurrent calls of this method may change both tables.
+        """Open and close outbound and inbound topics to match the graph and the peers' requests."""
+        # Iterate over a copy, because closing awaits the master, and concurrent calls may change both tables meanwhile.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
@@ -226,7 +224,7 @@ class Exporter:
     # --- messages, service calls and queries from other gateways
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for messages received for a topic, or None if the topic has no local subscribers."""
+        """Return the local publisher for a topic's inbound messages, or None if no local node subscribes to the topic."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:
@@ -241,7 +239,7 @@ class Exporter:
         return inbound
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
-        """Queue a message for this robot. Runs in one of Zenoh's threads."""
+        """Queue an inbound message for this robot. Runs in one of Zenoh's threads."""
         parsed = parse_in(key)
         token = self.graph.topics.get(parsed[0]) if parsed else None
         if parsed is None or token is None or not token.is_subscribed:
@@ -254,7 +252,7 @@ class Exporter:
             )
 
     def _deliver(self, topic: str, md5sum: str, writer: str, body: bytes) -> None:
-        """Publish a message. Runs in the receiver's thread."""
+        """Publish an inbound message locally. Runs in the receiver's thread."""
         inbound = self.inbound.get(topic)
         if inbound is None or not inbound.publish(md5sum, body):
             run_on_loop(self._node, self._hold(topic, md5sum, writer, body))
@@ -286,7 +284,7 @@ class Exporter:
         return json.dumps(value, default=str).encode()
 
     def _allowed(self, name: str, tree: Mapping[str, object]) -> dict[str, object]:
-        """Return the part of a namespace that clients may read."""
+        """Return the part of a parameter tree that clients may read."""
         found: dict[str, object] = {}
         for key, value in tree.items():
             full = f"{name.rstrip('/')}/{key}"

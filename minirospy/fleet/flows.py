@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Flow(Generic[_T]):
-    """The queue of one flow: at most ``max_waiting`` messages and ``max_bytes`` bytes. A single message may be larger."""
+    """The queue of one flow, limited to ``max_waiting`` messages and ``max_bytes`` bytes. One larger message is accepted."""
 
     max_waiting: int
     max_bytes: int
@@ -29,7 +29,7 @@ class Flow(Generic[_T]):
 
 
 class FlowQueue(Generic[_T]):
-    """Flows that are served round-robin. Not thread-safe: the owner must hold a lock."""
+    """Serves flows round-robin. Not thread-safe: the owner must hold a lock."""
 
     def __init__(self) -> None:
         self._ready: OrderedDict[Flow[_T], None] = OrderedDict()
@@ -38,7 +38,7 @@ class FlowQueue(Generic[_T]):
         return len(self._ready)
 
     def add(self, flow: Flow[_T], item: _T, size: int) -> int:
-        """Append a message; return the number of the flow's messages dropped to make room for it."""
+        """Append a message to a flow; return how many of the flow's messages were dropped to make room."""
         flow.waiting.append((size, item))
         flow.waiting_bytes += size
         dropped = 0
@@ -52,7 +52,7 @@ class FlowQueue(Generic[_T]):
         return dropped
 
     def pop(self) -> tuple[Flow[_T], _T] | None:
-        """Return the next message and its flow, round-robin, or None if the queue is empty."""
+        """Return the next message and its flow in round-robin order, or None if the queue is empty."""
         while self._ready:
             flow, _ = self._ready.popitem(last=False)
             if not flow.waiting:

@@ -21,7 +21,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
-    """A fixed number of bytes to skip because they contain no frame id."""
+    """A fixed number of bytes without a frame id, to skip."""
 
     size: int
 
@@ -33,7 +33,7 @@ class _Text(NamedTuple):
 
 
 class _Array(NamedTuple):
-    """An array; ``steps`` describe one element. ``length`` is None if the array's length is variable."""
+    """An array. ``steps`` describes one element; ``length`` is None for an array of variable length."""
 
     length: int | None
     steps: tuple[_Step, ...]
@@ -46,7 +46,7 @@ class FrameRewriter:
     """Rewrites the frame ids in messages of one type."""
 
     def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
-        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid, or any error from ``lookup``."""
+        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid; pass on errors of ``lookup``."""
         self._steps = _trimmed(_steps(spec, lookup))
 
     @property
@@ -55,7 +55,7 @@ class FrameRewriter:
         return bool(self._steps)
 
     def rewritten(self, data: bytes | memoryview, change: Callable[[bytes], bytes]) -> bytes:
-        """Return a message with ``change`` applied to each frame id. Raise DeserializationError if the message is too short."""
+        """Return the message with ``change`` applied to each frame id. Raise DeserializationError if the message is too short."""
         data = bytes(data)
         if not self._steps:
             return data
@@ -69,7 +69,7 @@ class FrameRewriter:
 
 
 def prefixed(prefix: str) -> Callable[[bytes], bytes]:
-    """Return a function that changes ``base_link`` into ``robot1/base_link``; prefixed and empty ids stay unchanged."""
+    """Return a function that changes ``base_link`` to ``robot1/base_link``; empty or prefixed ids stay unchanged."""
     start = prefix.encode() + b"/"
 
     def change(frame: bytes) -> bytes:
@@ -80,7 +80,7 @@ def prefixed(prefix: str) -> Callable[[bytes], bytes]:
 
 
 def stripped(prefix: str) -> Callable[[bytes], bytes]:
-    """Return a function that changes ``robot1/base_link`` into ``base_link``; other ids stay unchanged."""
+    """Return a function that changes ``robot1/base_link`` to ``base_link``; other ids stay unchanged."""
     start = prefix.encode() + b"/"
 
     def change(frame: bytes) -> bytes:
@@ -133,7 +133,7 @@ def _has_frame(step: _Step) -> bool:
 
 
 def _trimmed(steps: tuple[_Step, ...]) -> tuple[_Step, ...]:
-    """Return the steps up to the last frame id; the rest of a message is copied unchanged."""
+    """Return the steps up to the last frame id, after which a message is copied unchanged."""
     last = max((number for number, step in enumerate(steps) if _has_frame(step)), default=-1)
     return steps[: last + 1]
 
@@ -146,7 +146,7 @@ def _run(
     change: Callable[[bytes], bytes],
     pieces: list[bytes],
 ) -> tuple[int, int]:
-    """Process ``data`` from offset ``at``. Return the end of the data copied so far, and the offset after the steps."""
+    """Process ``data`` from offset ``at``. Return the offsets at which the copied part and the processed part end."""
     for step in steps:
         if isinstance(step, _Skip):
             at += step.size

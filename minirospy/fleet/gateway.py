@@ -58,10 +58,10 @@ class GatewayOptions:
 
 
 class Gateway:
-    """Forwards topics and services between a master and the fleet. Runs on the node's loop."""
+    """Connects a master to the fleet: forwards topics and services. Runs on the node's loop."""
 
     def __init__(self, node: Node, options: GatewayOptions) -> None:
-        """Create the gateway. Raise BridgeError if the name in the options is not a legal robot name."""
+        """Create the gateway. Raise BridgeError if the name in the options is not a valid robot name."""
         if options.name and not is_robot_name(options.name):
             raise BridgeError(
                 f"[{options.name}] cannot be a robot's name: letters, digits and underscores, a letter first"
@@ -85,7 +85,7 @@ class Gateway:
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
-        """Open the session; wait for the router if one is configured. May be called before the node is started.
+        """Open the session; if a router is configured, wait for it. May be called before the node starts.
 
         Raise BridgeError if the configuration is invalid.
         """
@@ -93,7 +93,7 @@ class Gateway:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet if not yet connected, and start forwarding; continue until :meth:`close`.
+        """Connect to the fleet if necessary, and start to forward topics and services, until :meth:`close`.
 
         Raise BridgeError if the fleet cannot be joined, MasterUnreachableError or RpcError if a call to the master fails,
         or ROSInterruptException if the node is shut down first.
@@ -179,7 +179,7 @@ class Gateway:
             self._receiver.close()
 
     def status(self) -> dict[str, object]:
-        """Return this gateway's configuration and counters as JSON-compatible values."""
+        """Return this gateway's configuration and counters, as JSON-compatible values."""
         found: dict[str, object] = {
             "name": self.options.name,
             "gateway": self.id,
@@ -237,7 +237,7 @@ class Gateway:
         return found
 
     async def _wait_for_network(self) -> None:
-        """Open the session. Raise ROSInterruptException if the node is shut down first."""
+        """Open the session. Raise ROSInterruptException if the node shuts down before it is open."""
         opening = asyncio.ensure_future(self.connect())
         ending = asyncio.ensure_future(self.node.spin())
         try:
@@ -284,7 +284,7 @@ class Gateway:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # If the task is cancelled before its first step, the coroutine has not started and must be closed.
+        # If the task is cancelled before its first step, the coroutine was never started and must be closed.
         task.add_done_callback(lambda _: work.close())
         return task
 

@@ -14,8 +14,8 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # Zenoh's default lease time, after which it closes a silent link
-# maximum number of names to hold for robots that have left; limited because the peers choose the names
+HOLD_SECONDS = 10.0  # seconds to hold a name: Zenoh's default lease, after which it closes a silent link
+# maximum number of held names of robots that have left; limited because peers choose the names
 MAX_HOLDS = 5_000
 
 
@@ -27,10 +27,10 @@ class _Hold:
 
 
 class Holders:
-    """Selects and remembers which claim to a name holds it."""
+    """Decides which of several claims holds a name, and remembers the decision."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Create an empty record. ``clock`` returns monotonic seconds."""
+        """Create the object without any holders. ``clock`` returns monotonic seconds."""
         self.machines: Mapping[str, str] = {}
         """The machines that the operator has chosen, keyed by robot name."""
         self._clock = clock
@@ -38,19 +38,19 @@ class Holders:
         self._given_up: set[Claim] = set()
 
     def give_up(self, claim: Claim) -> None:
-        """Release a claim whose gateway does not respond. Another gateway on its machine may then take the name.
+        """Release the claim of an unresponsive gateway. Another gateway on the same machine may then take the name.
 
         The gateway's token may still exist.
         """
         self._given_up.add(claim)
 
     def holder(self, name: str) -> Claim | None:
-        """Return the claim that holds a name, even if its gateway has just left the fleet."""
+        """Return the claim that holds a name, even if its gateway left the fleet recently."""
         hold = self._holds.get(name)
         return hold.claim if hold else None
 
     def choose(self, name: str, claims: Sequence[Claim]) -> Claim | None:
-        """Select the claim that holds a name, or return None if no claim may hold it now.
+        """Select the claim that holds a name; return None if no claim may hold it now.
 
         ``claims`` lists the current claims, first seen first.
         """
@@ -76,7 +76,7 @@ class Holders:
         return self._hold(name, present)
 
     def forget(self, present: Collection[str]) -> None:
-        """Forget the names whose holders left more than HOLD_SECONDS ago.
+        """Release the names whose holders left more than HOLD_SECONDS ago.
 
         ``present`` contains the names that are still claimed.
         """
@@ -93,7 +93,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return the seconds until the first of these names is released, or None if no holder has left."""
+        """Return the seconds until the next of these names is released, or None if none of their holders has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names
@@ -109,7 +109,7 @@ class Holders:
 
 
 def parse_machines(value: object) -> dict[str, str]:
-    """Parse the operator's choices, a dict of machines keyed by robot name. Ignore invalid entries."""
+    """Parse the machines chosen by the operator, a dict keyed by robot name. Ignore invalid entries."""
     if not isinstance(value, dict):
         return {}
     return {str(name): machine for name, machine in value.items() if is_machine(machine)}

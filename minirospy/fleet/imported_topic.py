@@ -51,13 +51,13 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MAX_MESSAGE = 256 << 20
 _MAX_OFFERS = 10
-# maximum number of concurrent registrations; each uses its own connection to the master
+# maximum number of concurrent registrations; each uses a separate connection to the master
 MAX_REGISTERING = 50
 
 
 @dataclass
 class Shared:
-    """The objects shared by all of the importer's topics."""
+    """Objects that all topics of the importer share."""
 
     node: Node
     network: FleetNetwork
@@ -75,7 +75,7 @@ class Shared:
 
 
 class ImportedTopic:
-    """One topic of one robot. Runs on the loop, except that other threads handle its messages."""
+    """A topic of one robot, imported into the local graph. Runs on the loop; other threads handle its messages."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
         """Create the topic. ``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
@@ -107,7 +107,7 @@ class ImportedTopic:
 
     @property
     def needs_snapshot(self) -> bool:
-        """Return whether only a snapshot of the local graph shows the topic's other publishers.
+        """Return whether a graph snapshot is needed to detect other local publishers of the topic.
 
         This is the case if this gateway publishes the topic itself.
         """
@@ -115,7 +115,7 @@ class ImportedTopic:
 
     @property
     def dropped(self) -> int:
-        """Return the number of the robot's messages dropped because local subscribers were too slow."""
+        """Return how many of the robot's messages were dropped because local subscribers were too slow."""
         return self._flow.dropped
 
     @property
@@ -124,11 +124,11 @@ class ImportedTopic:
         return self._outflow
 
     def start(self) -> None:
-        """Register the topic."""
+        """Register the topic with the master."""
         self._shared.spawn(self._open())
 
     def update(self, token: TopicToken) -> bool:
-        """Apply a changed token; return False if the topic must be closed and recreated."""
+        """Apply a changed token. Return False if the topic must be closed and created again."""
         before, self.token = self.token, token
         if token == before:
             return True
@@ -145,7 +145,7 @@ class ImportedTopic:
         return True
 
     def look(self, snapshot: Snapshot | None) -> None:
-        """Update the topic to match the local graph."""
+        """Match the topic to the current local graph."""
         if self._is_closed:
             return
         if self.needs_snapshot and snapshot is not None:
@@ -179,7 +179,7 @@ class ImportedTopic:
                 self._advertise(interface)
             elif token.is_subscribed:
                 self._subscribe()
-            # Limit the concurrent calls: a thousand robots need 8,000, which the master handles one by one.
+            # Limit the concurrent calls: a thousand robots need 8,000, which the master handles one at a time.
             handle = self._publisher or self._subscription
             if handle is not None:
                 await handle.wait_until_registered()
@@ -202,10 +202,10 @@ class ImportedTopic:
             self._statics = shared.statics.setdefault(self.name, made) if self._is_global else made
         self._links_changed()
 
-    # --- from the robot
+    # --- messages from the robot
 
     def _links_changed(self) -> None:
-        """Request the topic from the robot while local nodes (other than this gateway) subscribe to it."""
+        """Request the topic from the robot while local nodes other than this gateway subscribe to it."""
         publisher = self._publisher
         if publisher is None or self._is_closed:
             return
@@ -223,7 +223,7 @@ class ImportedTopic:
         shared, token = self._shared, self.token
         ends = token.robot, token.gateway
         network = shared.network
-        # Declare the token last: the robot starts sending as soon as it appears.
+        # Declare the token last, because the robot starts sending as soon as the token appears.
         self._wanted = [
             network.subscribe(out_key(*ends, token.md5sum, token.topic), self._arrived),
             network.subscribe(replay_key(*ends, token.md5sum, token.topic, shared.gateway), self._arrived),
@@ -239,12 +239,11 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # Forget the local copy, which may become outdated.
-            # The robot resends its latched message to the next subscriber.
+            # Forget the local copy, which may become outdated: the robot resends its latched message to the next subscriber.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
-        """Queue a message. Runs in one of Zenoh's threads."""
+        """Queue a message from the robot. Runs in one of Zenoh's threads."""
         if len(message) > _MAX_MESSAGE:
             self._misfits.error(
                 "a message on %s of %d bytes is left out: it is too large", self.name, len(message)
@@ -259,13 +258,12 @@ class ImportedTopic:
         self._publish(message)
 
     def _deliver(self, message: bytes, attachment: bytes) -> None:
-        """Publish a message locally. Runs in the receiver's thread."""
+        """Publish a message from the robot locally. Runs in the receiver's thread."""
         stamp = parse_stamp(attachment)
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart when the robot reopens the topic.
-            # A step back or a huge step forward therefore does not mean lost messages.
+            # Ignore a step back or a huge step forward: the sequence numbers restart when the robot reopens the topic.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()
@@ -285,7 +283,7 @@ class ImportedTopic:
         except ROSException:
             return  # the topic was closed during the await
 
-    # --- to the robot
+    # --- messages to the robot
 
     def _subscribe(self) -> None:
         if self._subscription or self._is_closed or self._is_global:
@@ -300,7 +298,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # Clear all attributes before the await: while it runs, the topic may be subscribed to again, with a new outflow.
+        # Clear all attributes before the await: meanwhile, the topic may be subscribed to again, with a new outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None
@@ -312,7 +310,7 @@ class ImportedTopic:
             await subscription.close()
 
     def _offer(self) -> None:
-        """Offer the topic to the robot while local nodes (other than this gateway) publish it."""
+        """Offer the topic to the robot while local nodes other than this gateway publish it."""
         subscription = self._subscription
         if subscription is None:
             return
@@ -337,7 +335,7 @@ class ImportedTopic:
         self._offer()
         token = self.token
         md5sum = header["md5sum"]
-        # Store the definition, so that a peer can request a type that is installed only on this machine.
+        # Store the definition, so that peers can request a type that is installed only on this machine.
         self._shared.definitions.learn(token.type, md5sum, header.get("message_definition", ""))
         key = in_key(token.robot, token.gateway, md5sum, token.topic, self._shared.gateway)
         outflow.send(key, bytes(frame), always=header.get("latching") == "1")

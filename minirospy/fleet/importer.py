@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["MACHINES", "ImportedRobot", "Importer"]
 
 MACHINES = "/fleet/machines"
-"""The parameter that holds the operator's choice of machines, keyed by robot; set by `minirospy fleet takeover`."""
+"""The parameter with the machines chosen by the operator, keyed by robot; set by `minirospy fleet takeover`."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
@@ -44,23 +44,23 @@ _PINGS = 5
 PING_SECONDS = 5.0
 _MAX_PING = 64  # maximum size in bytes of a reply to a ping; a valid reply has 8 bytes
 _CALL_SECONDS = 3600.0
-# seconds for a name's holder to reply when another gateway on the same machine claims the name
+# timeout in seconds for a name's holder to reply after another gateway on its machine has claimed the name
 CHALLENGE_SECONDS = 2.0
-# Return memory to the system after removing this many names (some 4 MB), and this many seconds later, because links close late
+# return memory to the system after removing this many names (about 4 MB) and this delay, because links close late
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
-MAX_ROBOT_NAMES = 2_000  # maximum number of names that one robot may use, out of _MAX_IMPORTED
-# maximum number of a robot's names to close concurrently; each needs a task and a call to the master
+MAX_ROBOT_NAMES = 2_000  # maximum number of names per robot; all robots share _MAX_IMPORTED
+# maximum number of a robot's names to close concurrently: each needs a task and a call to the master
 MAX_CONCURRENT_NAMES = 100
 MAX_LISTED = 5  # maximum number of robots named in one log line
 LINES = 5  # maximum number of log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
 _MAX_CONCURRENT_ROBOTS = 20  # maximum number of robots to remove concurrently
-# maximum number of names to register; the master accepts at most 10,000 per node
+# maximum number of names to register: the master accepts at most 10,000 per node
 _MAX_IMPORTED = 9_000
 
 
 class ImportedRobot:
-    """A robot whose topics and services are in the local graph."""
+    """A robot whose topics and services are registered in the local graph."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -73,7 +73,7 @@ class ImportedRobot:
 
 
 class Importer:
-    """Shows the fleet's robots in the local graph.
+    """Registers the fleet's robots in the local graph.
 
     Runs on the node's loop, except that messages are handled in other threads.
     """
@@ -140,11 +140,11 @@ class Importer:
 
     @property
     def names(self) -> list[str]:
-        """Return the names of the robots that are shown."""
+        """Return the names of the imported robots."""
         return list(self.robots)
 
     async def start(self) -> None:
-        """Start showing robots; continue until :meth:`close`.
+        """Start importing robots; continue until :meth:`close`.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -216,7 +216,7 @@ class Importer:
     # --- imported robots
 
     async def _reconcile(self) -> None:
-        """Add, update and remove robots to match the fleet's contents."""
+        """Add, update and remove imported robots to match the fleet's contents."""
         if self._is_reconciling:
             self._reconciling = None
             self._soon(_SETTLE_SECONDS)
@@ -230,7 +230,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # This pause lets other tasks run while a thousand robots join.
+            # Pause to let other tasks run while a thousand robots join.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -249,7 +249,7 @@ class Importer:
                 left.append(name)
         self._report_names(left, "left")
         for first in range(0, len(gone), _MAX_CONCURRENT_ROBOTS):
-            # return_exceptions keeps one robot's failure from affecting the others.
+            # With return_exceptions, one robot's failure does not affect the others.
             for error in await asyncio.gather(
                 *map(self._remove, gone[first : first + _MAX_CONCURRENT_ROBOTS]), return_exceptions=True
             ):
@@ -276,7 +276,7 @@ class Importer:
                 self._soon(AGAIN_SECONDS)
 
     def _report_names(self, names: list[str], what: str) -> None:
-        """Log the robots that have joined or left, in one line."""
+        """Log on one line which robots have joined or left."""
         if len(names) == 1:
             self._comings.info("robot [%s] has %s", names[0], what)
         elif names:
@@ -286,7 +286,7 @@ class Importer:
             self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
 
     def _report_machine(self, claim: Claim) -> None:
-        """Log that a robot's name is now held by another machine."""
+        """Log that another machine now holds a robot's name."""
         before = self._machines.get(claim.name, claim.host)
         if before != claim.host:
             is_chosen = claim.name in self.contents.holders.machines
@@ -303,7 +303,7 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log each gateway whose name is taken by another gateway, once per gateway.
+        """Log each gateway that is not shown because another gateway holds its name, once per gateway.
 
         If both run on the same machine, challenge the holder instead.
         """
@@ -338,7 +338,7 @@ class Importer:
                 )
 
     def _challenge(self, refused: Refused) -> None:
-        """Ping the holder of a name, because its gateway may have been restarted on the same machine."""
+        """Ping the holder of a name: its gateway may have been restarted on the same machine."""
         name = refused.claim.name
         if name not in self._challenging:
             self._challenging.add(name)
@@ -409,7 +409,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Schedule returning the memory of removed names to the system. Links close late, so wait before that."""
+        """Schedule returning the memory of removed names to the system, with a delay because links close late."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()
@@ -435,8 +435,7 @@ class Importer:
             answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
             leaving = asyncio.ensure_future(left.wait())
             try:
-                # Stop waiting as soon as the robot has left.
-                # Zenoh ends a query when the robot's token disappears, which can take minutes.
+                # Stop waiting as soon as the robot has left: Zenoh itself may take minutes to end the query.
                 await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
                 if not answering.done():
                     raise ServiceException(f"robot [{token.robot}] has left during the call")
@@ -466,7 +465,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph, or None if no robot both publishes and subscribes to a topic: it is not needed then."""
+        """Return a snapshot of the local graph, or None if no topic needs it."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node.call_master)
         return None
@@ -477,7 +476,7 @@ class Importer:
                 topic.look(snapshot)
 
     async def _answering(self) -> list[str] | None:
-        """Query all gateways in the fleet; return the gateways that respond, or None if the query cannot be sent."""
+        """Ping all gateways in the fleet. Return those that respond, or None if the query cannot be sent."""
         start = f"{ROOT}/ping/"
         try:
             answers = await self._network.queries(f"{start}*", seconds=PING_SECONDS, size=_MAX_PING)

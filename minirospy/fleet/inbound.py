@@ -42,7 +42,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 
 
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
-    """Run a coroutine on a node's loop and wait until it is done.
+    """Run a coroutine on a node's loop; wait until it has finished.
 
     Waiting keeps further messages in the receiver's queue while the loop is slow.
     """
@@ -52,7 +52,7 @@ def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
 
 
 class InboundTopic:
-    """Publishes the messages that writers send. Buffers them until the robot's subscribers are connected."""
+    """Publishes inbound messages on a local topic. Buffers them until the robot's subscribers are connected."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class InboundTopic:
 
     @property
     def is_idle(self) -> bool:
-        """Return whether no writer offers the topic and no message has arrived recently."""
+        """Return whether no writer offers the topic and no message has arrived recently, so that it can be closed."""
         return not self._offers and time.monotonic() - self._last > _IDLE_SECONDS
 
     @property
@@ -105,7 +105,7 @@ class InboundTopic:
         return self._publisher is not None and any(peer != own for peer in self._publisher.subscribers)
 
     def offer_changed(self, offer: Offer, is_there: bool) -> None:
-        """Record an offer or its withdrawal. Publish the topic while a writer offers it."""
+        """Record an offer or its withdrawal. Publish the topic while any writer offers it."""
         self._last = time.monotonic()
         if not is_there:
             self._offers.discard(offer)
@@ -122,7 +122,7 @@ class InboundTopic:
         return True
 
     def keep(self, md5sum: str, writer: str, body: bytes) -> None:
-        """Buffer a message that arrived before the topic is ready. Runs on the loop."""
+        """Buffer a message that arrived before the topic was ready. Runs on the loop."""
         if self.publish(md5sum, body):
             return
         self._prepare(md5sum, writer)
@@ -145,7 +145,7 @@ class InboundTopic:
             await publisher.close()
 
     def _prepare(self, md5sum: str, writer: str) -> None:
-        # A topic has only one type: the locally known type, or otherwise the type of the first writer.
+        # A topic has a single type: the type known locally or, if there is none, that of the first writer.
         if self._md5sum or self.token.md5sum not in (UNKNOWN_MD5, md5sum):
             return
         self._md5sum = md5sum
@@ -177,8 +177,7 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher.wait_for_expected()
-        # Publish buffered messages first.
-        # Until that is done, the receiver's thread passes new messages to `keep`, which runs on this loop.
+        # Publish buffered messages before newer ones, which the receiver's thread meanwhile passes to `keep` on this loop.
         for body in self._held:
             self._put(publisher, body)
         self._held.clear()

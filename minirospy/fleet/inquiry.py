@@ -23,7 +23,7 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Run ``question`` in a new session; return its result.
+    """Call ``question`` with a new fleet session; return its result.
 
     Raise BridgeError if neither a gateway nor a router is reached.
     """
@@ -44,7 +44,7 @@ def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitabl
 
 
 async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answer], list[Answer]]:
-    """Return the status of all robots, and of all control rooms. Wait at most ``seconds`` for each gateway's reply."""
+    """Return the status of all robots and of all control rooms. Wait at most ``seconds`` for each gateway."""
     robots = await _claims(network, "robot", seconds)
     controls = await _claims(network, "control", seconds)
     limit = asyncio.Semaphore(_MAX_CONCURRENT)
@@ -62,7 +62,7 @@ async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answ
 
 
 async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds: float) -> object:
-    """Return a robot's parameter, or a dict if the name is a namespace. Raise BridgeError if the robot does not provide it."""
+    """Return a robot's parameter, or a dict for a namespace. Raise BridgeError if the robot does not provide it."""
     claim = await _shown_claim(network, robot, seconds)
     if claim is None:
         raise BridgeError(
@@ -81,7 +81,7 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
 
 
 async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
-    """Return the claim to a name.
+    """Return the claim that control rooms show for a robot's name.
 
     If there are several claims, return the one that the control rooms show; raise BridgeError if the control rooms disagree.
     """
@@ -89,7 +89,7 @@ async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Cla
     if len(claims) > 1:
         _, controls = await fleet_status(network, seconds)
         shown = [claim for claim in claims if is_shown(claim, controls)]
-        # Use each machine's newest claim, because its previous gateway's token may still exist.
+        # Use each machine's newest claim, because the token of a previous gateway may still exist.
         claims = (
             [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
         )

@@ -66,10 +66,10 @@ __all__ = [
 ]
 
 ROOT = "@minirospy/1"
-"""The first chunk starts with ``@``, so that ``**`` does not match it. The second one is the version of this key scheme."""
+"""The first chunk starts with ``@``, so that ``**`` does not match it; the second is the version of this key scheme."""
 
 UNKNOWN_MD5 = "-"
-"""Represents an unknown md5sum: the topic has no publishers, and its type is not installed."""
+"""An unknown md5sum: the topic has no publishers, and its type is not installed."""
 
 _MAX_NAME = 256
 _ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
@@ -82,7 +82,7 @@ _STAMP = struct.Struct("<Iq")
 
 
 class Claim(NamedTuple):
-    """A gateway's claim to represent a robot. ``start``: since when, in ns of the gateway's clock; ``host``: its machine.
+    """A gateway's claim to represent a robot. ``start`` is in ns of the gateway's clock; ``host`` is its machine.
 
     Neither ``start`` nor ``host`` is verified; no decision depends on ``start``.
     """
@@ -94,7 +94,7 @@ class Claim(NamedTuple):
 
 
 class TopicToken(NamedTuple):
-    """A robot's topic. If ``has_frames``, the robot's prefix is added to the frame ids in its messages."""
+    """A robot's topic. If ``has_frames`` is true, the robot's name is prefixed to the frame ids in its messages."""
 
     robot: str
     gateway: str
@@ -107,7 +107,7 @@ class TopicToken(NamedTuple):
     has_frames: bool = False
 
     def has_same_messages(self, other: TopicToken) -> bool:
-        """Return whether another token's topic carries the same messages, so that a subscriber to either receives both."""
+        """Return whether the other token's topic has the same messages, so that a subscriber to either topic receives both."""
         ends = other._replace(is_subscribed=self.is_subscribed, is_latched=self.is_latched)
         return self.is_published and ends == self
 
@@ -123,14 +123,14 @@ class ServiceToken(NamedTuple):
 
 
 class Want(NamedTuple):
-    """A reader's request for a topic that its local nodes subscribe to."""
+    """A request for a topic by another gateway (the reader) whose local nodes subscribe to it."""
 
     topic: str
     reader: str
 
 
 class Offer(NamedTuple):
-    """A writer's offer to publish a topic that the robot subscribes to."""
+    """An offer of messages for a topic by another gateway (the writer) whose local nodes publish it."""
 
     topic: str
     writer: str
@@ -140,19 +140,19 @@ class Offer(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """A message's attachment: its sequence number on the topic, and its send time, in ns of the sender's clock."""
+    """A message's attachment: its sequence number on the topic, and its send time in ns of the sender's clock."""
 
     number: int
     nanoseconds: int
 
 
 def is_robot_name(name: str) -> bool:
-    """Return whether a name is a legal robot name. Robot names become ROS namespaces."""
+    """Return whether a name is valid for a robot. Robot names become ROS namespaces."""
     return bool(_ROBOT.fullmatch(name))
 
 
 def is_machine(value: object) -> bool:
-    """Return whether a value is a valid machine id, the last part of a robot's token."""
+    """Return whether a value is a valid machine id, which is the last part of a robot's token."""
     return isinstance(value, str) and bool(_GATEWAY.fullmatch(value))
 
 
@@ -162,18 +162,18 @@ def is_md5(text: str) -> bool:
 
 
 def mangled(name: str) -> str:
-    """Convert a name or type to a single chunk of a key: ``/arm/state`` becomes ``%arm%state``."""
+    """Convert a name or type to a single key chunk: ``/arm/state`` becomes ``%arm%state``."""
     return name.replace("/", "%")
 
 
 def unmangled(chunk: str) -> str | None:
-    """Convert a chunk to a global graph resource name; return None if the chunk is not legal."""
+    """Convert a key chunk to a global graph resource name, or to None if the chunk is invalid."""
     name = chunk.replace("%", "/")
     return name if is_global_name(name) else None
 
 
 def is_global_name(name: str) -> bool:
-    """Return whether a string is a global graph resource name within the length limit."""
+    """Return whether a string is a global graph resource name and not too long."""
     return (
         len(name) <= _MAX_NAME
         and name.startswith("/")
@@ -187,12 +187,12 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key that stores a robot's token or, if ``kind`` is "control", a control room's, whose name may be ``-``."""
+    """Return the key of a robot's token or, if ``kind`` is "control", of a control room's, whose name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 
 def parse_claim(key: str, kind: str = "robot") -> Claim | None:
-    """Parse the key of a robot's or control room's token."""
+    """Parse the key of a robot's or a control room's token."""
     match _chunks(key, kind):
         case [name, gateway, start, host]:
             if not is_robot_name(name) and not (kind == "control" and name == "-"):
@@ -261,12 +261,12 @@ def parse_service(key: str) -> ServiceToken | None:
 
 
 def want_key(robot: str, gateway: str, want: Want) -> str:
-    """Return the key of a reader's token."""
+    """Return the key of the token with which a gateway requests a topic from a robot."""
     return f"{ROOT}/want/{robot}/{gateway}/{mangled(want.topic)}/{want.reader}"
 
 
 def parse_want(key: str) -> Want | None:
-    """Parse the key of a reader's token."""
+    """Parse the key of a token with which a gateway requests a topic."""
     match _chunks(key, "want"):
         case [_, _, topic, reader]:
             name = unmangled(topic)
@@ -276,7 +276,7 @@ def parse_want(key: str) -> Want | None:
 
 
 def offer_key(robot: str, gateway: str, offer: Offer) -> str:
-    """Return the key of a writer's token."""
+    """Return the key of the token with which a gateway offers a robot messages for a topic."""
     flags = "l" if offer.is_latched else "-"
     type_ = mangled(offer.type)
     return (
@@ -285,7 +285,7 @@ def offer_key(robot: str, gateway: str, offer: Offer) -> str:
 
 
 def parse_offer(key: str) -> Offer | None:
-    """Parse the key of a writer's token."""
+    """Parse the key of a token with which a gateway offers messages for a topic."""
     match _chunks(key, "offer"):
         case [_, _, topic, writer, type_, md5sum, flags]:
             name = unmangled(topic)
@@ -300,7 +300,7 @@ def parse_offer(key: str) -> Offer | None:
 
 
 def out_key(robot: str, gateway: str, md5sum: str, topic: str) -> str:
-    """Return the key for a robot's outgoing messages."""
+    """Return the key on which a robot publishes a topic's messages."""
     return f"{ROOT}/out/{robot}/{gateway}/{md5sum}/{mangled(topic)}"
 
 
@@ -310,7 +310,7 @@ def replay_key(robot: str, gateway: str, md5sum: str, topic: str, reader: str) -
 
 
 def in_key(robot: str, gateway: str, md5sum: str, topic: str, writer: str) -> str:
-    """Return the key for a writer's messages to a robot."""
+    """Return the key on which a writer sends a topic's messages to a robot."""
     return f"{ROOT}/in/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{writer}"
 
 
@@ -325,7 +325,7 @@ def parse_in(key: str) -> tuple[str, str, str] | None:
 
 
 def call_key(robot: str, gateway: str, service: str, md5sum: str) -> str:
-    """Return the key for calls to a service."""
+    """Return the key on which a service is called."""
     return f"{ROOT}/call/{robot}/{gateway}/{mangled(service)}/{md5sum}"
 
 
@@ -340,7 +340,7 @@ def parse_call(key: str) -> tuple[str, str] | None:
 
 
 def definition_key(gateway: str, type_: str, md5sum: str) -> str:
-    """Return the key for queries for a type's full definition."""
+    """Return the key on which a type's full definition is queried."""
     return f"{ROOT}/definition/{gateway}/{mangled(type_)}/{md5sum}"
 
 
@@ -359,12 +359,12 @@ def serialize_stamp(stamp: Stamp) -> bytes:
 
 
 def parse_stamp(data: bytes) -> Stamp | None:
-    """Parse a message's attachment; return None if it is not from a minirospy gateway."""
+    """Parse a message's attachment, or return None if it is not from a minirospy gateway."""
     return Stamp._make(_STAMP.unpack(data)) if len(data) == _STAMP.size else None
 
 
 def _chunks(key: str, kind: str) -> list[str]:
-    """Return the chunks that follow the kind in a key, or an empty list if the key is of another kind."""
+    """Return the chunks that follow the kind in a key, or an empty list if the key's kind is different."""
     start = f"{ROOT}/{kind}/"
     return key[len(start) :].split("/") if key.startswith(start) else []
 

@@ -60,11 +60,11 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-# maximum number of bytes in a query or a reply, such as a service's response or a definition
+# maximum size in bytes of a query or reply, such as a service's response or a definition
 MAX_TEXT = 16 << 20
-# maximum number of replies to a query; limited because the peers choose it, and a fleet has at most 5,000 gateways
+# maximum number of replies to a query: peers choose it, and a fleet has at most 5,000 gateways
 MAX_REPLIES = 10_000
-# fraction of the timeout; a query that ends sooner without replies has lost its link
+# fraction of the timeout: if a query ends sooner without a reply, the link was lost
 EARLY_SHARE = 0.9
 RETRY_SECONDS = 1.0
 LINGER_SECONDS = 2.0
@@ -81,7 +81,7 @@ The limit is separate so that blocked service calls do not delay them.
 
 
 async def _remove_linger() -> None:
-    """Periodically remove SO_LINGER from all Zenoh links, well within their lease of 10 s."""
+    """Periodically remove SO_LINGER from all of Zenoh's links, more often than their lease of 10 s."""
     remover = LingerRemover()
     while True:
         remover.look()
@@ -89,11 +89,11 @@ async def _remove_linger() -> None:
 
 
 class QueryFailed(MinirospyError):
-    """Raised if a query receives no reply, or an error as its reply."""
+    """Raised if a query gets no reply, or an error in reply."""
 
 
 class FleetNetwork:
-    """A Zenoh session; created by :meth:`open`. Handlers are called on the loop that opened it."""
+    """A Zenoh session, created by :meth:`open`. Handlers are called on the loop that called it."""
 
     def __init__(
         self, session: Session, loop: asyncio.AbstractEventLoop, *, has_many_links: bool = False
@@ -101,7 +101,7 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # A single thread keeps the calls in order, so that peers see declarations in the order in which they were made.
+        # A single thread preserves the order of the calls, and therefore of the declarations that peers see.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(MAX_QUERIES)
@@ -115,7 +115,7 @@ class FleetNetwork:
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
-        """Open a session; if ``waits``, wait until a peer is connected. Raise BridgeError if the configuration is invalid."""
+        """Open a session; if ``waits``, wait for a peer. Raise BridgeError if the configuration is invalid."""
         has_many_links = bool(options.listen or options.config)
         require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")
@@ -161,7 +161,7 @@ class FleetNetwork:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Undeclaring fails on a broken link, but the peer detects the loss by itself.
+        # Undeclaring fails on a broken link, but the peer then detects the loss itself.
         with contextlib.suppress(self._zenoh.ZError):
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
@@ -186,7 +186,7 @@ class FleetNetwork:
         )
 
     async def tokens(self, pattern: str, seconds: float) -> list[str]:
-        """Query the existing tokens for at most ``seconds``; return their keys."""
+        """Query existing tokens for at most ``seconds``; return their keys."""
         found: list[str] = []
 
         def arrived(reply: Reply) -> bool:
@@ -224,7 +224,7 @@ class FleetNetwork:
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
     def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Deferred:
-        """Call ``changed(is_there)`` when a key's first subscriber in another session appears, and when the last disappears."""
+        """Call ``changed(is_there)`` when a key gets its first subscriber in another session, and when it loses the last one."""
 
         def declare() -> Declared:
             publisher = self._session.declare_publisher(key, **self._to_others)
@@ -238,7 +238,7 @@ class FleetNetwork:
         return self._declare(declare)
 
     def beacon(self, key: str) -> Beacon:
-        """Return a publisher that sends empty messages to other sessions, with the lowest priority."""
+        """Return a publisher of empty messages to other sessions, with the lowest priority."""
         zenoh = self._zenoh
         return Beacon(
             self._caller,
@@ -261,7 +261,7 @@ class FleetNetwork:
         return self.outlet(key, priority, **self._to_others)
 
     def outlet(self, key: str, priority: Priority, **options: object) -> Outlet:
-        """Return a publisher with Zenoh's ``options``.
+        """Return a publisher for a key, created with Zenoh's ``options``.
 
         This method and the publisher's ``put`` may block, so call both in a priority's thread.
         """
@@ -289,7 +289,7 @@ class FleetNetwork:
         is_control: bool = False,
         from_others: bool = False,
     ) -> Deferred:
-        """Answer queries.
+        """Declare a queryable for ``pattern`` that replies with the results of ``handler``.
 
         ``handler(key, request)`` returns the reply, or raises MinirospyError with the reason for a refusal.
         Set ``is_control`` for the fleet's own queries, whose handlers never wait for user nodes. If ``from_others``, ignore
@@ -297,7 +297,7 @@ class FleetNetwork:
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # A peer replies to a query with wildcards under its own key.
+        # A peer replies under its own key to a query with wildcards.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -310,7 +310,7 @@ class FleetNetwork:
     async def query(
         self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
     ) -> bytes:
-        """Return the first reply. Raise QueryFailed if there is no reply, or the reply is an error.
+        """Send a query and return the first reply. Raise QueryFailed if there is no reply, or it is an error.
 
         If ``of_others``, query only other sessions; if several sessions match, query the best match.
         """
@@ -337,7 +337,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return a dict of replies keyed by key: at most ``most`` replies, each of at most ``size`` bytes.
+        """Return the replies, keyed by their key: at most ``most`` replies of at most ``size`` bytes each.
 
         Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """
@@ -368,7 +368,7 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
-                    # By default, Zenoh withholds all replies until the last one has arrived or the timeout has expired.
+                    # Zenoh's default would withhold all replies until the last one has arrived or the timeout has expired.
                     "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,
@@ -382,7 +382,7 @@ class FleetNetwork:
     # --- internal
 
     async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], bool]) -> None:
-        """Start a query. Return after its last reply, or as soon as ``arrived`` returns True."""
+        """Start a query. Return after the last reply, or as soon as ``arrived`` returns True."""
         if self._is_closed:
             raise QueryFailed("the gateway is closed")
         ended = asyncio.Event()
@@ -402,13 +402,13 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in its own thread; otherwise Zenoh would start a thread per handler."""
+        """Return a handler that Zenoh calls in its own thread; by default it starts a thread for each handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        # Check the limit here, because all tasks of a burst are created before the first one runs.
+        # Check the limit here, because a burst creates all its tasks before the first one runs.
         is_full = len(share.tasks) >= share.limit
         refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
         task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
@@ -455,14 +455,14 @@ class FleetNetwork:
 
 @dataclass(eq=False)
 class _Share:
-    """The queries of one kind that are being handled, and the maximum number."""
+    """The running handlers for one kind of query, and their maximum number."""
 
     limit: int
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Deferred:
-    """A Zenoh entity that is declared, and later undeclared, in the background."""
+    """A Zenoh entity that is declared and later undeclared in the background."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]
@@ -474,7 +474,7 @@ class Deferred:
             caller.submit(self._declare, declare)
 
     def undeclare(self) -> None:
-        """Undeclare in the background. Idempotent."""
+        """Undeclare the entity in the background. Idempotent."""
         with contextlib.suppress(RuntimeError):
             self._caller.submit(self._undeclare)
 
@@ -493,7 +493,7 @@ class Deferred:
 
 @dataclass(frozen=True)
 class _Together:
-    """Two declarations that are undeclared together."""
+    """Two declarations that are undeclared at the same time."""
 
     first: Declared
     second: Declared
@@ -521,7 +521,7 @@ class Beacon:
         self._declared = Deferred(caller, opened, fault)
 
     def put(self) -> None:
-        """Send an empty message in the background; skip it while the previous one is pending."""
+        """Send an empty message in the background, unless the previous one is still pending."""
         if not self._is_waiting:
             self._is_waiting = True
             with contextlib.suppress(RuntimeError):

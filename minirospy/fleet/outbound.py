@@ -26,7 +26,7 @@ _MAX_LATCHED = 100
 
 
 class OutboundTopic:
-    """Sends a topic's messages to the fleet, and resends the latched messages to each late reader."""
+    """Sends a topic's messages to the fleet, and resends latched messages to each reader that joins later."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class OutboundTopic:
         self.outflow.close()
 
     def replay(self, key: str) -> None:
-        """Resend the latched messages on ``key``, the key of a late reader."""
+        """Resend the latched messages on ``key``, which only the new reader subscribes to."""
         self._forget_disconnected()
         for body in self._latched.values():
             self.outflow.send(key, body, always=True)

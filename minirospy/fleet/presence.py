@@ -13,14 +13,14 @@ from collections.abc import Awaitable, Callable, Collection
 __all__ = ["Presence"]
 
 REGULAR_SECONDS, LOST_SECONDS = 60.0, 10.0
-"""Seconds between checks: normally, and while a gateway is lost (shorter, to notice its return soon)."""
+"""Seconds between checks: normally, and while a gateway is lost, to notice its return soon."""
 _SETTLE_SECONDS = 2.0
-"""Seconds to wait after a robot has left, because robots that are lost together disappear one by one."""
+"""Seconds to wait after a robot has left: robots that are lost together disappear one by one."""
 _ROUNDS, ROUND_SECONDS = 2, 5.0
 
 
 class Presence:
-    """Tracks the gateways that do not respond."""
+    """Tracks which gateways do not respond."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Presence:
         self._soon.set()
 
     async def watch(self) -> None:
-        """Check at regular intervals, and soon after :meth:`check_soon`."""
+        """Check the gateways at regular intervals, and soon after :meth:`check_soon`."""
         while True:
             pause = LOST_SECONDS if self.lost else REGULAR_SECONDS
             waiting = asyncio.ensure_future(self._soon.wait())

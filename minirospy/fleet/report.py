@@ -21,7 +21,7 @@ MAX_LEVELS = 50
 
 @dataclass(frozen=True)
 class Answer:
-    """A gateway that is present: its claim, its reply ({} if there is none), and its clock."""
+    """A gateway in the fleet: its claim, its reply ({} if there was none), and its clock offset."""
 
     claim: Claim
     status: Json
@@ -29,7 +29,7 @@ class Answer:
 
 
 def parse_answer(data: bytes) -> Json:
-    """Return a gateway's status, or {} if the data is invalid."""
+    """Parse a gateway's status; return {} if the data is invalid."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError):
@@ -38,14 +38,14 @@ def parse_answer(data: bytes) -> Json:
 
 
 def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
-    """Return whether a JSON value is nested at most ``levels`` deep; the JSON encoder recurses once per level."""
+    """Return whether a JSON value has at most ``levels`` levels; the JSON encoder recurses once per level."""
     if isinstance(value, dict):
         value = list(value.values())
     return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
-    """Return the status as lines of text: the robots, then the control rooms with the robots that each receives."""
+    """Format the status as lines of text: the robots, then the control rooms with the robots that they receive."""
     robots, controls = list(robots), list(controls)
     found = [
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
@@ -58,7 +58,7 @@ def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
 
 
 def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
-    """Return the data of :func:`lines` as a JSON string."""
+    """Return the same data as :func:`lines`, as a JSON string."""
 
     def described(answer: Answer, shown: bool) -> dict[str, object]:
         clock = answer.clock
@@ -82,7 +82,7 @@ def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
 
 
 def is_shown(claim: Claim, controls: Iterable[Answer]) -> bool:
-    """Return whether a control room shows this gateway's robot. True if no control room shows a robot of that name."""
+    """Return whether a control room shows this gateway's robot, or no control room shows a robot of that name."""
     shown = {
         _text(robot, "gateway")
         for control in controls
@@ -191,7 +191,7 @@ def _milliseconds(table: Json, key: str) -> str:
 
 
 def _text(table: Json, key: str) -> str:
-    # JSON may contain an unpaired surrogate, which a terminal cannot encode.
+    # JSON may contain unpaired surrogates, which a terminal cannot encode.
     return escaped(str(table.get(key, "?"))[:200].encode(errors="replace").decode())
 
 

@@ -26,7 +26,7 @@ __all__ = ["RobotGraph"]
 _log = logging.getLogger(__name__)
 _MIN_REFRESH_INTERVAL, _MAX_REFRESH_INTERVAL = 0.25, 2.0
 _QUERY_SECONDS = 3.0
-"""Seconds to wait for types; after that, the graph is announced without those still unknown."""
+"""Timeout in seconds for querying types, after which the graph is announced without the unknown ones."""
 
 
 class RobotGraph:
@@ -67,7 +67,7 @@ class RobotGraph:
         await self._services.close()
 
     async def look(self) -> bool:
-        """Read the current graph; return whether it has changed.
+        """Read the current graph from the master; return whether it has changed.
 
         Raise MasterUnreachableError or RpcError if the call to the master fails.
         """
@@ -146,7 +146,7 @@ class RobotGraph:
         )
 
     async def _publisher(self, key: tuple[str, str]) -> Header:
-        """Query a publisher for the topic's type and whether it latches."""
+        """Query a publisher for its topic's type and latching."""
         header = await self._definitions.texts.header_of(*key)
         self._definitions.learn(
             header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")

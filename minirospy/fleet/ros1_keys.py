@@ -68,7 +68,7 @@ class Resource(NamedTuple):
 
 
 class SharedTopic(NamedTuple):
-    """A topic with one type. ``token`` describes its local use.
+    """A topic with a single type, shared with other bridges. ``token`` describes its local use.
 
     ``is_offered`` is True if other bridges publish it, ``is_wanted`` if they subscribe to it.
     """
@@ -85,7 +85,7 @@ class SharedTopic(NamedTuple):
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return two dicts keyed by topic name: the shared topics, and why other remote topics are ignored.
+    """Return two dicts keyed by topic name: the shared topics, and the reasons why other remote topics are ignored.
 
     A remote topic is ignored if its type differs. The local type takes precedence; without one, the first remote type does.
     """
@@ -106,7 +106,7 @@ def shared_topics(
 
 
 def parse_namespace(text: str) -> str:
-    """Return a namespace for keys. Raise BridgeError if ``text`` is not a single chunk."""
+    """Return the namespace used in keys. Raise BridgeError if ``text`` is not a single key chunk."""
     if text != EVERY_NAMESPACE and not _NAMESPACE.fullmatch(text):
         raise BridgeError(
             f"--ros1-keys {text}: is not a namespace of zenoh-bridge-ros1, as * or robot1: letters, digits, _ . and -"
@@ -115,12 +115,12 @@ def parse_namespace(text: str) -> str:
 
 
 def data_key(type_: str, md5sum: str, name: str, namespace: str) -> str:
-    """Return the key of a topic's messages or a service's queries."""
+    """Return the key on which a topic's messages, or a service's queries, are sent."""
     return f"{type_.encode().hex()}/{md5sum}/{namespace}/{name.strip('/')}"
 
 
 def beacon_key(resource: Resource, namespace: str) -> str:
-    """Return the key of a resource's beacons."""
+    """Return the key on which a resource's beacons are sent."""
     kind, name, type_, md5sum = resource
     return f"{_ROOT}/*/{kind}/{data_key(type_, md5sum, name, namespace)}"
 
@@ -131,7 +131,7 @@ def beacon_pattern(namespace: str) -> str:
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return a beacon's resource, or None if the beacon has no type because it is for a subscriber to any type.
+    """Return the resource of a beacon, or None if the beacon has no type because its subscriber accepts any type.
 
     Raise BridgeError if the beacon is invalid.
     """
@@ -166,10 +166,10 @@ class _Beacon:
 
 
 class Beacons:
-    """Schedules beacons for local resources: one per period, unless other bridges are sending the same beacon."""
+    """Schedules beacons for local resources, one per period, unless other bridges already send the same beacon."""
 
     def __init__(self, random: Callable[[], float]) -> None:
-        """Create an empty schedule. ``random()`` returns a number in [0, 1)."""
+        """Create an empty schedule. ``random`` returns a number in [0, 1)."""
         self._random = random
         self._beacons: dict[str, _Beacon] = {}
 
@@ -182,7 +182,7 @@ class Beacons:
         self._beacons = {key: before.get(key) or _Beacon(now) for key in keys}
 
     def received(self, key: str) -> None:
-        """Record a beacon from another bridge."""
+        """Record that another bridge has sent a beacon."""
         beacon = self._beacons.get(key)
         if beacon:
             beacon.is_received = True
@@ -196,11 +196,11 @@ class Beacons:
             is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
             if is_received:
-                # Decide at random whether to stop, so that about half of the bridges that send this beacon go on.
+                # Decide at random whether to stop, so that about half of the bridges sending this beacon continue.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
             elif beacon.is_silent and not beacon.is_resuming:
-                # Resume after a random delay, so that the silent bridges do not all resume at the same time.
+                # Resume after a random delay, so that not all silent bridges resume at the same time.
                 beacon.is_resuming = True
                 beacon.due = now + self._random() * PERIOD
             else:
@@ -211,7 +211,7 @@ class Beacons:
 
 
 class Sightings:
-    """The remote resources whose beacons have arrived recently."""
+    """The remote resources from which beacons have arrived recently."""
 
     def __init__(self) -> None:
         self._seen: dict[Resource, float] = {}
@@ -220,7 +220,7 @@ class Sightings:
         return iter(self._seen)
 
     def received(self, resource: Resource, now: float) -> bool:
-        """Record a beacon; return whether its resource is new. Raise BridgeError if there are too many resources."""
+        """Record a beacon; return whether its resource is new. Raise BridgeError at the maximum number of resources."""
         is_new = resource not in self._seen
         if is_new and len(self._seen) >= MAX_RESOURCES:
             raise BridgeError(f"there are more than {MAX_RESOURCES} topics and services")
@@ -228,11 +228,11 @@ class Sightings:
         return is_new
 
     def extend(self, seconds: float, now: float) -> None:
-        """Extend the lifetime of all resources by ``seconds``, but not beyond a full lifetime from ``now``."""
+        """Let all resources expire ``seconds`` later, but not later than those whose beacon arrives now."""
         self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
 
     def forget_lost(self, now: float) -> bool:
-        """Forget the resources whose last beacon is too old; return whether any were forgotten."""
+        """Remove resources whose last beacon is too old; return whether any were removed."""
         lost = [resource for resource, at in self._seen.items() if now - at > LOST_SECONDS]
         for resource in lost:
             del self._seen[resource]

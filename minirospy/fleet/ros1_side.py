@@ -50,11 +50,9 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""Each gateway that uses zenoh-bridge-ros1's keys subscribes to this topic first. That is how gateways on the same master
-detect each other.
-"""
+"""A topic to which each gateway that uses zenoh-bridge-ros1's keys subscribes first, so that they detect each other."""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
-_BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default names of zenoh-bridge-ros1's own nodes
+_BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default node names of zenoh-bridge-ros1
 _AGGREGATE = "/rosout_agg"
 _BEAT_SECONDS = 0.2
 _CALL_SECONDS = 3600.0
@@ -63,7 +61,7 @@ _MAX_ERROR = 2_000
 
 
 class Ros1Side:
-    """Forwards topics and services between a master and zenoh-bridge-ros1's keys.
+    """Connects a master to zenoh-bridge-ros1's keys: forwards topics and services.
 
     Runs on the node's loop, except that messages and beacons are handled in other threads.
     """
@@ -81,16 +79,15 @@ class Ros1Side:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """Create this half.
+        """Create this half of the bridge.
 
         ``hidden`` contains the names of robots whose topics are imported; ``namespace`` is the keys' namespace.
         """
-        # Exclude /rosout_agg, which repeats /rosout.
-        # If both were forwarded, each log message would come back to its own master.
+        # Exclude /rosout_agg, which repeats /rosout: forwarding both would return each log message to its own master.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace
-        self.refused = 0  # number of ignored beacons
+        self.refused = 0  # number of beacons ignored so far
         self.topics: dict[str, Ros1Topic] = {}
         self.services: dict[str, tuple[Resource, RawService]] = {}
         self.graph = RobotGraph(
@@ -102,7 +99,7 @@ class Ros1Side:
         self._shared = Shared(node, network, definitions, sender, receiver, rules, namespace, spawn)
         self._answered: dict[ServiceToken, Deferred] = {}
         self._outlets: dict[str, Beacon] = {}
-        # Guards the beacons, which arrive in Zenoh's threads.
+        # Guards the data about beacons, which arrive in Zenoh's threads.
         self._lock = threading.Lock()
         self._beacons = Beacons(random.random)
         self.sightings = Sightings()
@@ -118,7 +115,7 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Start forwarding topics and services; continue until :meth:`close`.
+        """Start to forward topics and services, until :meth:`close`.
 
         Raise BridgeError if another node on this master already uses these keys, or MasterUnreachableError or RpcError if a
         call to the master fails.
@@ -165,13 +162,13 @@ class Ros1Side:
         Raise MasterUnreachableError or RpcError if the call to the master fails.
         """
         changed = await self.graph.look()
-        # Open topics and services before announcing them: a bridge calls and sends as soon as it receives a beacon.
+        # Open topics and services before announcing them: a bridge uses them as soon as it receives a beacon.
         await self._adjust()
         self._announce()
         return changed
 
     def status(self) -> dict[str, object]:
-        """Return counters and resources as JSON-compatible values."""
+        """Return counters and resources, as JSON-compatible values."""
         with self._lock:
             seen, announced = len(list(self.sightings)), len(self._beacons)
         return {
@@ -199,7 +196,7 @@ class Ros1Side:
     # --- the local graph
 
     def _gateways(self, snapshot: Snapshot) -> set[str]:
-        """Return the other gateways on this master that use these keys.
+        """Return the other gateways on this master that use zenoh-bridge-ros1's keys.
 
         Their publications and subscriptions are not announced again.
         """
@@ -237,7 +234,7 @@ class Ros1Side:
             self._beacons.update(keys, time.monotonic())
 
     async def _beat(self) -> None:
-        """Send due beacons, and update topics and services from received beacons."""
+        """Send the beacons that are due; update topics and services from received beacons."""
         expected = time.monotonic()
         while True:
             now = time.monotonic()
@@ -245,7 +242,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was suspended. Beacons sent in the meantime have not been delivered yet.
+                    # The process was suspended, and beacons sent meanwhile have not been delivered yet.
                     self.sightings.extend(late, now)
                 has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:
@@ -275,7 +272,7 @@ class Ros1Side:
         return is_shown and self._rules.services(resource.name)
 
     async def _adjust(self) -> None:
-        """Open and close topics and services to match the graph and the beacons."""
+        """Open and close topics and services to match the local graph and the received beacons."""
         async with self._adjusting:
             with self._lock:
                 remote, self._has_news = list(self.sightings), False
@@ -301,7 +298,7 @@ class Ros1Side:
             key = data_key(token.type, token.md5sum, token.service, self.namespace)
             self._answered[token] = self._network.answer(key, self._answerer(token), from_others=True)
 
-        # A master keeps one provider per service name, so a local node's service takes precedence over a remote one.
+        # A master stores one provider per service, so a local node's service takes precedence over a remote one.
         there = {each.name: each for each in reversed(remote) if each.kind == "srv"}
         for name, (resource, offered) in list(self.services.items()):
             if there.get(name) != resource or name in self.graph.service_names:
@@ -332,7 +329,7 @@ class Ros1Side:
 
 
 def error_in(resource: Resource, answer: bytes) -> str:
-    """Return the error message in a reply to a call, or "" if the reply is a response.
+    """Return the error message in the reply to a service call, or "" if the call succeeded.
 
     The bridge sends errors and responses in the same way. If the type is installed locally, a reply is an error if it is text
     and is not exactly one serialized response.

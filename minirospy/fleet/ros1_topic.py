@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 __all__ = ["MARK", "Ros1Topic", "Shared"]
 
 MARK = "ros1_keys"
-"""Connection header field that marks publishers created by a gateway for zenoh-bridge-ros1's keys.
+"""Connection header field of the publishers that a gateway creates for zenoh-bridge-ros1's keys.
 
 No gateway sends these publishers' messages back to the keys.
 """
 
 _REPLAY_SECONDS = 0.5
-"""Seconds to wait after a subscriber's first beacon before sending latched messages.
+"""Seconds between a subscriber's first beacon and the replay of latched messages.
 
 The subscriber's bridge may subscribe only after the beacon.
 """
@@ -38,7 +38,7 @@ _WRITER = ""
 
 @dataclass
 class Shared:
-    """The objects shared by all topics that use zenoh-bridge-ros1's keys."""
+    """Objects shared by all topics on zenoh-bridge-ros1's keys."""
 
     node: Node
     network: FleetNetwork
@@ -51,7 +51,7 @@ class Shared:
 
 
 class Ros1Topic:
-    """One topic with one type. Runs on the loop, except that other threads handle its messages."""
+    """A topic with a single type. Runs on the loop; other threads handle its messages."""
 
     def __init__(self, shared: Shared, topic: SharedTopic) -> None:
         self.token = topic.token
@@ -68,7 +68,7 @@ class Ros1Topic:
         self._is_closed = False
 
     async def update(self, topic: SharedTopic) -> None:
-        """Open and close handles after a change in the topic's local or remote use."""
+        """Open and close handles after the topic's local or remote use has changed."""
         before, self._topic = self._topic, topic
         self.token = topic.token
         if topic.is_wanted and not before.is_wanted and self.outbound:
@@ -108,11 +108,11 @@ class Ros1Topic:
         return self._topic.is_wanted or (self.token.is_published and self._is_matched)
 
     def _adjust(self) -> None:
-        """Open newly needed handles, and close those that can be closed without an await."""
+        """Open the handles that are needed now, and close those that can be closed without an await."""
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Let Zenoh report the readers, because silent bridges and third-party programs send no beacons.
+        # Zenoh reports all readers; beacons do not, because silent bridges and third-party programs send none.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:
@@ -166,11 +166,11 @@ class Ros1Topic:
         return self.inbound
 
     def _arrived(self, _: str, message: bytes, __: bytes) -> None:
-        """Queue a message. Runs in one of Zenoh's threads."""
+        """Queue an inbound message. Runs in one of Zenoh's threads."""
         self._shared.receiver.add(self._flow, self._deliver, message, b"")
 
     def _deliver(self, message: bytes, _: bytes) -> None:
-        """Publish a message. Runs in the receiver's thread."""
+        """Publish an inbound message locally. Runs in the receiver's thread."""
         inbound = self.inbound
         if inbound is None or not inbound.publish(self.token.md5sum, message):
             run_on_loop(self._shared.node, self._hold(message))

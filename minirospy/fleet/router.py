@@ -17,7 +17,7 @@ _TICK_SECONDS = 0.5
 
 
 def run_router(options: NetworkOptions, report: Callable[[str], object]) -> int:
-    """Run a router and return its exit status; call ``report`` with the line that lists its endpoints.
+    """Run a router; return its exit status. Call ``report`` with a line that lists its endpoints.
 
     Raise BridgeError if the router cannot listen.
     """
@@ -39,7 +39,7 @@ async def _run(options: NetworkOptions, report: Callable[[str], object]) -> int:
     try:
         network = await FleetNetwork.open(options)
         report(f"router of the fleet at {', '.join(options.listen) or options.config}")
-        # On Windows, Python handles a signal only when the loop wakes up.
+        # On Windows, Python handles signals only when the loop wakes up, so wake it periodically.
         while not ended.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(ended.wait(), _TICK_SECONDS)

@@ -30,7 +30,7 @@ _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 
 
 class Priority(IntEnum):
-    """A sending priority.
+    """Priority with which a message is sent.
 
     Each priority has its own queue and thread, so that a slow message does not delay those with a higher priority.
     """
@@ -60,13 +60,13 @@ _BULK_TYPES = {
 }
 
 
-# seconds without a command before zero velocity is published; more frequent commands form a stream
+# seconds without a command before zero velocity is published; more frequent commands count as a stream
 STOP_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
 class GatewayRules:
-    """The topics and services that a gateway may forward, with their rates and priorities.
+    """Selects the topics and services to forward, and the rates and priorities of the topics.
 
     ``rates`` (Hz) and ``priorities`` map patterns of names; the first pattern that matches applies.
     """
@@ -93,7 +93,7 @@ class GatewayRules:
 
 @dataclass(frozen=True)
 class Export:
-    """A topic that nodes other than gateways use."""
+    """A topic that has local nodes other than gateways."""
 
     topic: str
     type: str
@@ -102,7 +102,7 @@ class Export:
 
 
 class Throttle:
-    """Limits messages to a rate in Hz, evenly spaced; 0 means no limit."""
+    """Limits messages to a rate in Hz by spacing them evenly; 0 means no limit."""
 
     def __init__(self, hertz: float) -> None:
         self._period = 1.0 / hertz if hertz else 0.0
@@ -112,9 +112,8 @@ class Throttle:
         """Return whether a message may be sent at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time instead of the current time.
-        # Otherwise a limit of 10 Hz would pass only 7.5 of 30 messages per second.
-        # After a pause, start again from the current time.
+        # Add the period to the due time: starting from ``now``, a limit of 10 Hz would pass only 7.5 of 30 messages per second.
+        # After a pause, the due time would be in the past, so use ``now``.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period
@@ -122,14 +121,14 @@ class Throttle:
 
 
 def priority_of_type(type_: str) -> Priority:
-    """Return the default priority of a type, for topics without a rule."""
+    """Return the default priority for a type, used if no rule matches the topic."""
     if type_ in _TELEOP_TYPES:
         return Priority.TELEOP
     return Priority.BULK if type_ in _BULK_TYPES else Priority.DATA
 
 
 def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
-    """Parse arguments such as ``/camera/*=5`` into patterns and rates. Raise BridgeError if an argument is invalid."""
+    """Parse patterns and rates in Hz, such as ``/camera/*=5``. Raise BridgeError if one is invalid."""
     found = []
     for word in words:
         pattern, text = _halves(word, "--rate", "/camera/*=5")
@@ -144,7 +143,7 @@ def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
 
 
 def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
-    """Parse arguments such as ``/arm/*=teleop`` into patterns and priorities. Raise BridgeError if an argument is invalid."""
+    """Parse patterns and priorities, such as ``/arm/*=teleop``. Raise BridgeError if one is invalid."""
     names = {priority.name.lower(): priority for priority in Priority}
     found = []
     for word in words:
@@ -158,7 +157,7 @@ def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
 def exported_topics(
     snapshot: Snapshot, own: Collection[str], allows: Callable[[str], bool], hidden: Iterable[str] = ()
 ) -> dict[str, Export]:
-    """Return the topics that a robot announces: those with a known type and a node other than a gateway.
+    """Return the topics that a robot announces: their type is known, and a node other than a gateway uses them.
 
     ``own`` contains the gateways' nodes, ``hidden`` the namespaces of imported robots, whose topics are not announced again.
     """
@@ -178,7 +177,7 @@ def exported_topics(
 def exported_services(
     snapshot: Snapshot, own: Collection[str], allows: NameFilter, hidden: Iterable[str] = ()
 ) -> dict[str, tuple[str, ...]]:
-    """Return the services that a robot announces, with their nodes.
+    """Return the services that a robot announces, each with its nodes.
 
     Each node's two logger services are left out, unless the filter was given patterns.
     """
@@ -195,7 +194,7 @@ def exported_services(
 
 
 def is_logger_service(service: str) -> bool:
-    """Return whether a service is one of the two logger services that each node has."""
+    """Return whether this is one of the two logger services that every node provides."""
     return service.endswith(_LOGGER_SERVICES)
 
 

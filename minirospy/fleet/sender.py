@@ -22,14 +22,14 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 MAX_OUTLETS = 64
-"""Maximum number of Zenoh publishers cached per flow: one for its own key, others to replay latched messages.
+"""Maximum number of cached Zenoh publishers per flow: one for the flow's key, the others to replay latched messages.
 
 The least recently used publisher is dropped.
 """
 
 
 class _Worker:
-    """A thread that processes a queue. It is started when something is queued."""
+    """A thread that processes a queue. It starts when the first item is queued."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -38,7 +38,7 @@ class _Worker:
         self._is_closed = False
 
     def close(self) -> None:
-        """Stop the thread, but do not wait for it if it is blocked in Zenoh. Idempotent."""
+        """Stop the thread. Do not wait for it, because it may be blocked in Zenoh. Idempotent."""
         with self._condition:
             self._is_closed = True
             self._condition.notify_all()
@@ -84,18 +84,18 @@ class Outflow:
 
     @property
     def dropped(self) -> int:
-        """Return the number of messages that newer ones have replaced because the network was too slow."""
+        """Return how many messages were replaced by newer ones because the network was too slow."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
-        """Queue a message; if ``always``, ignore the rate limit."""
+        """Queue a message. Apply the rate limit unless ``always`` is true."""
         if not always and not self._throttle.allows(time.monotonic()):
             self.throttled += 1
             return
         self._worker.add(self, key, message)
 
     def close(self) -> None:
-        """Drop queued messages and undeclare the publishers."""
+        """Drop all queued messages, and undeclare the publishers."""
         self._worker.end(self)
 
 
@@ -160,14 +160,14 @@ class _PriorityWorker(_Worker):
 
 
 class Sender:
-    """Sends messages. Each priority has its own thread, so that a large message does not delay a command."""
+    """Sends messages to the fleet. Each priority has its own thread, so that a large message does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
-        """Create the queues. ``clock`` returns the time in ns that is attached to each message."""
+        """Create the sender. ``clock`` returns the send time in ns that is attached to each message."""
         self.priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
-        """Return a flow for a topic, limited to ``hertz`` (0: unlimited).
+        """Return a new flow for a topic, limited to ``hertz`` messages per second (0: unlimited).
 
         If ``is_bare``, send messages without stamps, for third-party programs.
         """
@@ -184,7 +184,7 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """A receiver's flows by key. At the limit, the least recently used idle flow is removed. Thread-safe."""
+    """A receiver's flows by key. At the limit, a new flow replaces the idle one that was used least recently. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -192,7 +192,7 @@ class Flows:
         self._flows: dict[object, Flow[_Arrival]] = {}
 
     def of(self, key: object) -> Flow[_Arrival] | None:
-        """Return a key's flow, or None if the limit is reached and every flow has queued messages."""
+        """Return the flow for a key, or None if there are too many flows and each has queued messages."""
         with self._lock:
             flow = self._flows.pop(key, None)
             if flow is None:
@@ -207,7 +207,7 @@ class Flows:
 
 
 class Receiver(_Worker):
-    """Queues received messages until they are published, round-robin between robots' topics.
+    """Queues received messages, and publishes them in a thread, alternating between the robots' topics.
 
     Publishing to a slow subscriber may block for some milliseconds, which in Zenoh's own thread would delay all robots.
     """
@@ -219,12 +219,12 @@ class Receiver(_Worker):
 
     @staticmethod
     def flow() -> Flow[_Arrival]:
-        """Return a new flow for a robot's topic."""
+        """Return a new flow for a topic of a robot."""
         return Flow(_INTAKE_MESSAGES, _INTAKE_BYTES)
 
     @staticmethod
     def flows(most: int) -> Flows:
-        """Return a new table of flows."""
+        """Return a new table of at most ``most`` flows."""
         return Flows(most)
 
     def add(

@@ -24,11 +24,11 @@ __all__ = ["CommandStream", "at_rest"]
 _log = logging.getLogger(__name__)
 _TWIST = struct.Struct("<6d")
 _HEADER = 16
-"""Size in bytes of a header with an empty frame id: seq, stamp and the length of the frame id."""
+"""Size in bytes of a header with an empty frame id: sequence number, stamp, and length of the frame id."""
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the zero-velocity message for a command, or None if the command is already zero or is invalid."""
+    """Return ``body`` with all velocities set to zero, or None if they already are zero or ``body`` is invalid."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -48,7 +48,7 @@ def at_rest(type_: str, body: bytes) -> bytes | None:
     return bytes(rest) if moves else None
 
 
-_Part = tuple[int, int, str]  # (start offset, end offset, struct format) of the numbers in a message
+_Part = tuple[int, int, str]  # (start offset, end offset, struct format) of consecutive numbers in a message
 
 
 def _twist(_: bytes) -> list[_Part]:
@@ -84,7 +84,7 @@ _FIELDS: dict[str, Callable[[bytes], list[_Part]]] = {
 
 
 class CommandStream:
-    """Publishes one topic's commands in order, and a zero velocity when a stream of commands stops. Thread-safe."""
+    """Publishes the commands on one topic in order, then zero velocity when a stream of commands stops. Thread-safe."""
 
     def __init__(
         self,
@@ -108,11 +108,11 @@ class CommandStream:
 
     @staticmethod
     def guards(type_: str) -> bool:
-        """Return whether messages of a type are velocity commands."""
+        """Return whether messages of this type are velocity commands."""
         return type_ in _FIELDS
 
     def publish(self, body: bytes) -> None:
-        """Publish a command."""
+        """Publish a velocity command."""
         now = self._clock()
         rest = at_rest(self._type, body)
         with self._lock:
@@ -120,20 +120,20 @@ class CommandStream:
             self._last, self._rest = now, rest
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
-                # Arm the guard before publishing, so that every published command is followed by a stop.
+                # Arm the guard before publishing, so that a stop follows every published command.
                 self.guard.arm(self._silent, self._deadline)
             else:
                 self.guard.disarm(self._silent)
             self._publish(body)
 
     def close(self) -> None:
-        """Publish a zero velocity if a stream is active. Idempotent."""
+        """Publish zero velocity if a stream is active. Idempotent."""
         self.guard.disarm(self._silent)
         with self._lock:
             self._stop()
 
     def _silent(self) -> None:
-        """Publish a zero velocity if commands have stopped arriving. Runs in the guard's thread."""
+        """Publish zero velocity if no more commands arrive. Runs in the guard's thread."""
         with self._lock:
             if self._clock() < self._deadline:
                 return  # another command has just arrived
@@ -144,7 +144,7 @@ class CommandStream:
         )
 
     def _stop(self) -> None:
-        """Publish a zero velocity if a stream has ended with a nonzero command. The caller must hold the lock."""
+        """Publish zero velocity if a stream has ended with a nonzero velocity. The caller must hold the lock."""
         rest, is_stream = self._rest, self._deadline < math.inf
         self._rest, self._deadline = None, math.inf
         if rest is not None and is_stream:

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 __all__ = ["BRACKETS", "arithmetic", "degrees", "radians"]
 
-BRACKETS = r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)"  # pattern for the text after `rad`, with at most one nested pair of brackets
+BRACKETS = r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)"  # matches (...) after `rad`, with at most one nested level
 
 _MAX_LENGTH = (
-    200  # characters; longer expressions may exceed Python's parser's limits, which raises other errors
+    200  # maximum length of an expression, in characters; longer ones may exceed limits of Python's parser
 )
-_MAX_BITS = 1_100  # bits of an integer; a float has fewer, so a larger result is an error in ROS, too
-_MAX_PLACES = 400  # argument of round(); a float has fewer decimal places
+_MAX_BITS = 1_100  # maximum size of an integer; larger than any float, so it is an error in ROS, too
+_MAX_PLACES = 400  # maximum argument of round(): a float has fewer decimal places
 
 _CONSTANTS = ("e", "inf", "nan", "tau")  # names from the math module; `pi` is handled separately
 _FUNCTIONS = (
@@ -63,7 +63,7 @@ Number = int | float
 
 
 def arithmetic(text: str) -> float:
-    """Evaluate an arithmetic expression of numbers and ``pi``.
+    """Evaluate an arithmetic expression that contains numbers, operators, functions and ``pi``.
 
     A comparison returns 1.0 or 0.0. Raise ValueError, SyntaxError or ArithmeticError if the expression is invalid.
     """
@@ -74,12 +74,12 @@ def arithmetic(text: str) -> float:
     try:
         return float(_Evaluator().value(ast.parse(text.strip(), mode="eval").body))
     except TypeError as error:
-        # For example 1 << 0.5, or a function call with the wrong number of arguments.
+        # Examples: 1 << 0.5, or a function call with the wrong number of arguments.
         raise ValueError(str(error)) from error
 
 
 def radians(text: str) -> float | str:
-    """Return the value of ``rad(pi/2)``, or of the expression alone.
+    """Evaluate ``rad(pi/2)`` or a plain expression; return the value in radians.
 
     ROS treats nested brackets as a string. Here they are evaluated, and the text remains a string only if that fails. Raise the
     same exceptions as :func:`arithmetic`.
@@ -88,7 +88,7 @@ def radians(text: str) -> float | str:
 
 
 def degrees(text: str) -> float | str:
-    """Return the value of ``deg(90)``, or of the expression alone, converted to radians. See :func:`radians`."""
+    """Evaluate ``deg(90)`` or a plain expression in degrees; return the value in radians. See :func:`radians`."""
 
     def value(expression: str) -> float:
         try:
@@ -111,7 +111,7 @@ def _angle(text: str, name: str, evaluate: Callable[[str], float]) -> float | st
 
 
 class _Evaluator:
-    """Evaluates a syntax tree. Looks up each operator by its node type."""
+    """Evaluates a syntax tree, with one function per type of operator."""
 
     def __init__(self) -> None:
         import ast
@@ -147,7 +147,7 @@ class _Evaluator:
         }
 
     def value(self, node: ast.expr) -> Number:
-        """Return a node's value. Raise ValueError, TypeError or ArithmeticError if the node is invalid."""
+        """Return the value of a node. Raise ValueError, TypeError or ArithmeticError if it cannot be evaluated."""
         value = self._any_value(node)
         if isinstance(value, int) and value.bit_length() > _MAX_BITS:
             raise OverflowError("int too large to convert to float")
@@ -191,7 +191,7 @@ class _Evaluator:
         return True
 
     def _connected(self, values: Sequence[ast.expr], *, until: bool) -> Number:
-        """Return the first value whose truth equals ``until``, or else the last value."""
+        """Return the first value whose truth value is ``until``; if there is none, return the last value."""
         for node in values:
             value = self.value(node)
             if bool(value) is until:

@@ -17,7 +17,7 @@ __all__ = ["check", "convert"]
 
 
 def check(source: str, target: str, *, compression: str, force: bool) -> None:
-    """Check the arguments of :func:`convert` before it writes.
+    """Check the arguments of :func:`convert` before anything is written.
 
     Raise UsageError if they are invalid, BagError or OSError if ``source`` cannot be read.
     """
@@ -36,7 +36,7 @@ def check(source: str, target: str, *, compression: str, force: bool) -> None:
 
 
 def convert(source: str, target: str, *, compression: str, force: bool, step: Callable[[int], object]) -> int:
-    """Write a bag's or MCAP file's messages to ``target``, an MCAP file if its name ends in .mcap.
+    """Write the messages of a bag or MCAP file to ``target``, in MCAP format if its name ends in .mcap.
 
     Return the number of messages. ``step`` is called with the number of message bytes processed so far. ``force``:
     overwrite an existing file. An incomplete file is removed. Raise UsageError if ``target`` exists, BagError if the

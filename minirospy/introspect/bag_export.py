@@ -27,15 +27,15 @@ from minirospy.introspect.columns import MAX_COLUMNS, Column, Kind, columns, lea
 __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
-MAX_BATCH = 2_000  # messages per batch
-MAX_CELLS = 8_000_000  # table cells per batch; each cell takes at least one byte in its message
-_MAX_ELEMENTS = 10_000  # elements of an array that get a column
+MAX_BATCH = 2_000  # maximum number of messages per batch
+MAX_CELLS = 8_000_000  # maximum number of table cells per batch; each takes at least one byte of a message
+_MAX_ELEMENTS = 10_000  # maximum number of array elements that get separate columns
 _SECOND = 10**9
 _MAX_INT64 = (1 << 63) - 1
 
 
 class Exported(NamedTuple):
-    """An exported table: its file, its numbers of rows and columns, and the fields that were left out."""
+    """An exported table: its file, its numbers of rows and columns, and the omitted fields."""
 
     path: str
     rows: int
@@ -44,14 +44,14 @@ class Exported(NamedTuple):
 
 
 class _Batch(NamedTuple):
-    """Consecutive rows: the times of receipt in nanoseconds, and the columns by name."""
+    """Consecutive rows of a table: receive times in nanoseconds, and the columns by name."""
 
     times: list[int]
     columns: dict[str, Column]
 
 
 def file_name(bag: str, topic: str, format_: str) -> str:
-    """Return the file name of a topic's table: ``run_camera_info.csv`` for the topic /camera/info of run.bag."""
+    """Return the file name for a topic's table: ``run_camera_info.csv`` for the topic /camera/info in run.bag."""
     stem = os.path.splitext(os.path.basename(bag))[0]
     return f"{stem}_{re.sub(r'[^A-Za-z0-9]+', '_', topic).strip('_') or 'topic'}.{format_}"
 
@@ -66,7 +66,7 @@ def export(
     warn: Callable[[str], object] = lambda line: None,
     step: Callable[[int], object] = lambda done: None,
 ) -> list[Exported]:
-    """Write a table for each of these topics into ``folder``, or for all topics if none is given; return the tables.
+    """Write one table per topic into ``folder``, and return the tables. Without ``topics``, export all topics.
 
     ``step`` is called with the number of message bytes read so far. ``force``: overwrite existing files. Raise UsageError if a
     file exists or the format is unknown, NotFoundError if a topic is not in the bag, BagError if the bag is invalid or the
@@ -90,7 +90,7 @@ def export(
         targets = {
             topic: os.path.join(folder, file_name(bag, topic, format_)) for topic in dict.fromkeys(chosen)
         }
-        # Some file systems do not distinguish upper and lower case.
+        # Some file systems do not distinguish upper and lower case, so compare casefolded names.
         if len({target.casefold() for target in targets.values()}) < len(targets):
             raise UsageError("two of these topics have the same file name: export them into two folders")
         for target in targets.values():
@@ -167,7 +167,7 @@ def _batches(
     times: list[int] = []
     messages: list[object] = []
     size = 0
-    largest = 0  # bytes of the largest message so far: an upper limit for the cells of each row in the batch
+    largest = 0  # bytes of the batch's largest message: an upper limit for the number of cells per row
     for stored in reader.messages([each.id for each in connections]):
         largest = max(largest, len(stored.body))
         if times and (len(times) == most or (len(times) + 1) * largest > MAX_CELLS):
@@ -203,12 +203,12 @@ def _check_width(topic: str, width: int) -> None:
 
 
 def _field_name(name: str) -> str:
-    """Return the column name of a field. The name ``time`` is reserved for the times of receipt."""
+    """Return the column name for a field. The name ``time`` is reserved for the receive times."""
     return "message.time" if name == "time" else name
 
 
 def _flat(found: Sequence[Column], prefix: str = "") -> Iterator[tuple[str, Column]]:
-    """Yield columns by name, with one column per array element."""
+    """Yield (column name, column), with a separate column for each array element."""
     for column in found:
         name = prefix + column.name
         first = next((value for value in column.values if value is not None), None)
@@ -241,7 +241,7 @@ def _elements(name: str, arrays: Sequence[Sequence[object] | None]) -> Iterator[
 
 
 class _Cells:
-    """The kinds of values that a column has, over all batches."""
+    """The kind and types of a column's values in all batches."""
 
     def __init__(self) -> None:
         self.kind = Kind.PLAIN
@@ -249,7 +249,7 @@ class _Cells:
         self.is_large = False  # set if a value exceeds a signed 64-bit integer
 
     def widen(self, column: Column) -> None:
-        """Add the values of a batch."""
+        """Add the types of a batch's values."""
         self.kind = column.kind
         self.types |= {*map(type, column.values)} - {type(None)}
         if int in self.types and not self.is_large:
@@ -257,14 +257,14 @@ class _Cells:
 
 
 class _Schema:
-    """The columns of all batches by name, in the order of first appearance."""
+    """The columns of all batches, keyed by name, in order of first appearance."""
 
     def __init__(self, topic: str) -> None:
         self.columns: dict[str, _Cells] = {}
         self._topic = topic
 
     def widen(self, batch: _Batch) -> None:
-        """Add the columns of a batch."""
+        """Add the columns of a batch to the schema."""
         for name, column in batch.columns.items():
             self.columns.setdefault(name, _Cells()).widen(column)
             _check_width(self._topic, len(self.columns))
@@ -292,7 +292,7 @@ def _writer(format_: str, path: str, schema: _Schema) -> Iterator[_Writer]:
 
 
 class _CsvWriter(_Writer):
-    """Writes CSV. Times are seconds with nine decimals, booleans are true and false, and missing values are empty cells."""
+    """Writes CSV. Times are seconds with nine decimals, booleans are true or false, and missing values are empty."""
 
     def __init__(self, stream: TextIO, schema: _Schema) -> None:
         self._names = list(schema.columns)
@@ -320,7 +320,7 @@ def _seconds(nanoseconds: int) -> str:
 
 
 class _ParquetWriter(_Writer):
-    """Writes Parquet. Times are UTC timestamps, and durations are durations, both with nanoseconds."""
+    """Writes Parquet. Times become UTC timestamps, and durations become durations, both in nanoseconds."""
 
     def __init__(self, pyarrow: Any, schema: Any, writer: Any) -> None:
         self._pyarrow = pyarrow

@@ -34,10 +34,10 @@ __all__ = [
     "sample",
 ]
 
-MAX_EXACT = 20_000  # points of a series that are returned unchanged; the page draws at most 6,000
-MAX_POINTS = 2_000_000  # exact points of all series in a request, 16 bytes each
-MAX_SERIES = 200  # series per request
-MAX_LABELS = 50  # series per path; nested slices could select more
+MAX_EXACT = 20_000  # maximum number of points returned unchanged per series; the page draws at most 6,000
+MAX_POINTS = 2_000_000  # maximum number of unchanged points of all series in a request, at 16 bytes each
+MAX_SERIES = 200  # maximum number of series per request
+MAX_LABELS = 50  # maximum number of series per path; nested slices could select more
 _SECOND = 10**9
 
 
@@ -50,14 +50,14 @@ class BagTopic(NamedTuple):
 
 
 class FieldPath(NamedTuple):
-    """A plot's path in a bag: the topic, and the steps that lead to a number in its messages."""
+    """The path of a plotted field in a bag: the topic, and the steps to a number in its messages."""
 
     topic: str
     steps: Sequence[Step]
 
 
 class Point(NamedTuple):
-    """A number from a message: its series' label, its time in seconds since the start of the bag, and its value."""
+    """A number in a message: the label of its series, the time in seconds since the start of the bag, and the value."""
 
     label: str
     time: float
@@ -65,12 +65,12 @@ class Point(NamedTuple):
 
 
 def bag_span(reader: BagReader) -> tuple[int, int]:
-    """Return the times of a bag's first and last messages in nanoseconds, (0, 0) if it has none.
+    """Return the times of a bag's first and last message in nanoseconds, or (0, 0) if it has no messages.
 
     Chunks may be stored out of order. Raise BagFormatError if the bag is damaged.
     """
     if reader.chunks:
-        # A chunk without messages has the times 0. The message counts of an MCAP file's chunks are unknown.
+        # A chunk without messages has times of 0. In an MCAP file, the chunks' message counts are unknown.
         starts = [chunk.start_time for chunk in reader.chunks if chunk.end_time]
         ends = [chunk.end_time for chunk in reader.chunks if chunk.end_time]
     else:
@@ -80,7 +80,7 @@ def bag_span(reader: BagReader) -> tuple[int, int]:
 
 
 def bag_topics(reader: BagReader) -> list[BagTopic]:
-    """Return a bag's topics, sorted by name."""
+    """Return the topics in a bag, sorted by name."""
     found: dict[str, BagTopic] = {}
     for each in reader.connections.values():
         found.setdefault(each.topic, BagTopic(each.topic, each.type, each.definition))
@@ -88,7 +88,7 @@ def bag_topics(reader: BagReader) -> list[BagTopic]:
 
 
 def field_path(path: str, topics: Iterable[str]) -> FieldPath:
-    """Split a plot's path, such as /joint_states/position[elbow], after the longest matching topic name.
+    """Split the path of a plotted field, such as /joint_states/position[elbow], after the longest matching topic name.
 
     Raise NotFoundError if no topic matches, UsageError if the syntax of the rest is invalid.
     """
@@ -107,7 +107,7 @@ def points(
     end: float | None = None,
     on_time: Callable[[float], object] = lambda time: None,
 ) -> Iterator[tuple[int, Point]]:
-    """Yield the numbers at these paths in time order, each with its path's index.
+    """Yield the numbers at the given paths in time order, each with the index of its path.
 
     ``start`` and ``end``: seconds since the start of the bag, inclusive. ``on_time`` is called after each chunk, with the time
     reached. Raise BagFormatError if the bag is damaged or a message cannot be deserialized.
@@ -150,11 +150,11 @@ def _message(message_class: type[Message], body: bytes, connection: Connection) 
 
 
 def _ignore(_: str) -> None:
-    """Accept a connection whose definition does not match its md5sum: read as many of its messages as possible."""
+    """Ignore a definition that does not match its md5sum, so that as many messages as possible are read."""
 
 
 def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterator[Point]:
-    """Yield the first series minus the second one, which is linearly interpolated at the first one's times.
+    """Yield the first series minus the second, which is interpolated linearly at the first one's times.
 
     Both must be in time order. Times outside the range of the second series are left out. If a path has several series, only the
     first one is used.
@@ -169,7 +169,7 @@ def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterat
         if before.time > time:
             continue
         share = (time - before.time) / (after.time - before.time) if after.time > before.time else 1.0
-        # Use a point at exactly this time without interpolation, because the point before it may be NaN.
+        # At exactly this time, do not interpolate, because the point before may be NaN.
         other = after.value if share == 1.0 else before.value + share * (after.value - before.value)
         yield Point(f"{label} - {after.label}", time, value - other)
 
@@ -184,7 +184,7 @@ def _first_series(found: Iterable[Point]) -> Iterator[Point]:
 
 
 class Budget:
-    """The numbers of exact points and of series that a request may still add."""
+    """The numbers of unchanged points and of series that are still available to a request."""
 
     def __init__(self) -> None:
         self.points = MAX_POINTS
@@ -192,7 +192,7 @@ class Budget:
 
 
 class Sampler:
-    """The points of one series from ``start`` to ``end`` (seconds), added in time order.
+    """Collects the points of one series from ``start`` to ``end`` (seconds), added in time order.
 
     Up to MAX_EXACT points are kept unchanged, if the budget allows. Beyond that, the time is divided into ``columns`` equal
     parts, and each part keeps only its lowest and its highest point.
@@ -205,15 +205,15 @@ class Sampler:
         self._start = start
         self._width = max(end - start, 1e-9) / max(columns, 1)
         self._budget = budget or Budget()
-        self._columns: dict[int, list[float]] | None = None  # column -> low, its time, high, its time
+        self._columns: dict[int, list[float]] | None = None  # column -> (low, time, high, time)
 
     @property
     def is_exact(self) -> bool:
-        """Return whether all points have been kept."""
+        """Return whether all points are still stored unchanged."""
         return self._columns is None
 
     def add(self, time: float, value: float) -> None:
-        """Add a point."""
+        """Add a point to the series."""
         self.count += 1
         if self._columns is not None:
             self._widen(time, value)
@@ -242,7 +242,7 @@ class Sampler:
             column[2:] = value, time
 
     def result(self) -> tuple[list[float], list[float | None]]:
-        """Return the times and the values. A value that is not finite becomes None."""
+        """Return the times and the values. A value that is not finite is returned as None."""
         if self._columns is None:
             return list(self.times), [each if math.isfinite(each) else None for each in self.values]
         found = []
@@ -260,7 +260,7 @@ def sample(
     columns: int,
     budget: Budget | None = None,
 ) -> list[dict[str, Sampler]]:
-    """Return, for each of ``count`` paths, the samplers of its series by label. Series beyond the budget are left out."""
+    """Return a list with one dict from label to sampler for each of ``count`` paths. Omit series beyond the budget."""
     budget = budget or Budget()
     samplers: list[dict[str, Sampler]] = [{} for _ in range(count)]
     for number, (label, time, value) in found:

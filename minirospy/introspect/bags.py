@@ -75,19 +75,19 @@ def is_mcap(path: str) -> bool:
 
 
 def left_out(reader: BagReader) -> str:
-    """Return the topics of an MCAP file that cannot be read, each with the reason, as one line; "" if there are none."""
+    """Return one line that lists an MCAP file's unreadable topics, each with the reason, or "" if all can be read."""
     foreign: dict[str, str] = getattr(reader, "foreign", {})
     return "; ".join(f"{topic}: {why}" for topic, why in sorted(foreign.items()))
 
 
 def data_size(reader: BagReader) -> int:
-    """Return the total decompressed size of all chunks, in bytes, or the file's size if the bag has no chunks."""
+    """Return the total size of all chunks after decompression, in bytes, or the file's size if there are no chunks."""
     headers = reader.chunk_headers().values()
     return sum(each.chunk.size for each in headers) or reader.size()
 
 
 def chunks_end(path: str) -> int:
-    """Return the offset of the index in a version 2.0 bag, or 0 if there is none. Raise OSError if the file cannot be read."""
+    """Return the offset of a version 2.0 bag's index, or 0 if it has none. Raise OSError if the file cannot be read."""
     try:
         with open_reader(path) as reader:
             return reader.index_position if isinstance(reader, ChunkedReader) else 0
@@ -96,12 +96,12 @@ def chunks_end(path: str) -> int:
 
 
 def backup_path(path: str) -> str:
-    """Return the path of a bag's backup: ``a.orig.bag`` for ``a.bag``."""
+    """Return the path for the backup of a bag: ``a.orig.bag`` for ``a.bag``."""
     return "{}.orig{}".format(*os.path.splitext(path))
 
 
 def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], object]) -> type[Message]:
-    """Return the message class for a connection, generated from the definition in the bag.
+    """Return the message class of a connection, generated from the definition in the bag.
 
     If the definition is invalid or does not match the md5sum, call ``warn`` with ROS's message and return a class without
     fields. Raise DefinitionError if the type's name is not legal.
@@ -124,7 +124,7 @@ def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], obj
 
 
 def compress(source: str, target: str, compression: str, progress: Progress) -> None:
-    """Copy a bag, changing the compression of its chunks. Raise BagError if it is invalid, OSError if a file operation fails.
+    """Copy a bag with a different chunk compression. Raise BagError if it is invalid, OSError if a file operation fails.
 
     All connections are kept. If the source is damaged, the target contains the messages before the damage.
     """
@@ -138,7 +138,7 @@ def copy_bag(
     compression: str = compressions.NONE,
     progress: Progress = lambda done: None,
 ) -> None:
-    """Copy a bag in time order, replacing each connection with ``change(connection)``.
+    """Copy a bag in time order; replace each connection by ``change(connection)``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails.
     """
@@ -158,7 +158,7 @@ def copy_bag(
 
 
 class Expression:
-    """A Python expression for `rosbag filter`, with the variables topic, m and t.
+    """A Python expression for `rosbag filter`, in which the variables topic, m and t are available.
 
     Raise ValueTextError if its syntax is invalid.
     """
@@ -176,7 +176,7 @@ class Expression:
         """True if the expression uses the message. If False, messages are not deserialized."""
 
     def __call__(self, topic: str, message: Message | None, time: Time) -> object:
-        """Evaluate the expression and return its value. Raise ValueTextError if the evaluation fails."""
+        """Evaluate the expression for a message; return the value. Raise ValueTextError if the evaluation fails."""
         try:
             return self._call(topic, message, time)
         except Exception as error:
@@ -186,7 +186,7 @@ class Expression:
 
 
 class FilterResult(NamedTuple):
-    """The number of messages kept, and the number read."""
+    """The numbers of messages that were kept and read."""
 
     kept: int
     read: int
@@ -202,7 +202,7 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
+    """Copy the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.
@@ -243,7 +243,7 @@ def filter_bag(
 
 
 def reindex(path: str, progress: Progress) -> list[str]:
-    """Rebuild the index of a version 2.0 bag or an MCAP file in place; return descriptions of unrecoverable parts.
+    """Rebuild the index of a version 2.0 bag or an MCAP file in place. Return descriptions of the unrecoverable parts.
 
     Raise BagError if the file is not a bag, OSError if it cannot be read or written.
     """
@@ -281,7 +281,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if the name of an output bag has an MCAP file's extension."""
+    """Raise UsageError if the file name of an output bag ends like an MCAP file's."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -290,7 +290,7 @@ def check_bag_name(path: str) -> None:
 
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield a writer for a new bag. Chunks are compressed in parallel. After an error or Ctrl-C the file is a valid bag.
+    """Yield a writer for a new bag, which compresses chunks in parallel. After an error or Ctrl-C, the file is a valid bag.
 
     Raise UsageError before writing if the name has an MCAP file's extension.
     """
@@ -315,7 +315,7 @@ def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
 
 @contextlib.contextmanager
 def naming_full_disk(path: str) -> Iterator[None]:
-    """If an OSError means a full disk or an exceeded quota, add the output file's name to it."""
+    """Add the output file's name to an OSError that is caused by a full disk or an exceeded quota."""
     try:
         yield
     except OSError as error:
@@ -330,7 +330,7 @@ def _add(writer: BagWriter, connection: Connection) -> int:
 
 
 def class_of_connection(connection: Connection, warn: Callable[[str], object]) -> type[Message]:
-    """Return the message class for a connection, using :func:`class_of`.
+    """Return the message class of a connection; see :func:`class_of`.
 
     Raise BagFormatError if its definition is invalid.
     """

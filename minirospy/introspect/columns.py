@@ -16,12 +16,12 @@ from minirospy.base.errors import BagError
 
 __all__ = ["MAX_COLUMNS", "Column", "Kind", "columns", "leaves"]
 
-MAX_COLUMNS = 20_000  # columns per table; a laser scan has about 3,000
+MAX_COLUMNS = 20_000  # maximum number of columns per table; a laser scan has about 3,000
 _NUMBERS = {
     *("int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"),
     *("float32", "float64", "bool", "char", "byte"),
 }
-_NO_BYTES = {"uint8", "char"}  # arrays of these types are bytes in Python, not lists of numbers
+_NO_BYTES = {"uint8", "char"}  # arrays of these types are bytes objects in Python, not lists of numbers
 
 
 class Kind(Enum):
@@ -46,7 +46,7 @@ class _Leaf(NamedTuple):
 
 
 def leaves(message_class: Any, prefix: str = "") -> Iterator[_Leaf]:
-    """Yield the path and type of each field that is not itself a message; an array of messages is a single field."""
+    """Yield the path and type of each field. Descend into messages, but yield an array of messages as a single field."""
     for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
         path = f"{prefix}{name}"
         nested = None if type_.endswith("]") else _class_of(message_class, name, type_)
@@ -57,14 +57,14 @@ def leaves(message_class: Any, prefix: str = "") -> Iterator[_Leaf]:
 
 
 def _class_of(message_class: Any, name: str, type_: str) -> Any:
-    """Return the message class of a field, or None if the field is a primitive."""
+    """Return the message class of a field, or None if the field has a primitive type."""
     if type_ in ("time", "duration", "string") or type_ in _NUMBERS:
         return None
     return type(getattr(message_class(), name))
 
 
 def columns(messages: Sequence[object]) -> list[Column]:
-    """Return the columns of messages, which must have the same type. Without messages there are no columns.
+    """Return the columns for messages of the same type, or no columns if there are no messages.
 
     Raise BagError if the values of an array have more than MAX_COLUMNS names.
     """
@@ -99,7 +99,7 @@ def columns(messages: Sequence[object]) -> list[Column]:
 
 
 def _names_of(field: _Leaf) -> str:
-    """Return the path of the field ``name`` next to an array of numbers, or "" for any other field."""
+    """Return the path of the field ``name`` in the same message as an array of numbers, or "" for any other field."""
     element, bracket, _ = field.type.partition("[")
     if not bracket or element not in _NUMBERS - _NO_BYTES:
         return ""
@@ -108,7 +108,7 @@ def _names_of(field: _Leaf) -> str:
 
 
 def _belong(names: Sequence[Sequence[object]], values: Sequence[Sequence[object]]) -> list[bool]:
-    """Return for each array whether it has values, and as many as there are names."""
+    """Return, for each array, whether it is not empty and has as many values as names."""
     return [0 < len(array) == len(own) for own, array in zip(names, values, strict=True)]
 
 

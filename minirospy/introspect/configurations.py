@@ -9,7 +9,7 @@ __all__ = ["configuration_documents", "parameter_values"]
 
 
 def configuration_documents(text: str) -> list[object]:
-    """Return the documents in a file; a Python object, as ROS's dynparam writes it, becomes a dict.
+    """Parse a YAML file into documents. Convert a Python object, as written by ROS's dynparam, to a dict.
 
     Raise MinirospyError if the file is not YAML, or its aliases expand to too much data.
     """
@@ -29,7 +29,7 @@ def configuration_documents(text: str) -> list[object]:
 
 
 def parameter_values(text: str) -> dict[str, bool | int | float | str]:
-    """Return a dict of a file's values, keyed by name, without group states. Raise MinirospyError if the file is invalid."""
+    """Return the parameter values in a file, keyed by name, without group states. Raise MinirospyError if it is invalid."""
     values: dict[str, bool | int | float | str] = {}
     for document in configuration_documents(text):
         if not isinstance(document, dict):

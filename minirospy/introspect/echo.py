@@ -23,7 +23,7 @@ __all__ = ["Echo", "Filter", "elided", "fill_message"]
 
 
 class Filter:
-    """A Python expression over a message ``m`` and its ``topic``, as typed by the user."""
+    """A Python expression over a message ``m`` and its ``topic``, entered by the user."""
 
     def __init__(self, expression: str) -> None:
         """Compile the expression. Raise UsageError if its syntax is invalid."""
@@ -34,17 +34,17 @@ class Filter:
             raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
 
     def __call__(self, message: Message, topic: str) -> bool:
-        """Return whether the expression's value is true. Raise UsageError if the expression cannot be evaluated."""
+        """Return whether the expression is true for a message. Raise UsageError if it cannot be evaluated."""
         try:
-            # eval is safe here: the code is the user's own, on the user's own machine, as in ROS.
+            # eval is safe here: users run their own code on their own machine, as in ROS.
             return bool(eval(self._code, {"m": message, "topic": topic}))
-        # the user's expression may raise any exception; report it to the user
+        # The user's expression may raise any exception, which is reported to the user.
         except Exception as error:
             raise UsageError(f"filter [{self._expression}]: {type(error).__name__}: {error}") from error
 
 
 class Echo:
-    """Formats a topic's messages, or one of their fields, as output lines that end with a line feed.
+    """Formats a topic's messages, or one field of them, as output lines that end with a line feed.
 
     ``plot``: print comma-separated values, with a header line first. ``strings`` and ``arrays``: show fields of these
     kinds. ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns
@@ -86,7 +86,7 @@ class Echo:
         self._header_written = False
 
     def message(self, received: Received) -> Message:
-        """Deserialize a message and return the message or its selected field.
+        """Deserialize a message; return it or its selected field.
 
         Raise NotFoundError if the message has no such field.
         """
@@ -100,7 +100,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return the output for a message. Raise IndexError if the path's index is past the end of the array."""
+        """Return the output for a message. Raise IndexError if the path's index is beyond the end of an array."""
         value = field_value(message, self._steps, self._report)
         return self._row(value, received) if self._plot else self._block(value)
 
@@ -118,7 +118,7 @@ class Echo:
         return header + row + "\n"
 
     def _is_shown_whole(self, value: object) -> bool:
-        """Return whether to print a value whole, without eliding any part.
+        """Return whether to print a value completely, without eliding strings or arrays.
 
         This applies to a field of a bag's message that is not itself a message, because ROS does not look up its type.
         """
@@ -140,7 +140,7 @@ class Echo:
 
 
 def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int | None = None) -> Message:
-    """Create a message and fill it from YAML values.
+    """Create a message, with its fields set from YAML values.
 
     ``now`` represents ``nanoseconds`` (or the current time), ``auto`` a stamped header. Raise MessageException, with the
     names of the fields, if the values do not match the fields.
@@ -151,7 +151,7 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 
 
 def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
-    """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, or "" if unknown.
+    """Return ``value`` with placeholders in place of strings or arrays. ``type_`` is its ROS type, or "" if unknown.
 
     As in ROS, arrays of messages are not elided, the placeholder of a fixed-length array contains the length, as in ``[3``,
     and a field's values from all elements of an array are treated as a single value of the field's type.
@@ -173,7 +173,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A placeholder is always a string, but a field is printed according to its declared type.
+    # A field is printed according to its declared type, but a placeholder is always a string.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

@@ -16,10 +16,10 @@ from minirospy.base.errors import UsageError
 
 __all__ = ["Filter", "Named", "Slice", "Step", "parse_steps", "select"]
 
-_MAX_VALUES = 50  # series per path, for example for a whole array
-_MAX_TESTED = 10_000  # elements that a filter may test
-_MAX_PATH = 1_000  # characters; searching for the end of a step takes quadratic time
-_MAX_STEPS = 50  # steps per path, for example messages within messages
+_MAX_VALUES = 50  # maximum number of series per path, for example for a whole array
+_MAX_TESTED = 10_000  # maximum number of elements that a filter tests
+_MAX_PATH = 1_000  # maximum length in characters; finding the end of a step takes quadratic time
+_MAX_STEPS = 50  # maximum number of steps per path, for example for messages within messages
 
 _STEP = re.compile(
     r"[/.](?P<name>\w+)|\[(?P<index>-?\d{1,9})\]|\[(?P<first>\d{0,9}):(?P<last>\d{0,9})\]"
@@ -38,20 +38,20 @@ _TESTS: dict[str, Callable[[Any, Any], bool]] = {
 
 
 class Slice(NamedTuple):
-    """The elements from ``first`` up to but not including ``last`` (None: to the end)."""
+    """Array elements from ``first`` up to, but not including, ``last`` (None: to the end)."""
 
     first: int
     last: int | None
 
 
 class Named(NamedTuple):
-    """The element whose name is ``name``, according to the array of strings ``name`` next to the array."""
+    """An array element selected by name: the message's array of strings ``name`` contains its name at the same index."""
 
     name: str
 
 
 class Filter(NamedTuple):
-    """A filter: a field of an element, an operator, and the value to compare with. ``text`` is the filter's source text."""
+    """Selects elements by comparing a field with a value. ``text`` is the source text."""
 
     fields: tuple[str, ...]
     compare: Callable[[Any, Any], bool]
@@ -59,7 +59,7 @@ class Filter(NamedTuple):
     text: str
 
     def accepts(self, value: object) -> bool:
-        """Return whether a field of an element passes the test."""
+        """Return whether an element's field passes the filter."""
         for name in self.fields:
             if name not in _slots(value):
                 return False
@@ -74,7 +74,7 @@ Step = str | int | Slice | Named | Filter
 
 
 def parse_steps(text: str) -> list[Step]:
-    """Return the steps of a path after its topic. Raise UsageError if the syntax is invalid."""
+    """Parse the steps that follow the topic in a path. Raise UsageError if the syntax is invalid."""
     if len(text) > _MAX_PATH:
         raise UsageError(f"a path behind its topic has at most {_MAX_PATH:,} characters")
     steps: list[Step] = []
@@ -118,7 +118,7 @@ def _filter(found: Mapping[str, str], text: str) -> Filter:
 def select(
     value: object, steps: Sequence[Step], label: str = "", depth: int = 0
 ) -> Iterator[tuple[str, float]]:
-    """Yield the label and value of each number in a message that the steps select."""
+    """Yield (label, value) for each number that the steps select in a message."""
     if depth == len(steps):
         yield from _leaves(value, label)
         return
@@ -134,7 +134,7 @@ def select(
         if -len(value) <= step < len(value):
             yield from select(value[step], steps, f"{label}[{step}]", depth + 1)
     else:
-        # All elements that pass a filter form one series, regardless of their indexes.
+        # All elements that pass a filter form a single series, regardless of their indexes.
         is_filtered = isinstance(steps[depth + 1] if depth + 1 < len(steps) else None, Filter)
         last = len(value) if step.last is None else min(step.last, len(value))
         last = min(last, step.first + (_MAX_TESTED if is_filtered else _MAX_VALUES))
@@ -172,7 +172,7 @@ def _leaves(value: object, label: str) -> Iterator[tuple[str, float]]:
             if (number := _number(each)) is not None:
                 yield f"{label}[{index}]", number
     else:
-        # As in rqt_plot, a message selects the numeric fields directly in it.
+        # As in rqt_plot, a message selects its direct numeric fields.
         for name in _slots(value):
             if (number := _number(getattr(value, name))) is not None:
                 yield f"{label}/{name}", number
@@ -188,7 +188,7 @@ def _slots(value: Any) -> Sequence[str]:
 
 
 def _number(value: Any) -> float | None:
-    """Return a value as a number, or None if it is not a number. Times are converted to seconds."""
+    """Return a number as a float and a time in seconds; return None for any other value."""
     if isinstance(value, int | float):
         return float(value)
     if hasattr(type(value), "to_nsec"):
@@ -197,14 +197,14 @@ def _number(value: Any) -> float | None:
 
 
 def _angle(value: Any, name: str) -> float | None:
-    """Return a quaternion's roll, pitch or yaw, or None if ``name`` is another name or the value is not a rotation."""
+    """Return a quaternion's roll, pitch or yaw. Return None for any other ``name``, or if the value is not a rotation."""
     if name not in ("roll", "pitch", "yaw") or not {"x", "y", "z", "w"} <= {*_slots(value)}:
         return None
     parts = [_number(each) for each in (value.x, value.y, value.z, value.w)]
     if None in parts:
         return None
     size = math.hypot(*(each for each in parts if each is not None))
-    # An all-zero quaternion, from a message that was not filled in, is not a rotation.
+    # An all-zero quaternion, found in messages that were not filled in, is not a rotation.
     if not 0 < size < math.inf:
         return None
     x, y, z, w = (each / size for each in parts if each is not None)

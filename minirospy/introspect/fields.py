@@ -28,14 +28,14 @@ _TIMES = {
 
 
 class Step(NamedTuple):
-    """One part of a path: a field name and, for an array, an index or a slice."""
+    """One step of a path: a field name and, for an array, an index or a slice."""
 
     name: str
     element: int | slice | None
 
 
 class NotAnArrayError(NotFoundError):
-    """A field with an index or a slice is neither an array nor a string. ``type_name`` is the name of its value's class."""
+    """Raised if a field with an index or slice is neither an array nor a string. ``type_name`` is its value's class."""
 
     def __init__(self, name: str, value: object) -> None:
         super().__init__("array", name, hint=f"the field is a single {_type_of(value)}")
@@ -43,7 +43,7 @@ class NotAnArrayError(NotFoundError):
 
 
 def parse_path(path: str, *, zero_steps: bool = False) -> tuple[Step, ...]:
-    """Parse a path; the empty path refers to the whole message.
+    """Parse a field path; the empty path means the whole message.
 
     Raise UsageError if its syntax is invalid or, unless ``zero_steps``, if a slice has a step of 0.
     """
@@ -55,7 +55,7 @@ Report = Callable[[NotFoundError | IndexError], object]
 
 
 def field_value(message: object, steps: tuple[Step, ...], report: Report | None = None) -> object:
-    """Return the value at a path. For a slice of messages followed by a field, return a list of that field's values.
+    """Return the value at a path. For a slice of messages followed by a field name, return a list of that field's values.
 
     Strings have indices and slices, too. Raise NotFoundError if a field does not exist, IndexError if an array is too short.
     With ``report``, an element of a slice that lacks the rest of the path is None, and its error is reported.
@@ -97,7 +97,7 @@ def _element_value(element: object, rest: tuple[Step, ...], report: Report | Non
 
 
 def field_type(message_class: type[Message], path: str) -> str:
-    """Return the ROS type of the field at a path in a message class.
+    """Return the ROS type of the field at ``path`` in a message class.
 
     Raise NotFoundError if the field does not exist or the class of an inner message is not installed.
     """

@@ -27,18 +27,18 @@ __all__ = [
     "why_illegal",
 ]
 
-_MAX_NAME_LENGTH = 4096  # maximum characters in a name; the master refuses longer names
+_MAX_NAME_LENGTH = 4096  # maximum length of a name; the master rejects longer ones
 
 
 class NodeAddress(NamedTuple):
-    """A node's name and its Slave API's URI. The URI is None if the master does not know the node."""
+    """A node's name and the URI of its Slave API, which is None if the master does not know the node."""
 
     name: str
     uri: str | None
 
 
 class Graph:
-    """A connection to a master, with ``tool`` as caller_id. Names are resolved in ``namespace`` and then remapped.
+    """A master's graph, queried with caller_id ``tool``. Resolves names in ``namespace``, then remaps them.
 
     A context manager. Every call raises MasterUnreachableError if no master responds.
     """
@@ -63,7 +63,7 @@ class Graph:
     def open(
         cls, tool: str, environ: Mapping[str, str] | None = None, arguments: names.Arguments | None = None
     ) -> Graph:
-        """Return the graph for the environment and, with ``arguments``, the command line's remappings.
+        """Return the graph for an environment and, if ``arguments`` are given, the command line's remappings.
 
         Raise UsageError if ROS_MASTER_URI is invalid.
         """
@@ -94,7 +94,7 @@ class Graph:
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """Return the URI of a node's Slave API (one call to the master), or None if the master does not know the node."""
+        """Return the URI of a node's Slave API from the master, or None if the master does not know the node."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):
@@ -103,12 +103,12 @@ class Graph:
         return self._uris[node]
 
     def addresses(self, nodes: Iterable[str]) -> list[NodeAddress]:
-        """Return each node with its URI, or None if the master does not know the node."""
+        """Return the address of each node; its URI is None if the master does not know the node."""
         return [NodeAddress(node, self.node_uri(node)) for node in nodes]
 
 
 def why_illegal(name: str) -> str:
-    """Return the reason why a topic's or service's global name is not legal, or "" if it is legal.
+    """Return why a topic's or service's global name is not legal, or "" if it is legal.
 
     rospy accepts illegal names, roscpp does not. A field path may follow a topic name: /points[0]/x.
     """
@@ -119,7 +119,7 @@ def why_illegal(name: str) -> str:
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Return whether a global name equals ``namespace`` or is below it. Every name is below the root namespace."""
+    """Return whether a global name is ``namespace`` or below it. All names are below the root namespace."""
     return namespace in ("", "/") or name == namespace or name.startswith(namespace.rstrip("/") + "/")
 
 
@@ -131,11 +131,11 @@ def node_host(uri: str | None) -> str | None:
 
 
 def unknown_topic(graph: Graph, topic: str) -> NotFoundError:
-    """Return the error for a topic without publishers or subscribers. It lists similar names that exist."""
+    """Return the error that a topic has neither publishers nor subscribers, with a list of similar existing names."""
     state = graph.state()
     return NotFoundError("topic", topic, [*state.publishers, *state.subscribers])
 
 
 def unknown_service(graph: Graph, service: str) -> NotFoundError:
-    """Return the error for a service that does not exist. It lists similar names that exist."""
+    """Return the error that a service does not exist, with a list of similar existing names."""
     return NotFoundError("service", service, graph.state().services)

@@ -21,14 +21,14 @@ _INDENT = "  "
 
 
 class Kind(Enum):
-    """The kind of a definition; the value is both its folder and its file extension."""
+    """The kind of a definition; the value is its folder and its file extension."""
 
     MESSAGE = "msg"
     SERVICE = "srv"
 
     @property
     def word(self) -> str:
-        """The word for this kind in messages to the user."""
+        """The word for this kind in messages to users."""
         return "message" if self is Kind.MESSAGE else "service"
 
 
@@ -58,7 +58,7 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """Return the types that match ``name``: ``name`` itself if it includes a package, else all types with that name.
+        """Return the types that match ``name``: ``pkg/Name`` matches one type, ``Name`` the types of this name in all packages.
 
         Raise NotFoundError with similar names if no type matches.
         """
@@ -79,22 +79,22 @@ class Interfaces:
         return found
 
     def text(self, type_: str) -> str:
-        """Return a type's definition exactly as in its file. Raise NotFoundError if the type does not exist."""
+        """Return the text of a type's definition file, unchanged. Raise NotFoundError if the type does not exist."""
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """Return a type's constants and fields, with inner types expanded. Raise NotFoundError if one does not exist."""
+        """Return a type's constants and fields, with nested types expanded. Raise NotFoundError if a type does not exist."""
         return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:
-        """Return a type's md5sum. Raise NotFoundError if the type, or one that it uses, does not exist."""
+        """Return a type's md5sum. Raise NotFoundError if the type, or one of its fields' types, does not exist."""
         spec = self._spec(type_)
         if isinstance(spec, ServiceSpec):
             return service_md5(spec, self._catalogue.message)
         return message_md5(spec, self._catalogue.message)
 
     def _is_of_other_kind(self, name: str) -> bool:
-        """Return whether a name is that of a service although messages are looked up, or the other way round."""
+        """Return whether a type exists as the other kind: as a service instead of a message, or vice versa."""
         other = Interfaces(self._packages, Kind.SERVICE if self._kind is Kind.MESSAGE else Kind.MESSAGE)
         types = other.all()
         return name in types or any(type_.partition("/")[2] == name for type_ in types)
@@ -110,7 +110,7 @@ class Interfaces:
         raise NotFoundError("service type", type_, self.all())
 
     def _names(self, package: str) -> list[str]:
-        """Return the sorted names of a package's types, from its files. An action file defines seven messages."""
+        """Return the sorted names of the types that a package's files define. An action file defines seven messages."""
         folder = self._catalogue.packages[package]
         ending = self._kind.value
         names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}
@@ -120,7 +120,7 @@ class Interfaces:
 
 
 def describe(spec: MessageSpec | ServiceSpec, lookup: Lookup) -> str:
-    """Format a type as `rosmsg show` does: a line for each constant and field, inner types indented below."""
+    """Format a type like `rosmsg show`: one line per constant and field, with nested types indented below."""
     if isinstance(spec, ServiceSpec):
         lines = [*_lines(spec.request, lookup, ""), "---", *_lines(spec.response, lookup, "")]
     else:

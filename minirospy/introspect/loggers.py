@@ -22,7 +22,7 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 
 
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
-    """Return a dict from logger to level (lower case) for the node with the global name ``node``.
+    """Return the loggers of the node with global name ``node``, as a dict from logger to level (lower case).
 
     Raise NotFoundError if the node does not exist, NodeUnreachableError if it does not respond, or MinirospyError if it
     has no logger services.
@@ -32,7 +32,7 @@ def logger_levels(graph: Graph, node: str) -> dict[str, str]:
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
-    """Return the level of one logger.
+    """Return the level of one of a node's loggers.
 
     Raise NotFoundError if the logger does not exist; otherwise raise the same exceptions as :func:`logger_levels`.
     """
@@ -43,14 +43,14 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
-    """Set a logger's level. Raise the same exceptions as :func:`logger_level`."""
-    # A node accepts any logger name, so first check that the logger exists.
+    """Set the level of a node's logger. Raise the same exceptions as :func:`logger_level`."""
+    # A node accepts any logger name, so check that the logger exists first.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
 
 def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Message:
-    """Call one of a node's own services; return the response."""
+    """Call one of the services that every node provides; return the response."""
     name = find_node(graph, node).name
     try:
         return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))

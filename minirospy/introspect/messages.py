@@ -24,14 +24,14 @@ _M = TypeVar("_M", bound="Message")
 
 
 _HINTS = {
-    # YAML may parse such values as other types: an unquoted 5 as a number, 1e-3 as a string.
+    # YAML may parse an unquoted string as another type, for example 5 as a number, and 1e-3 as a string.
     "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
 
 
 class Received(NamedTuple):
-    """A received message: its bytes, its publisher's connection header, and its receive time (since the epoch)."""
+    """A received message: its bytes, its publisher's connection header, and its receive time in ns since the epoch."""
 
     body: bytes
     header: Header
@@ -44,13 +44,13 @@ class Received(NamedTuple):
 
 
 class MessageClasses:
-    """Message classes for received messages. Each class is looked up or generated once."""
+    """The classes of received messages. Each class is looked up or generated only once."""
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """Return the class for a publisher's connection header. If the md5sums agree, this is the installed class.
+        """Return the class for a publisher's connection header: the installed class if its md5sum is the same.
 
         Raise NotFoundError if the type is not installed and the publisher sent no definition, or DefinitionError if the
         definition cannot be parsed.
@@ -58,7 +58,7 @@ class MessageClasses:
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
             if len(self._classes) >= _MAX_CLASSES:
-                # Normal use never involves this many types, so a publisher must be sending made-up type names.
+                # No normal program uses this many types, so a publisher must be sending made-up type names.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
@@ -89,14 +89,14 @@ class MessageClasses:
 
 
 def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
-    """Fill the fields of ``message`` from YAML values: a single dictionary, or one value per field in order.
+    """Set the fields of ``message`` from YAML values: one dictionary, or one value per field in order.
 
     Return the message. ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise
     MessageException if the values do not match the fields.
     """
     from minirospy.core.idl.message import fill_message_args
 
-    # If there are no values, the message keeps its defaults.
+    # Without values, the message keeps its defaults.
     try:
         fill_message_args(message, list(values) or [{}], keys=dict(keys or {}))
     except (MessageException, ValueError, TypeError, AttributeError) as error:
@@ -105,7 +105,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
 
 def words_of(nanoseconds: int) -> dict[str, object]:
-    """Return the keywords with their values: ``now`` is the time, and ``auto`` is a header with that time stamp."""
+    """Return the values of the keywords: ``now`` is the time, and ``auto`` a header with this stamp."""
     from minirospy.base.times import Time
     from minirospy.core.idl.load import get_message_class
 
@@ -115,7 +115,7 @@ def words_of(nanoseconds: int) -> dict[str, object]:
 
 
 def check(message: Message) -> None:
-    """Raise MessageException, with the field's name, if a value does not match the definition."""
+    """Raise MessageException, which names the field, if a value does not match the definition."""
     serialize(message)
 
 
@@ -130,7 +130,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """Return a one-line error that the user's ``values`` do not fit the message, with a list of the message's fields."""
+    """Return a one-line error that ``values``, entered by the user, do not match the message. List the message's fields."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

@@ -13,14 +13,14 @@ from minirospy.base.errors import MinirospyError, ServiceException
 __all__ = ["MAX_CONCURRENT", "NodeQueries"]
 
 MAX_CONCURRENT = 64
-"""Maximum number of concurrent first queries. A node that hangs occupies only one of them."""
+"""Maximum number of concurrent first queries. A hanging node occupies only one of them."""
 
 _MAX_CONCURRENT_RETRIES = 32
-"""Maximum number of concurrent retries. It is separate, so that retries do not delay first queries."""
+"""Maximum number of concurrent retries, separate so that retries do not delay first queries."""
 QUERY_SECONDS = 5.0
-AGAIN_SECONDS = 10.0  # seconds before a node that did not respond is queried again
+AGAIN_SECONDS = 10.0  # seconds until a node that did not respond is queried again
 REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
-"""Seconds to pause after a refused query: base, and increment per failed query.
+"""Seconds to wait after a refused query: a base value, and an increment per failed query.
 
 A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner than others. With
 500 dead nodes, each is queried every 10 s.
@@ -31,7 +31,7 @@ _Found = TypeVar("_Found")
 
 
 class NodeQueries(Generic[_Key, _Found]):
-    """Queries nodes once per key; a key is, for example, a service's name and its nodes. Runs on the loop.
+    """Queries nodes and stores one result per key, such as a service's name and nodes. Runs on the loop.
 
     Queries that fail are retried later, and do not delay others.
     """
@@ -43,7 +43,7 @@ class NodeQueries(Generic[_Key, _Found]):
         *,
         arrived_late: Callable[[], object] = lambda: None,
     ) -> None:
-        """Create the queries. ``arrived_late`` is called when a response arrives after :meth:`look` has returned."""
+        """Create the object. ``arrived_late`` is called if a response arrives after :meth:`look` has returned."""
         self.found: dict[_Key, _Found] = {}
         self._query = query
         self._reporter = reporter
@@ -55,7 +55,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self._again = asyncio.Semaphore(_MAX_CONCURRENT_RETRIES)
 
     async def look(self, present: Collection[_Key], seconds: float) -> None:
-        """Query new keys and forget absent ones; return when all new keys have results, or after ``seconds``."""
+        """Query new keys, and remove absent ones. Return when all new keys have results, or after ``seconds``."""
         kept = self._present = set(present)
         self.found = {key: found for key, found in self.found.items() if key in kept}
         self.not_before = {key: until for key, until in self.not_before.items() if key in kept}
@@ -84,7 +84,7 @@ class NodeQueries(Generic[_Key, _Found]):
             is_late = True
 
     def refresh(self, key: _Key) -> None:
-        """Query a key again, because its node may now respond differently. Keep the old result until the node has responded.
+        """Query a key again, because its node may respond differently now. Keep the old result until the node has responded.
 
         ``arrived_late`` is called if the new result differs from the old one.
         """
@@ -99,11 +99,11 @@ class NodeQueries(Generic[_Key, _Found]):
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Clear the tasks here: the done callbacks of tasks that have just finished run only later.
+        # Clear the tasks here, because the done callbacks of tasks that have just finished have not run yet.
         self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
-        """Query the node for one key. Return True if there is a result and the key is still present."""
+        """Query a node for one key. Return True if it responded and the key is still present."""
         started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
@@ -114,7 +114,7 @@ class NodeQueries(Generic[_Key, _Found]):
             self._reporter.report(error)
             self._failed(key)
         else:
-            # If the key is absent now, it has to be queried again when it returns.
+            # If the key is absent now, query it again when it returns.
             if key in self._present:
                 self.found[key] = found
                 return True
@@ -125,7 +125,7 @@ class NodeQueries(Generic[_Key, _Found]):
             try:
                 found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
             except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
-                return  # the master removes the key if the node is gone
+                return  # the master removes the key if the node has exited
             except Exception as error:  # noqa: BLE001 - of one node: its result is kept
                 self._reporter.report(error)
                 return

@@ -53,7 +53,7 @@ __all__ = [
 
 
 SHUTDOWN_SECONDS = 10.0
-"""Time limit in seconds: long enough for a node to run its shutdown hooks before it responds."""
+"""Timeout in seconds, long enough for a node to run its shutdown hooks before it responds."""
 
 
 class TypedName(NamedTuple):
@@ -64,7 +64,7 @@ class TypedName(NamedTuple):
 
 
 class NodeDetail(NamedTuple):
-    """A node's registrations at the master."""
+    """What a node has registered at the master."""
 
     name: str
     uri: str | None
@@ -74,14 +74,14 @@ class NodeDetail(NamedTuple):
 
 
 class Connections(NamedTuple):
-    """The connections that a node reports: its process id and its links."""
+    """The connections that a node reports: its process ID and its links."""
 
     pid: int
     links: list[BusConnection]
 
 
 class Neighbours(NamedTuple):
-    """The nodes from which a node receives messages, and those to which it sends, according to the master."""
+    """The nodes that a node receives messages from and sends messages to, according to the master."""
 
     senders: list[str]
     receivers: list[str]
@@ -98,13 +98,13 @@ def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def node_hosts(graph: Graph) -> dict[str, str]:
-    """Return a dict from node to host name or address, for nodes whose address the master knows."""
+    """Return the host name or address of each node whose URI the master knows, as a dict keyed by node."""
     hosts = {node.name: node_host(node.uri) for node in graph.addresses(list_nodes(graph))}
     return {node: host for node, host in hosts.items() if host}
 
 
 def nodes_on(graph: Graph, machine: str) -> list[str]:
-    """Return the nodes on a machine, given its name or address. Raise NotFoundError if there are none."""
+    """Return the nodes on a machine, given by its name or address. Raise NotFoundError if there are none."""
     hosts = node_hosts(graph)
     found = [node for node, host in hosts.items() if _is_same_host(host, machine)]
     if not found:
@@ -113,12 +113,12 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
 
 
 def is_known_host(machine: str) -> bool:
-    """Return whether a machine's name or address resolves to an IPv4 address."""
+    """Return whether a host name or address resolves to an IPv4 address."""
     return _ipv4_address(machine) is not None
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
-    """Return a dict from node to neighbours, sorted by name, for the nodes that publish or subscribe."""
+    """Return the neighbours of each node that publishes or subscribes, as a dict keyed by node, sorted."""
     senders: dict[str, set[str]] = {}
     receivers: dict[str, set[str]] = {}
     for topic in {*state.publishers, *state.subscribers}:
@@ -134,7 +134,7 @@ def neighbours(state: SystemState) -> dict[str, Neighbours]:
 
 
 def find_node(graph: Graph, name: str) -> NodeAddress:
-    """Return a node (global name) and its URI. Raise NotFoundError, with similar names, if it does not exist."""
+    """Return the node ``name`` (a global name) and its URI. Raise NotFoundError, with similar names, if it does not exist."""
     uri = graph.node_uri(name)
     if uri is None:
         raise NotFoundError("node", name, list_nodes(graph))
@@ -142,9 +142,9 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 
 
 def node_detail(graph: Graph, name: str) -> NodeDetail:
-    """Return the master's information about a node (global name). Raise NotFoundError if the node is not registered."""
+    """Return what the master knows about the node ``name`` (a global name). Raise NotFoundError if it is not registered."""
     state = graph.state()
-    # Use the types that publishers registered. rosnode prints "unknown type" for a topic without publishers.
+    # Use only types that publishers have registered: rosnode prints "unknown type" for a topic without publishers.
     types = dict(graph.master.get_published_topics())
 
     def topics(table: Mapping[str, list[str]]) -> list[TypedName]:
@@ -160,13 +160,13 @@ def node_detail(graph: Graph, name: str) -> NodeDetail:
 
 
 def node_connections(graph: Graph, node: NodeAddress) -> Connections:
-    """Query a node for its process id and its connections. Raise NodeUnreachableError if it does not respond."""
+    """Ask a node for its process ID and its connections. Raise NodeUnreachableError if it does not respond."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout=5.0)) as slave:
         return Connections(slave.get_pid(), slave.get_bus_info())
 
 
 def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
-    """Call a node and return the round-trip time in seconds. Raise NodeUnreachableError if the call fails."""
+    """Call a node; return the round-trip time in seconds. Raise NodeUnreachableError if the call fails."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout)) as slave:
         start = time.perf_counter()
         slave.get_pid()
@@ -185,23 +185,23 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             if isinstance(error.__cause__, TimeoutError):
                 raise NodeUnreachableError(node.name, error.uri, error.why) from error
         except RpcError:
-            pass  # a node that exits immediately may not get to send its whole response
+            pass  # a node that exits immediately may not send its whole response
 
 
 def is_unknown_host(error: NodeUnreachableError) -> bool:
-    """Return whether the node was unreachable because its host name does not resolve."""
+    """Return whether a node was unreachable because its host name does not resolve."""
     return isinstance(getattr(error.__cause__, "__cause__", None), socket.gaierror)
 
 
 def is_timeout(error: NodeUnreachableError) -> bool:
-    """Return whether the node was unreachable because it did not respond in time."""
+    """Return whether a node was unreachable because it did not respond in time."""
     return isinstance(getattr(error.__cause__, "__cause__", None), TimeoutError)
 
 
 def unreachable_nodes(
     graph: Graph, timeout: float = 3.0, on_error: Callable[[NodeUnreachableError], object] | None = None
 ) -> list[NodeAddress]:
-    """Return the registered nodes that do not respond; call ``on_error`` with each node's error."""
+    """Return the registered nodes that do not respond; call ``on_error`` with the error for each."""
     found = []
     for node in graph.addresses(list_nodes(graph)):
         if node.uri is None:
@@ -216,7 +216,7 @@ def unreachable_nodes(
 
 
 def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
-    """Unregister everything that a node registered with the master; a newer node with the same name is not affected.
+    """Unregister everything that a node has registered; do not affect a newer node with the same name.
 
     ``state``: the master's state, if the caller already has it. Raise MasterUnreachableError if no master responds.
     """
@@ -224,11 +224,11 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
     state = state or graph.state()
     uri = node.uri or ""
-    # Use the node's name as the caller_id: the master removes only the caller's own registrations.
+    # Use the node's name as caller_id, because the master removes only registrations of the caller.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # Topics are unregistered by the node's URI, services by their own URI.
-        # If the node's name still has this URI after the services were looked up, none of them belongs to a newer node.
+        # Topics are unregistered by the node's URI, services by the service's own URI.
+        # If the node's URI is unchanged after the services were looked up, these services do not belong to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:
@@ -243,7 +243,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether nothing listens at a node's address any more, or another process does.
+    """Return whether the node's process is gone: nothing, or another process, listens at its address.
 
     Return False for a node that does not respond in time, because it may be alive.
     """
@@ -251,12 +251,12 @@ def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
         try:
             return bool(slave.call("getName") != node.name)
         except RpcUnreachable as error:
-            # EOFError: another server, such as a TCPROS server, now uses the port and has closed the connection.
+            # EOFError: another server, such as a TCPROS server, uses the port now and has closed the connection.
             return isinstance(error.__cause__, ConnectionError | EOFError)
         except RpcProtocolError:
             return True
         except RpcError:
-            # roscpp's nodes do not implement getName.
+            # Nodes in roscpp do not implement getName.
             return False
 
 
@@ -293,7 +293,7 @@ def _slave(graph: Graph, node: NodeAddress, timeout: float) -> SlaveProxy:
 
 @contextlib.contextmanager
 def _named(node: NodeAddress) -> Iterator[None]:
-    """Raise NodeUnreachableError, with the node's name, if a call to the node fails."""
+    """Convert an error of a call to a node to a NodeUnreachableError that includes the node's name."""
     try:
         yield
     except RpcTimeout as error:

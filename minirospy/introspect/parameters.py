@@ -30,11 +30,11 @@ _NAMESPACE_KEY = "_ns"
 
 
 class RootValueError(ValueTextError):
-    """The root namespace was set to a value that is not a dictionary."""
+    """Raised on an attempt to set the root namespace to a value that is not a dictionary."""
 
 
 class ParameterFile(NamedTuple):
-    """One document of a parameter file: its values and their namespace.
+    """A document in a parameter file: its values and their namespace.
 
     ``own_namespace``: the namespace was set by the key ``_ns`` in the document.
     """
@@ -62,7 +62,7 @@ def get_parameter(graph: Graph, name: str) -> object:
 
 
 def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
-    """Set a parameter. As in rosparam, a dictionary sets each of its entries and leaves all others unchanged.
+    """Set a parameter. As in rosparam, a dictionary sets each of its entries, and leaves other parameters unchanged.
 
     Return the individual parameters that were set. Raise ValueTextError if a value cannot be stored as a parameter.
     """
@@ -76,9 +76,9 @@ def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, obj
 
 
 def delete_parameter(graph: Graph, name: str) -> None:
-    """Delete a parameter or namespace; deleting the root empties it. Raise NotFoundError if it is not set."""
+    """Delete a parameter or a namespace; for the root, delete all parameters. Raise NotFoundError if it is not set."""
     if name == "/":
-        # The master's deleteParam refuses to delete the root.
+        # The master's deleteParam rejects the root.
         graph.master.set_param(name, {})
         return
     try:
@@ -88,7 +88,7 @@ def delete_parameter(graph: Graph, name: str) -> None:
 
 
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
-    """Parse a parameter file named ``where``. Return its documents, to be set below the global name ``namespace``.
+    """Parse a parameter file named ``where``; return its documents, whose namespaces start with the global name ``namespace``.
 
     Raise ValueTextError if the file is not YAML, or has unnamed values at the root.
     """
@@ -114,7 +114,7 @@ def dump_parameters(values: object) -> str:
 
 
 def flatten(name: str, value: object) -> Iterator[tuple[str, object]]:
-    """Yield (name, value) for each individual parameter at or below ``name``, in the order of the values."""
+    """Yield (name, value) for each parameter at or below ``name``, in the order in which ``value`` contains them."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from flatten(_join(name, str(key)), inner)

@@ -18,14 +18,14 @@ class _Cell(NamedTuple):
 
 
 def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> str:
-    """Return the header line, with the column names for messages like ``value``."""
+    """Return the header line: the column names for messages with the same fields as ``value``."""
     return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays, 0))
 
 
 def plot_row(
     value: object, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
 ) -> str:
-    """Return the line of values for a message, starting with its time.
+    """Return the line for a message: its time, then its values.
 
     ``origin`` (nanoseconds) is subtracted from the line's times.
     """
@@ -33,7 +33,7 @@ def plot_row(
 
 
 def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -> Iterator[_Cell]:
-    # Use plain ``if`` statements, most frequent case first, because this runs for every value of every message.
+    # Use plain ``if`` statements, most frequent case first, because this code runs for every value of every message.
     if isinstance(value, bool):
         yield _Cell(name, str(int(value)))
     elif isinstance(value, int | float):
@@ -41,10 +41,10 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     elif isinstance(value, str):
         yield _Cell(name, value)
     elif value is None:
-        # An element that does not have the rest of a path such as points[:]/x[0] keeps its column, which stays empty.
+        # For a path such as points[:]/x[0], an element without x[0] keeps its column, which stays empty.
         yield _Cell(name, "")
     elif hasattr(value, "to_nsec"):
-        # Subtract the origin only from points in time, not from durations.
+        # Subtract the origin from times, but not from durations.
         yield _Cell(name, str(value.to_nsec() - (origin if hasattr(value, "to_time") else 0)))
     elif isinstance(value, list | tuple):
         for index, element in enumerate(value):
@@ -52,7 +52,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     else:
         for field in getattr(value, "__slots__", ()):
             inner = getattr(value, field)
-            # As in ROS, omit fields that are messages, unless the path itself selects them.
+            # As in ROS, omit fields that are messages, unless the path selects them directly.
             if (strings and arrays) or not _is_left_out(inner, strings, arrays):
                 yield from _cells(f"{name}.{field}", inner, strings, arrays, origin)
 

@@ -12,7 +12,7 @@ __all__ = ["ProcessLoad", "ProcessLoads"]
 
 
 class ProcessLoad(NamedTuple):
-    """``cpu``: percent of one core since the previous call, or None on the first; ``memory``: resident memory in bytes."""
+    """``cpu``: percent of one core since the previous call (None on the first); ``memory``: resident memory in bytes."""
 
     cpu: float | None
     memory: int
@@ -20,19 +20,19 @@ class ProcessLoad(NamedTuple):
 
 
 class ProcessLoads:
-    """Measures the CPU and memory use of processes between calls."""
+    """Measures the CPU load and memory of processes between calls."""
 
     def __init__(self) -> None:
         self.known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
-        """Return a dict from process id to load, omitting processes that have exited or that this user may not inspect."""
+        """Return the load of each process, keyed by ID. Omit processes that have exited or that this user may not inspect."""
         before, self.known = self.known, {}
         found = {}
         for pid in set(pids):
             with contextlib.suppress(psutil.Error, ValueError):
                 process = before.get(pid)
-                # The id of an exited process may have been reused.
+                # The ID may have been reused after the process exited.
                 is_new = process is None or not process.is_running()
                 if process is None or is_new:
                     process = psutil.Process(pid)

@@ -13,13 +13,13 @@ __all__ = ["prototype"]
 
 _WIDE = 5
 _COLUMNS = 80
-_NO_BYTES = '!!binary ""'  # the value of an empty uint8[], which is a byte string, not a list of numbers
+_NO_BYTES = '!!binary ""'  # YAML for an empty uint8[], which is bytes in Python, not a list of numbers
 
 
 def prototype(
     spec: MessageSpec, catalogue: Catalogue, *, without: Collection[str] = (), empty_arrays: bool = False
 ) -> str:
-    """Return a message of default values as `rosmsg-proto`'s YAML, for the user to edit and publish.
+    """Return the YAML of a message with default values, like `rosmsg-proto`, for the user to edit and publish.
 
     A variable-length array has one element, as an example, or none with ``empty_arrays``. ``without``: names of fields to
     leave out, including those of inner messages.
@@ -34,7 +34,7 @@ class _Defaults(NamedTuple):
     empty_arrays: bool
 
     def of(self, spec: MessageSpec) -> dict[str, object]:
-        """Return a dict of the default values of a message type's fields."""
+        """Return the default values of a message type's fields, keyed by field name."""
         fields = (field for field in spec.fields if field.name not in self.without)
         return {field.name: self._value(field.type) for field in fields}
 
@@ -56,7 +56,7 @@ class _Defaults(NamedTuple):
 
 
 class _Yaml:
-    """A YAML writer.
+    """Formats values as YAML.
 
     After the first wide value, it writes innermost lists and dictionaries on one line, as `rosmsg-proto` does.
     """
@@ -95,10 +95,10 @@ def _flow(value: object) -> str:
 
 
 def _wrapped(line: str) -> str:
-    """Wrap a line that is too wide as YAML libraries do: before the first word that starts after the last column."""
+    """Wrap a line that is too wide. Like YAML libraries, break before the first word that starts beyond the last column."""
     if len(line) <= _COLUMNS:
         return line
-    # A dash before a key counts as indentation; a dash before a brace does not.
+    # A dash counts as indentation before a key, but not before a brace.
     start = re.match(r" *(?:- (?=\w))?", line)
     indent = start.end() if start else 0
     column, depth, text = 0, 0, []

@@ -23,7 +23,7 @@ __all__ = ["publish_all", "values_to_publish"]
 def values_to_publish(
     fields: Sequence[str], arguments: Sequence[str], file: str | None
 ) -> Iterator[list[object]]:
-    """Yield each message's YAML values, at least once. ``fields`` are the names of a message's fields.
+    """Yield the YAML values of each message, at least once. ``fields`` contains the names of the message's fields.
 
     ``arguments`` are the values of one message. If there are none, the values are read from a file, or from standard input as
     data arrives. Raise UsageError if there are no values, NotFoundError if the file does not exist, or ValueTextError if the
@@ -58,7 +58,7 @@ def publish_all(
     rate: float,
     on_message: Callable[[Message], object],
 ) -> None:
-    """Publish at ``rate`` Hz of the node's clock until there are no more messages or the node is stopped.
+    """Publish ``messages`` at ``rate`` Hz of the node's clock, until there are none left or the node is stopped.
 
     If time jumps back (a simulation is restarted), continue from the new time.
     """
@@ -68,7 +68,7 @@ def publish_all(
         on_message(message)
         publisher.publish(message)
         sent += 1
-        # Measure from the start instead of the last message, so that errors do not add up.
+        # Measure from the start instead of from the last message, so that errors do not add up.
         pause = round(start + sent * 1e9 / rate) - node.clock.now()
 
         try:

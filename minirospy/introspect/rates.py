@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Maximum number of messages in a window without a limit; it bounds the memory of a long measurement."""
+"""Number of messages in a window without a limit: bounds the memory of a long measurement."""
 
 
 _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Statistics of times in seconds: mean, minimum, maximum, standard deviation, and the number of messages."""
+    """Statistics of times, in seconds: mean, minimum, maximum and standard deviation, and the number of messages."""
 
     mean: float
     min: float
@@ -40,12 +40,12 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Return the rate in Hz; the times must be the periods between messages."""
+        """Return the rate in Hz, if the times are the periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 
 class Bandwidth(NamedTuple):
-    """The bandwidth in bytes per second, and statistics of the message sizes."""
+    """The bandwidth in bytes per second, and statistics of the message sizes in bytes."""
 
     rate: float
     mean: float
@@ -55,7 +55,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateWindow:
-    """Measures the periods between the newest ``size`` messages (0: no limit)."""
+    """Measures the periods between messages, for the newest ``size`` messages (0: no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
@@ -69,12 +69,12 @@ class RateWindow:
         if self._last is not None and time >= self._last:
             self._pauses.append(time - self._last)
         elif self._last is not None:
-            # The clock was set back, so earlier measurements cannot be compared with later ones.
+            # The clock was set back, so later times cannot be compared with earlier ones.
             self._pauses.clear()
         self._last = time
 
     def report(self) -> Spread | None:
-        """Return the statistics, or None if no message has arrived since the last report, or too few in total."""
+        """Return the statistics, or None if there are too few messages or none has arrived since the last report."""
         if self._arrived == self._reported or not self._pauses:
             return None
         self._reported = self._arrived
@@ -82,7 +82,7 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """Measures the sizes of the newest ``size`` messages."""
+    """Measures message sizes, for the newest ``size`` messages."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """Measures the delay from stamp to arrival, for the newest ``size`` messages (0: no limit)."""
+    """Measures the delay from a message's stamp to its arrival, for the newest ``size`` messages (0: no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)
@@ -111,7 +111,7 @@ class DelayWindow:
         self._reported = 0
 
     def add(self, time: float, stamp: float) -> None:
-        """Record a message with the stamp ``stamp`` that arrived at ``time``."""
+        """Record a message stamped ``stamp`` that arrived at ``time``, both in seconds."""
         self._arrived += 1
         self._delays.append(time - stamp)
 
@@ -124,7 +124,7 @@ class DelayWindow:
 
 
 def rate_text(reports: Mapping[str, Spread | None]) -> str:
-    """Return the text that `rostopic hz` prints once a second: two lines for a single topic, a table for several."""
+    """Return what `rostopic hz` prints once a second: two lines for a single topic, a table for several."""
     if len(reports) == 1:
         (report,) = reports.values()
         return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
@@ -137,12 +137,12 @@ def rate_text(reports: Mapping[str, Spread | None]) -> str:
 
 
 def delay_text(report: Spread | None) -> str:
-    """Return the text that `rostopic delay` prints once a second."""
+    """Return what `rostopic delay` prints once a second."""
     return f"average delay: {report.mean:.3f}\n\t{_extremes(report)}" if report else _NOTHING
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return the text that `rostopic bw` prints each second: two lines for one topic, a table for several, "" for none."""
+    """Return what `rostopic bw` prints once a second: two lines for one topic, a table for several, "" for none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Format a number of bytes in the unit that suits ``rate``."""
+    """Format a number of bytes, using the unit that suits ``rate``."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

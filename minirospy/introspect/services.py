@@ -47,21 +47,21 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and its providers. The one registered last receives the calls."""
+    """A service and its providers. The provider registered last receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
 
 
 class ServiceOffer(NamedTuple):
-    """A service's registration at the master: the node that provides it, and its URI."""
+    """A registered service: the node that provides it, and the service's URI."""
 
     node: str
     uri: str
 
 
 def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
-    """Return the services at or below ``namespace`` and their nodes, sorted by service name."""
+    """Return the services at or below ``namespace``, each with its nodes, sorted by name."""
     state = graph.state()
     return [
         ServiceNode(name, tuple(state.services[name]))
@@ -79,7 +79,7 @@ def service_uri(graph: Graph, service: str) -> str:
 
 
 def service_type(graph: Graph, service: str) -> str:
-    """Return the type of a service, as reported by the node that provides it.
+    """Return the type of a service, as reported by its provider.
 
     Raise NotFoundError if the service does not exist, or NodeUnreachableError if its node does not respond.
     """
@@ -95,19 +95,19 @@ def service_offer(graph: Graph, service: str) -> ServiceOffer:
 
 
 def service_arguments(type_: str) -> list[str]:
-    """Return the names of the request fields of a service type. Raise NotFoundError if the type is not installed."""
+    """Return the request field names of a service type. Raise NotFoundError if the type is not installed."""
     from minirospy.core.idl.load import service_class
 
     return list(service_class(type_)._request_class.__slots__)
 
 
 def find_services_of_type(graph: Graph, type_: str) -> list[str]:
-    """Return the sorted names of the services with this type, omitting services that do not respond."""
+    """Return the sorted names of all services of a type. Omit services that do not respond."""
     return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
 
 
 def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object]) -> None:
-    """Wait until a service is registered and responds. Call ``on_waiting`` once if it is not available yet."""
+    """Wait until a service is registered and responds. Call ``on_waiting`` once if it is not available immediately."""
     if _probed_type(graph, service):
         return
     on_waiting()
@@ -116,7 +116,7 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 
 
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
-    """Create a request for a service type, and fill it from YAML values (one dictionary, or all fields in order).
+    """Create a service request from YAML values: one dictionary, or all fields in order.
 
     ``now`` represents the current time, ``auto`` a stamped header. The header's ``seq`` is 1, as in a proxy's first call.
     Raise NotFoundError if the type is not installed, MessageException if the values do not match the fields.
@@ -163,7 +163,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Message) -> Me
 
 
 def _probed_type(graph: Graph, service: str) -> str | None:
-    """Return a service's type, or None if the service does not exist or does not respond."""
+    """Return a service's type, or None if it does not exist or does not respond."""
     try:
         return _probe(graph, service, graph.master.lookup_service(service))
     except (RpcRefused, NodeUnreachableError):
@@ -188,14 +188,14 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return an error's message without its number (`Connection refused`) or, for a timeout, the likely cause."""
+    """Return an error's message without its error number, or a timeout's likely cause."""
     if isinstance(error, TimeoutError):
         return f"timed out; {SUSPENDED}"
     return getattr(error, "strerror", None) or str(error)
 
 
 def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
-    # Imported here because listing services does not need the module.
+    # Import this here, because listing services does not need it.
     from minirospy.runtime.node.service_client import ServiceClient
 
     return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

@@ -18,7 +18,7 @@ _ANY = "*"
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The graph's topics and services with their nodes, in the master's order, and the topics' known types."""
+    """The topics and services of a graph with their nodes, in the master's order, and the known topic types."""
 
     publishers: Table = field(default_factory=dict)
     subscribers: Table = field(default_factory=dict)
@@ -31,7 +31,7 @@ class Snapshot:
         return {*self.publishers, *self.subscribers}
 
     def filtered(self, topic: Callable[[str], bool], service: Callable[[str], bool]) -> Snapshot:
-        """Return the snapshot without the topics and services that the filters reject."""
+        """Return a copy without the topics and services that the filters reject."""
         return Snapshot(
             {name: nodes for name, nodes in self.publishers.items() if topic(name)},
             {name: nodes for name, nodes in self.subscribers.items() if topic(name)},
@@ -42,7 +42,7 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Changes:
-    """The difference between two snapshots: new or changed entries, each in full, and removed names.
+    """The difference between two snapshots: the complete new or changed entries, and the removed names.
 
     A topic that has lost its last publisher but still has subscribers is in ``publishers`` with an empty list.
     """
@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference between two snapshots. A changed type alone does not count."""
+    """Return the difference between two snapshots. Ignore a topic whose type alone has changed."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),
@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 def moved(before: Table, after: Table) -> list[str]:
-    """Return the names in both tables that moved back: the master appends a name that is registered again."""
+    """Return the names in both tables that have moved to the end: the master re-appends a name that is registered again."""
     found: dict[str, None] = {}
     rest = iter(name for name in before if name in after)
     for name in after:
@@ -91,7 +91,7 @@ def moved(before: Table, after: Table) -> list[str]:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the current graph. ``call(method, *arguments)`` calls the master; its exceptions are passed on."""
+    """Fetch the current graph. ``call(method, *arguments)`` calls the master; its exceptions are passed on."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

@@ -37,17 +37,17 @@ if TYPE_CHECKING:
 __all__ = ["Inbox", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
 _POLL_SECONDS = 0.1
-_WAITING = 64  # maximum number of messages queued for the reading thread
+_WAITING = 64  # maximum number of messages queued for the thread that reads
 
 _SLICE = 0.05 if sys.platform == "win32" else 3600.0
-"""Seconds per wait of the main thread.
+"""Maximum seconds per wait of the main thread.
 
 On Windows Ctrl-C does not interrupt a wait, so waits there are split into short slices.
 """
 
 
 class ToolNode:
-    """Context manager for a node named ``name``, by default ``<tool>_<pid>_<milliseconds>``.
+    """Context manager for a command's node named ``name``, by default ``<tool>_<pid>_<milliseconds>``.
 
     ``ended`` is set when the node has to stop. ``clock`` is the machine's time or, with ``ros_time`` and if the
     parameter /use_sim_time is set, the time from /clock; ``simulated`` is True in the latter case. Raise
@@ -59,7 +59,7 @@ class ToolNode:
     ) -> None:
         name = name or f"{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
         self.name = f"{environment.namespace.rstrip('/')}/{name}"
-        # Ctrl-C may interrupt wait() anywhere: the lock of a threading.Event would stay locked, and close() would wait forever.
+        # Ctrl-C may interrupt wait() anywhere, which would leave a threading.Event locked, and close() would block forever.
         self.ended = SignalSafeEvent()
         self.classes = MessageClasses()
         self.clock: Clock = WallClock()
@@ -75,7 +75,7 @@ class ToolNode:
             if ros_time:
                 self._follow_clock(environment.master_uri)
         except BaseException:
-            # Ctrl-C may interrupt the start after the node's servers were opened, so close them.
+            # Ctrl-C may have interrupted the start after the node's servers were opened.
             self.close()
             raise
 
@@ -94,7 +94,7 @@ class ToolNode:
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep for ``seconds``, or until the node has to stop. Return whether it has to stop.
+        """Wait for ``seconds``, or until the node must stop. Return whether it must stop.
 
         Raise the exception of a function passed to :meth:`measure`, if it raised one.
         """
@@ -109,7 +109,7 @@ class ToolNode:
         return True
 
     def wait_for_time(self, seconds: float) -> None:
-        """Wait until a time has been received on /clock, for at most ``seconds``."""
+        """Wait until /clock has published a time, for at most ``seconds``."""
         end = time.monotonic() + seconds
         while not self.clock.now() and time.monotonic() < end and not self.wait(0.01):
             pass
@@ -117,7 +117,7 @@ class ToolNode:
     def listen(
         self, topic: str, deliver: Callable[[Frame, Header], None], *, tcp_nodelay: bool = False
     ) -> None:
-        """Call ``deliver(bytes, header)`` in a worker for each message on a topic of any type.
+        """Subscribe to a topic of any type; call ``deliver(bytes, header)`` in a worker for each message.
 
         The bytes are valid only during the call. A node subscribes to a topic only once, so the same worker also calls
         later listeners, for example for /clock, which the node itself uses. A later listener is first called in this
@@ -134,7 +134,7 @@ class ToolNode:
         self._loop.run(self._node.subscribe(subscription))
 
     def measure(self, topic: str, add: Callable[[Received], object], *, tcp_nodelay: bool = False) -> None:
-        """Call ``add`` in a worker for each message on a topic. If ``add`` raises, :meth:`wait` raises the exception."""
+        """Call ``add`` in a worker for each message on a topic. If ``add`` raises an exception, :meth:`wait` raises it."""
 
         def deliver(body: Frame, header: Header) -> None:
             try:
@@ -146,11 +146,11 @@ class ToolNode:
         self.listen(topic, deliver, tcp_nodelay=tcp_nodelay)
 
     def stop(self) -> None:
-        """Make :meth:`wait` return, and end the reading of all inboxes."""
+        """Make :meth:`wait` return, and end all inboxes."""
         self._end()
 
     def inbox(self, topic: str) -> Inbox:
-        """Subscribe to a topic and return an inbox for its messages. Only one thread may read the inbox."""
+        """Subscribe to a topic; return an inbox with its messages. Only one thread may read the inbox."""
         inbox = Inbox(self.clock)
         self._on_end.append(inbox.close)
         self.listen(topic, inbox.put)
@@ -159,7 +159,7 @@ class ToolNode:
     def publisher(
         self, topic: str, message_class: type[Message], *, latch: bool, queue_size: int = 100
     ) -> TopicPublisher:
-        """Advertise a topic whose message class is installed."""
+        """Advertise a topic. Its message class must be installed."""
         type_ = InterfaceType.of(message_class)
         publication = Publication(topic, type_, queue_size=queue_size, latch=latch)
         self._loop.run(self._node.advertise(publication))
@@ -192,16 +192,16 @@ class ToolNode:
 
 
 class _Listeners:
-    """The functions to call with each message on one topic."""
+    """The functions to call with each message on a topic."""
 
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
         self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
         self._lock = threading.Lock()
-        # The last message of each latched publisher, by name.
+        # The last message of each latched publisher, keyed by the publisher's name.
         self._latched: dict[str, tuple[bytes, Header]] = {}
 
     def add(self, function: Callable[[Frame, Header], None]) -> None:
-        """Call ``function`` immediately with latched messages, and then for each new message."""
+        """Call ``function`` immediately with the latched messages, then with each new message."""
         with self._lock:
             self._functions += (function,)
             latched = [*self._latched.values()]
@@ -209,8 +209,8 @@ class _Listeners:
             function(body, header)
 
     def deliver(self, body: Frame, header: Header) -> None:
-        """Pass a new message to each of the functions. Called in a worker."""
-        # A function that is being added gets this message either here or in add(), but not in both.
+        """Pass a new message to all functions. Called in a worker."""
+        # With the lock, a function that is being added gets this message exactly once: either here or in add().
         with self._lock:
             functions = self._functions
             if header.get("latching") == "1":
@@ -220,7 +220,7 @@ class _Listeners:
 
 
 class Inbox:
-    """A queue between the workers that receive messages and the one thread that reads them."""
+    """A queue between the workers, which receive messages, and the single thread that reads them."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -228,7 +228,7 @@ class Inbox:
         self._closed = threading.Event()
 
     def put(self, body: Frame, header: Header) -> None:
-        """Queue a message; block while too many messages are unread."""
+        """Queue a message; block while the queue is full."""
         received = Received(bytes(body), header, self._clock.now())
         while not self._closed.is_set():
             try:
@@ -238,13 +238,13 @@ class Inbox:
             return
 
     def close(self) -> None:
-        """Make the reader stop after reading the queued messages."""
+        """Make the reader stop after it has read all queued messages."""
         if not self._closed.is_set():
             self._closed.set()
             try:
                 self._messages.put_nowait(None)
             except queue.Full:
-                pass  # the queue is full: the reader checks the flag after reading the queued messages
+                pass  # the queue is full, so the reader checks the flag after reading the queued messages
 
     def __iter__(self) -> Iterator[Received]:
         while True:
@@ -260,7 +260,7 @@ class Inbox:
 
 
 class TopicPublisher:
-    """Publishes messages on one topic from one thread."""
+    """Publishes messages on a topic from a single thread."""
 
     def __init__(self, publication: Publication) -> None:
         self._publication = publication
@@ -278,7 +278,7 @@ class TopicPublisher:
             pass
 
     def publish(self, message: Message) -> None:
-        """Send a message, with the next sequence number in its header. Raise MessageException if a value is invalid."""
+        """Set the sequence number in the message's header; send the message. Raise MessageException if a value is invalid."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence
@@ -286,7 +286,7 @@ class TopicPublisher:
 
 
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
-    """Wait until ``name``, a topic or a path to a topic's field, is published. Return the topic and the field.
+    """Wait until ``name``, a topic or a field of a topic, is published. Return the topic and the field.
 
     Call ``on_waiting`` once if this has to wait.
     """

@@ -24,7 +24,7 @@ __all__ = ["Edge", "Survey", "describe", "survey", "traffic"]
 
 
 class Edge(NamedTuple):
-    """A connection for one topic, from the sending node to the receiving node."""
+    """A connection for a topic, from the sending to the receiving node."""
 
     sender: str
     topic: str
@@ -32,7 +32,7 @@ class Edge(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Messages and bytes sent over a connection since it was opened."""
+    """The messages and bytes sent over a connection since it was opened."""
 
     messages: int
     bytes: int
@@ -40,7 +40,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """The graph at one time (monotonic seconds).
+    """The graph at a point in time, in monotonic seconds.
 
     ``counts`` is keyed by process, connection and edge; ``loads`` is keyed by node.
     """
@@ -54,7 +54,7 @@ class Survey:
 
 
 def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
-    """Query the master and all nodes in parallel. If ``processes`` is given, also measure the loads.
+    """Query the master and all nodes in parallel. If ``processes`` is given, measure the processes' loads, too.
 
     Raise MasterUnreachableError if no master responds.
     """
@@ -74,14 +74,14 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
 
 
 def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, float]]:
-    """Return a dict from edge to (messages, bytes) per second, for the edges in both surveys."""
+    """Return the (messages, bytes) per second of each edge that is in both surveys."""
     if before is None or after.seconds <= before.seconds:
         return {}
     span = after.seconds - before.seconds
     found: dict[Edge, tuple[float, float]] = {}
     for key, now in after.counts.items():
         then = before.counts.get(key)
-        # roscpp's counters have 32 bits: skip counters that have wrapped around.
+        # roscpp's counters have 32 bits, so skip those that have wrapped around.
         if then is None or now.messages < then.messages or now.bytes < then.bytes:
             continue
         hz, size = found.get(key[2], (0.0, 0.0))
@@ -90,7 +90,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
 
 
 def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
-    """Convert a survey to values for JSON: ``nodes``, ``traffic``, ``mismatches``.
+    """Convert a survey to JSON-compatible values: ``nodes``, ``traffic``, ``mismatches``.
 
     A row in ``traffic`` is [sender, topic, receiver, Hz, bytes/s].
     """
@@ -160,7 +160,7 @@ def _topics(
 
 
 def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
-    """Return a node's counters per outbound connection, or {} if the rows do not have the documented format."""
+    """Return a node's counters for each outbound connection, or {} if the rows are not in the documented format."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
     }
@@ -170,8 +170,7 @@ def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Count
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # rospy's rows end with messages and connected.
-                # roscpp's end with bytes of messages, messages and connected.
+                # A row ends with (messages, is connected) in rospy; in roscpp, the messages' size comes before these.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

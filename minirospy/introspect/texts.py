@@ -36,14 +36,14 @@ def node_text(detail: NodeDetail) -> str:
 
 
 def connections_text(graph: Graph, connections: Connections) -> str:
-    """Format a node's report about itself: process id and connections."""
+    """Format what a node reports about itself: its process ID and its connections."""
     lines = [f"Pid: {connections.pid}"]
     if connections.links:
         names = {graph.node_uri(node): node for node in list_nodes(graph)}
         lines.append("Connections:")
         for link in connections.links:
             to = link.destination
-            # For an inbound connection, ``to`` is the publisher's URI, not its name.
+            # For an inbound connection, ``to`` is the publisher's URI instead of its name.
             shown = f"{names[to]} ({to})" if to in names else to
             lines += (
                 f" * topic: {link.topic}",
@@ -68,7 +68,7 @@ def topic_text(detail: TopicDetail) -> str:
 
 
 def _direction(direction: str, info: str) -> str:
-    """Return ``outbound (port - host:port) [socket]``. The numbers come from the description that nodes send."""
+    """Return ``outbound (port - host:port) [socket]``, with the numbers from the node's description of a connection."""
     import re
 
     match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)

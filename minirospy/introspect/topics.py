@@ -30,13 +30,13 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""Shown for a topic of unknown type: no node has declared a type, because all its subscribers accept any type."""
+"""Shown for a topic whose type no node has declared, because all its subscribers accept any type."""
 
 _ANY = "*"
 
 
 class TopicNodes(NamedTuple):
-    """A topic, its type, and its publishers or its subscribers."""
+    """A topic, its type, and either its publishers or its subscribers."""
 
     name: str
     type: str
@@ -44,7 +44,7 @@ class TopicNodes(NamedTuple):
 
 
 class TopicList(NamedTuple):
-    """A graph's topics with their publishers, and topics with their subscribers, in the master's order."""
+    """The published topics with their publishers, and the subscribed topics with their subscribers, in the master's order."""
 
     published: list[TopicNodes]
     subscribed: list[TopicNodes]
@@ -60,7 +60,7 @@ class TopicDetail(NamedTuple):
 
 
 class TopicField(NamedTuple):
-    """A name split into a topic, the topic's type, and the path of a field in the topic's messages."""
+    """A name split into a topic, the topic's type, and the path of a field in its messages."""
 
     topic: str
     type: str
@@ -96,7 +96,7 @@ def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
 
 
 def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
-    """Return a dict from host, sorted, to the topics used by the nodes on that host."""
+    """Group the topics by the hosts of the nodes that use them; return a dict sorted by host."""
     hosts = {
         node: node_host(graph.node_uri(node)) for side in found for topic in side for node in topic.nodes
     }
@@ -124,7 +124,7 @@ def topic_detail(graph: Graph, topic: str) -> TopicDetail:
 
 
 def find_topic(graph: Graph, name: str) -> TopicField | None:
-    """Return the topic that the global name ``name`` refers to: the topic itself, or one of its fields (``/pose/header/stamp``).
+    """Return the topic for the global name ``name``, which may include a field: ``/pose/header/stamp``.
 
     Return None if the topic does not exist, or its type is not known yet. A topic with the whole name takes precedence over
     a field of a topic with a shorter name.
@@ -132,7 +132,7 @@ def find_topic(graph: Graph, name: str) -> TopicField | None:
     types = {topic: type_ for topic, type_ in graph.master.get_topic_types().items() if type_ != _ANY}
     if name in types:
         return TopicField(name, types[name], "")
-    # `/a/b[0]` may be an element of the field b of /a, but not one of the topic /a/b.
+    # `/a/b[0]` may be an element of the field b of /a, but not of the topic /a/b.
     holders = [topic for topic in types if name.startswith(topic + "/")]
     if not holders:
         return None
@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Like :func:`find_topic`, but never return None.
+    """Return the topic like :func:`find_topic`, but never None.
 
     Raise NotFoundError if the topic does not exist or its type is not known.
     """

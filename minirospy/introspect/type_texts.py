@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 MAX_NAMES = 2_000
-"""Maximum number of types to cache, including those that are not installed: a peer may send any number of names."""
-_MAX_CONCURRENT = 32  # maximum number of publishers queried concurrently
+"""Maximum number of cached types, including types that are not installed: peers can send any number of names."""
+_MAX_CONCURRENT = 32  # maximum number of publishers to query concurrently
 
 
 def installed_type(name: str) -> InterfaceType | None:
-    """Return an installed message type, or None if the type is not installed or its module cannot be loaded."""
+    """Return an installed message type, or None if it is not installed or its module cannot be loaded."""
     from minirospy.core.idl.load import get_message_class
 
     try:
@@ -36,7 +36,7 @@ def installed_type(name: str) -> InterfaceType | None:
 
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
-    """Return the type for a full definition, or None if it cannot be parsed.
+    """Return the type that a full definition describes, or None if the definition cannot be parsed.
 
     Generates no class, because that would take a second.
     """
@@ -49,7 +49,7 @@ def type_of_text(name: str, text: str) -> InterfaceType | None:
 
 
 class TypeTexts:
-    """Message types by topic. Importing a type's module takes milliseconds, so a worker imports each one, once."""
+    """Determines the types of topics. Imports each type's module only once, in a worker, because that takes milliseconds."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -59,7 +59,7 @@ class TypeTexts:
     async def of_publishers(
         self, topics: Mapping[str, tuple[str, ...]], seconds: float
     ) -> dict[str, InterfaceType]:
-        """Query the publishers of these topics.
+        """Query publishers for the types of their topics.
 
         Return the types that arrive within ``seconds``, because a publisher may stall.
         """
@@ -89,7 +89,7 @@ class TypeTexts:
         loop = asyncio.get_running_loop()
         found = await loop.run_in_executor(None, installed_type, name)
         while len(self._installed) >= MAX_NAMES:
-            # Remove the oldest entry, which comes first because dictionaries preserve insertion order.
+            # The oldest entry is the first one, because dictionaries preserve insertion order.
             del self._installed[next(iter(self._installed))]
         self._installed[name] = found
         return found
@@ -99,13 +99,13 @@ class TypeTexts:
             with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
                 header = await self.header_of(topic, publisher)
                 text = header.get("message_definition", "")
-                # An empty definition is valid only for a message without fields, which has this md5sum.
+                # An empty definition is valid only for a message without fields, which always has this md5sum.
                 if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":
                     return InterfaceType(header["type"], header["md5sum"], text)
         return None
 
     async def header_of(self, topic: str, publisher: str) -> Header:
-        """Connect to a publisher as a subscriber, disconnect, and return the publisher's connection header."""
+        """Return a publisher's connection header, by connecting as a subscriber and disconnecting again."""
         uri = await self._node.call_master("lookupNode", publisher)
         answer = await self._rpc.call(uri, "requestTopic", self._node.name, topic, [["TCPROS"]])
         match answer:
@@ -129,7 +129,7 @@ class TypeTexts:
 
 @dataclass(frozen=True)
 class ServiceInfo:
-    """A service's type, with the full definitions of its request and response."""
+    """A service's type, and the full definitions of its request and response."""
 
     name: str
     type: str
@@ -139,7 +139,7 @@ class ServiceInfo:
 
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
-    """Return the service type named in a service's connection header. Raise NotFoundError if the type is not installed."""
+    """Return the service type that a connection header names. Raise NotFoundError if it is not installed."""
     from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")

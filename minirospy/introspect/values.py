@@ -38,7 +38,7 @@ _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "nul
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
-_MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer that an error message shows
+_MAX_SHOWN_DIGITS = 40  # maximum number of digits shown of an integer in an error message
 
 
 def parse_value(text: str) -> object:
@@ -59,7 +59,7 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # An argument that is not UTF-8 is a usage error, which the command reports.
+            # Text that is not UTF-8 is a usage error, which the command reports.
             raise error.__cause__ from None
         accepted = _accepted_by_ros(text, error)
         if len(accepted) != 1:
@@ -68,7 +68,7 @@ def parse_value(text: str) -> object:
 
 
 def parse_documents(text: str, where: str) -> Iterator[object]:
-    """Yield the values of a YAML string's documents, which are separated by ``---``.
+    """Yield the value of each document in a YAML string; ``---`` separates documents.
 
     Raise ValueTextError if the string is invalid.
     """
@@ -87,7 +87,7 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
 
 
 def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
-    """Return the documents of a text with which the compiled loader failed, or [] if it is invalid for ROS, too.
+    """Return the documents of a text that the compiled loader rejected, or [] if ROS's loader rejects it, too.
 
     ROS uses PyYAML's loader in Python, which also accepts ``{data:[1, 2]}``, without a space after the colon.
     """
@@ -102,7 +102,7 @@ def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
-    """Like :func:`parse_documents`, but yield each value as soon as its document is complete.
+    """Yield values like :func:`parse_documents`, but yield each as soon as its document is complete.
 
     For example, `rostopic echo /a | rostopic pub /b TYPE` needs this.
     """
@@ -117,7 +117,7 @@ def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
 
 
 def parse_arguments(words: Sequence[str]) -> list[object]:
-    """Parse a message's values from the command line. An empty argument becomes an empty string, not null as in YAML."""
+    """Parse a message's values from command-line arguments. An empty argument becomes an empty string, not null as in YAML."""
     return [parse_value(word) if word else "" for word in words]
 
 
@@ -129,7 +129,7 @@ def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
 
 
 def format_value(value: object) -> str:
-    """Format a value as YAML, as `rosparam get` prints it. The text of a list or dictionary ends with a line feed."""
+    """Format a value as YAML, like `rosparam get`. The text for a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -142,7 +142,7 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object, indent: str = "") -> str:
-    """Format a value for people, like `rosparam get -p`. Strings are not quoted, so the output may not be valid YAML.
+    """Format a value for people, like `rosparam get -p`: strings are not quoted, so the output may not be valid YAML.
 
     ``indent`` is put before the entries of a dictionary.
     """
@@ -152,7 +152,7 @@ def format_pretty(value: object, indent: str = "") -> str:
 
 
 def check_parameter(value: object, name: str) -> None:
-    """Raise ValueTextError if a value, or one inside it, cannot be stored as a parameter."""
+    """Raise ValueTextError if a value, or a nested one, cannot be stored as a parameter."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if not isinstance(key, str):
@@ -178,7 +178,7 @@ def check_parameter(value: object, name: str) -> None:
 
 
 def _is_digits(text: str) -> bool:
-    """Return whether a string consists of at most nine ASCII digits.
+    """Return whether a string consists of one to nine ASCII digits.
 
     Uses no regular expression, because compiling one slows the start.
     """
@@ -186,7 +186,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML parses a word as a string: it consists of letters, digits, / and _, and has no special meaning."""
+    """Return whether YAML reads an unquoted word as a string: only letters, digits, / and _, without a special meaning."""
     return (
         len(word) > 1
         and word.isascii()
@@ -211,7 +211,7 @@ def _pretty_lines(table: dict[str, object], indent: str) -> Iterator[str]:
 
 @lru_cache(maxsize=2)
 def _loader(*, compiled: bool = True) -> type[yaml.SafeLoader]:
-    """Return a safe YAML loader that accepts angle expressions such as ``deg(90)``."""
+    """Return a safe YAML loader class that accepts angles such as ``deg(90)``."""
     import yaml
 
     class AngleLoader(yaml_text.fast_loader() if compiled else yaml.SafeLoader):  # type: ignore[misc]
@@ -222,7 +222,7 @@ def _loader(*, compiled: bool = True) -> type[yaml.SafeLoader]:
 
 
 def add_angles(loader_class: type[_Loader]) -> None:
-    """Add angles to a YAML loader: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
+    """Make a YAML loader class accept angles: ``deg(90)``, ``rad(pi/2)``, ``!degrees 90``, ``!radians pi``."""
     import yaml
 
     def constructor(

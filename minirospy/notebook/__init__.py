@@ -21,7 +21,7 @@ __all__ = ["frame", "load_ipython_extension", "unload_ipython_extension", "view"
 
 
 def load_ipython_extension(shell: Shell) -> None:
-    """Show messages as tables and images as pictures, and make an interrupt in ``rospy.spin()`` end only the cell."""
+    """Display messages as tables and images as pictures, and let an interrupt of ``rospy.spin()`` end only the cell."""
     from minirospy.client.session import current_session
     from minirospy.notebook.display import show_messages
 

@@ -16,9 +16,9 @@ from minirospy.web.video.pictures import COMPRESSED, IMAGE, encoded
 __all__ = ["Shell", "hide_messages", "html_of", "show_messages"]
 
 _MAX_ROWS = 100
-_MAX_ITEMS = 8  # array elements shown
-_MAX_TEXT = 200  # characters shown per value
-_MAX_WIDTH = 640  # pixels; the maximum width of a picture
+_MAX_ITEMS = 8  # maximum number of array elements shown
+_MAX_TEXT = 200  # maximum number of characters shown per value
+_MAX_WIDTH = 640  # maximum width of a picture, in pixels
 
 
 class _Formatter(Protocol):
@@ -38,17 +38,17 @@ class Shell(Protocol):
 
 
 def show_messages(shell: Shell) -> None:
-    """Make ``shell`` show messages as HTML."""
+    """Make ``shell`` display messages as HTML."""
     shell.display_formatter.formatters["text/html"].for_type(genpy.Message, html_of)
 
 
 def hide_messages(shell: Shell) -> None:
-    """Make ``shell`` show messages as text again."""
+    """Make ``shell`` display messages as text again."""
     shell.display_formatter.formatters["text/html"].pop(genpy.Message, None)
 
 
 def html_of(message: Any) -> str:
-    """Return a message as an HTML table of its fields; for an image, with its picture above the table."""
+    """Format a message as an HTML table of its fields; for an image, add its picture above the table."""
     rows = []
     fields = list(leaves(type(message)))
     for path, type_ in fields[:_MAX_ROWS]:
@@ -81,7 +81,7 @@ def _text_of(value: Any) -> str:
 
 
 def _picture_of(message: Any) -> str:
-    """Return an image's picture as an HTML element, the reason if there is none, or "" for other messages."""
+    """Return an HTML element with an image message's picture or the reason why there is none; "" for other messages."""
     if message._type not in (IMAGE, COMPRESSED):
         return ""
     body = _Buffer()
@@ -95,7 +95,7 @@ def _picture_of(message: Any) -> str:
 
 
 class _Buffer:
-    """An output buffer for a message's ``serialize``."""
+    """A buffer into which a message's ``serialize`` writes."""
 
     def __init__(self) -> None:
         self.data = bytearray()

@@ -26,7 +26,7 @@ def frame(
     end: Any = None,
     library: Literal["pandas", "polars"] = "pandas",
 ) -> pandas.DataFrame | polars.DataFrame:
-    """Return a topic's messages in a bag or MCAP file as a data frame with one row per message.
+    """Return the messages on a topic of a bag or MCAP file as a data frame with one row per message.
 
     The column ``time`` (in pandas, the index) contains the times of receipt. Each other column is a field, such as
     ``twist.twist.linear.x`` or ``position[elbow]``. Times are in UTC with nanoseconds. Arrays without names remain lists, and

@@ -26,7 +26,7 @@ _HEIGHT = 420  # pixels
 
 
 class Frame:
-    """A view for a cell. IPython shows its HTML."""
+    """A dashboard view, which IPython displays in a cell as an HTML iframe."""
 
     def __init__(self, url: str, height: int) -> None:
         self.url = url
@@ -43,7 +43,7 @@ class Frame:
 
 
 class _Dashboard:
-    """A dashboard process, and its page's host, port and token."""
+    """A dashboard process, with the host, port and token of its page."""
 
     def __init__(self, process: subprocess.Popen[str], url: str) -> None:
         self.process = process
@@ -53,14 +53,14 @@ class _Dashboard:
 
 
 class _Dashboards:
-    """The dashboard processes of this kernel, by master URI."""
+    """The dashboard processes of this kernel, keyed by master URI."""
 
     lock = threading.Lock()
     by_master: dict[str, _Dashboard] = {}
 
 
 def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterable[str]) -> Frame:
-    """Return a dashboard view, to be the last expression of a cell or an argument of ``display``.
+    """Return a dashboard view to display: as the last expression of a cell, or with ``display``.
 
     ``name``: plot, 3d, graph, image, console or another view. ``height``: pixels. ``fields``: the view's settings, as in its
     link: for example ``path="/odom/twist/twist/linear/x"`` for a plot, or ``topic="/camera/image_raw"`` for an image. The first
@@ -80,7 +80,7 @@ def view(name: str = "topics", *, height: int = _HEIGHT, **fields: str | Iterabl
 
 
 def _start() -> _Dashboard:
-    # Use a new process group, because interrupting a cell signals the kernel's whole group.
+    # Use a new process group, because interrupting a cell sends the signal to the kernel's whole group.
     group: dict[str, Any] = {"start_new_session": True}
     if sys.platform == "win32":
         group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
@@ -99,8 +99,8 @@ def _start() -> _Dashboard:
         said.append(line)
         url = next((word for word in line.split() if word.startswith("http") and "token=" in word), "")
         if url:
-            # Discard all further output, so that the process never blocks on a full pipe.
+            # Discard further output, so that the process never blocks on a full pipe.
             threading.Thread(target=deque, args=(process.stdout, 0), daemon=True).start()
             return _Dashboard(process, url)
-    said.append(process.communicate()[0])  # closes the pipes, too
+    said.append(process.communicate()[0])  # also closes the pipes
     raise MinirospyError(f"the dashboard did not start: {''.join(said).strip()}")

@@ -34,7 +34,7 @@ _STANDARD_LIBRARY = {
 """Standard library submodules that real ROS imports, so programs use them without importing them."""
 
 _LARGE = {"http", "logging"}
-"""Packages that are slow to import: their submodules are offered only if the packages have already been imported."""
+"""Packages that are slow to import: offer their submodules only if the program has already imported the package."""
 
 
 def import_passed_on(namespace: dict[str, object], name: str, place: str) -> object:
@@ -47,7 +47,7 @@ def import_passed_on(namespace: dict[str, object], name: str, place: str) -> obj
 
 
 def offer_standard_library() -> None:
-    """Make ``import rospy, xml`` sufficient for using ``xml.etree.ElementTree``, as in real ROS.
+    """Let programs use ``xml.etree.ElementTree`` after ``import rospy, xml``, as in real ROS.
 
     The submodules are imported when they are first used: importing them in advance would take longer than ``import rospy``.
     """
@@ -59,7 +59,7 @@ def offer_standard_library() -> None:
 
 
 def _on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
-    """Return a ``__getattr__`` (PEP 562) for ``package`` that imports these submodules on first use."""
+    """Return a module ``__getattr__`` (PEP 562) for ``package`` that imports these submodules on first use."""
 
     def find(name: str) -> ModuleType:
         if name in names:

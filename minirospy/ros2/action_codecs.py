@@ -28,7 +28,7 @@ _WIDTHS = {"time": 8, "duration": 8, "string": 4}
 
 @dataclass(frozen=True)
 class ActionCodec:
-    """Converts an action's messages. ``classes`` maps the last part of a ROS 1 topic name to the message class."""
+    """Converts the messages of an action. ``classes`` maps the last part of a ROS 1 topic name to its message class."""
 
     goal: Transcoder
     result: Transcoder
@@ -38,7 +38,7 @@ class ActionCodec:
 
 
 class ActionCodecs:
-    """Creates action codecs, and caches them keyed by the action's ROS 1 and ROS 2 types."""
+    """Creates and caches the codecs of actions, keyed by the ROS 1 and ROS 2 types."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -47,7 +47,7 @@ class ActionCodecs:
         self._codecs: dict[tuple[str, str], ActionCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type on the side that sends goals, given the type on the side that offers the action."""
+        """Return an action's type on the client's side, given its type on the server's side."""
         names: tuple[str, ...]
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_actions(type_)
@@ -56,7 +56,7 @@ class ActionCodecs:
         return next((name for name in names if self._is_in_ros1(name)), names[0])
 
     def codec(self, ros1_type: str, ros2_type: str) -> ActionCodec:
-        """Return an action's codec. Raise TypesDiffer if its types cannot be converted."""
+        """Return the codec for an action. Raise TypesDiffer if its types cannot be converted."""
         key = (ros1_type, ros2_type)
         if key not in self._codecs:
             self._codecs[key] = self._made(ros1_type, ros2_type)

@@ -16,7 +16,7 @@ _GOAL_TYPE = "ActionGoal"
 
 @dataclass(frozen=True)
 class ActionLink:
-    """An action that one side offers and the other uses. Goals are sent in ``direction``."""
+    """An action with a server on one side and a client on the other. Goals are sent in ``direction``."""
 
     action: str
     direction: Direction
@@ -37,7 +37,7 @@ def send_goal_service(action: str) -> str:
 def action_links(
     ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
 ) -> list[ActionLink]:
-    """Return the actions to bridge: those that only one side offers. Ignore those that bridges offer.
+    """Return the actions to bridge: those with a server on only one side, ignoring those that bridges offer.
 
     ``ros2_services`` maps services to their types. ``partner(type, direction)`` returns the type on the side that sends goals.
     """

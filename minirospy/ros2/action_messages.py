@@ -30,7 +30,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class GoalId(NamedTuple):
-    """A goal's id and its send time, in seconds and nanoseconds."""
+    """A goal's ID, and its send time in seconds and nanoseconds."""
 
     id: str
     secs: int = 0
@@ -38,12 +38,12 @@ class GoalId(NamedTuple):
 
     @property
     def nanoseconds(self) -> int:
-        """Return the time in nanoseconds, or 0 if it is not set."""
+        """Return the send time in nanoseconds, or 0 if it is not set."""
         return self.secs * 1_000_000_000 + self.nsecs
 
 
 class Status(NamedTuple):
-    """A goal's status: the number of a GoalState, and a text for users."""
+    """A goal's status: the number of a GoalState, and a text for people."""
 
     goal: GoalId
     state: int
@@ -56,7 +56,7 @@ def goal_message(goal: GoalId, body: bytes) -> bytes:
 
 
 def parse_goal(data: bytes | memoryview) -> tuple[GoalId, bytes]:
-    """Return the goal's id and body from an ActionGoal. Raise DeserializationError if the data is invalid."""
+    """Return the goal ID and the body of an ActionGoal. Raise DeserializationError if the data is invalid."""
     data = bytes(data)
     goal, end = _parse_goal_id(data, _parse_header(data))
     return goal, data[end:]
@@ -78,7 +78,7 @@ def status_and_body(secs: int, nsecs: int, status: Status, body: bytes) -> bytes
 
 
 def parse_status_and_body(data: bytes | memoryview) -> tuple[Status, bytes]:
-    """Return the status and body from an ActionFeedback or ActionResult. Raise DeserializationError if the data is invalid."""
+    """Return the status and body of an ActionFeedback or ActionResult. Raise DeserializationError if the data is invalid."""
     data = bytes(data)
     status, end = _parse_status(data, _parse_header(data))
     return status, data[end:]

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 SERVER_SECONDS = 5.0
-"""Timeout in seconds for a ROS 1 server to connect and to list a new goal in its statuses."""
+"""Seconds that a ROS 1 server may take to connect, and to list a new goal in its statuses."""
 MAX_GOALS = 1_000
-"""Maximum number of goals forwarded concurrently; further goals are rejected."""
+"""Maximum number of concurrently forwarded goals; further goals are rejected."""
 _PENDING_SECONDS = 0.5
 """Seconds after which a pending goal counts as accepted, because ROS 2 has no pending state."""
 _ENDS = {
@@ -49,7 +49,7 @@ _REFUSED = {GoalState.REJECTED, GoalState.RECALLED}
 
 
 class _Goal:
-    """A goal from a ROS 2 client, sent to a ROS 1 server."""
+    """A goal that a ROS 2 client has sent to a ROS 1 server."""
 
     def __init__(
         self, id: GoalId, feedback: Callable[[bytes], None], cancel: Callable[[_Goal], None]
@@ -62,7 +62,7 @@ class _Goal:
         self._cancel = cancel
 
     def cancel(self) -> None:
-        """Send the server a cancel request. May be called from any thread."""
+        """Ask the server to cancel the goal. May be called from any thread."""
         self._cancel(self)
 
     def accept(self, is_accepted: bool) -> None:
@@ -75,7 +75,7 @@ class _Goal:
 
 
 class GoalsToRos1:
-    """The client of a ROS 1 action server. Runs on the node's loop."""
+    """Forwards goals from ROS 2 clients to a ROS 1 action server. Runs on the node's loop."""
 
     def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
         self._node = node
@@ -104,14 +104,14 @@ class GoalsToRos1:
         ]
 
     async def open(self) -> None:
-        """Connect to the server, then offer the action. Raise TypesDiffer if its types cannot be converted."""
+        """Connect to the server, then offer the action in ROS 2. Raise TypesDiffer if its types cannot be converted."""
         for end in (self._goal, self._cancel, *self._subscriptions):
             await end
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """Close the action. Running goals are aborted, except that a goal whose result has already arrived finishes with it."""
-        # A result that has already arrived is processed in the loop's next iteration.
+        """Close the action. Abort running goals, except those whose results have already arrived."""
+        # Let the loop process results that have already arrived.
         await asyncio.sleep(0)
         self._is_closed = True
         for goal in list(self._goals.values()):
@@ -120,7 +120,7 @@ class GoalsToRos1:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._server:
-            # close() blocks until all known results have been sent.
+            # Wait in a thread, because close() blocks until all known results have been sent.
             await self._loop.run_in_executor(None, self._server.close)
         for end in (*self._subscriptions, self._goal, self._cancel):
             await end.close()
@@ -137,7 +137,7 @@ class GoalsToRos1:
         if self._is_closed:
             accepted.set_exception(BridgeError("it is not bridged any more"))
             return
-        # Count the goals that are being accepted, as well as the running ones.
+        # Count both the running goals and those still being accepted.
         if len(self._tasks) + len(self._goals) >= MAX_GOALS:
             accepted.set_exception(BridgeError(f"the bridge passes on {MAX_GOALS} goals already"))
             return
@@ -177,7 +177,7 @@ class GoalsToRos1:
         return goal if is_accepted else None
 
     async def _connected(self) -> None:
-        """Wait until the server is connected in both directions; a goal sent before that would be lost."""
+        """Wait until the server is connected in both directions, because an earlier goal would be lost."""
         await self._heard.wait()
         for publisher in (self._goal, self._cancel):
             await publisher.wait_for_subscribers()
@@ -191,7 +191,7 @@ class GoalsToRos1:
 
         self._loop.call_soon_threadsafe(cancel)
 
-    # --- messages from the server
+    # --- messages from the ROS 1 server
 
     def _guarded(self, take: Callable[[Frame], None]) -> Callable[[Frame, Header], None]:
         def guarded(frame: Frame, _: Header) -> None:
@@ -209,7 +209,7 @@ class GoalsToRos1:
             state = listed.get(goal.id.id)
             if state is None:
                 if goal.is_listed:
-                    # The server has been restarted and no longer knows the goal.
+                    # The server was restarted and no longer knows the goal.
                     self._end(goal, ABORTED, None)
             elif state == GoalState.PENDING:
                 if not goal.is_listed:
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Feedback arrives on a separate connection, so process the feedback that has already arrived first.
+        # Process feedback that has already arrived first, because it uses another connection.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

@@ -41,20 +41,20 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 REACH_SECONDS = 2.0
-"""Maximum seconds for which opening this link, which waits for the server, may delay other links."""
+"""Maximum time in seconds that opening this link may delay other links while it waits for the server."""
 ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
-"""Delay of a response in seconds: Python's actionlib drops responses that arrive before its send_goal has returned."""
+"""Seconds to delay a response: Python's actionlib drops one that arrives before its send_goal has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
-"""Maximum number of goals sent but not yet accepted. A server's queue holds 10; further goals would be lost."""
+"""Maximum number of sent goals that are not accepted yet. A server queues only 10, and further goals would be lost."""
 MAX_GOALS = 1_000
-"""Maximum number of stored goals, including recently ended ones; further goals are rejected."""
+"""Maximum number of stored goals, including those that ended recently; further goals are rejected."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
 
 
 class _Goal:
-    """A ROS 1 client's goal."""
+    """A goal from a ROS 1 client."""
 
     def __init__(self, id: GoalId) -> None:
         self.status = Status(id, int(GoalState.PENDING))
@@ -63,18 +63,18 @@ class _Goal:
         self.ended_at = 0.0
 
     def step(self, event: GoalEvent, text: str = "") -> None:
-        """Apply an event to the goal's state; ignore an event that the state does not allow."""
+        """Apply an event to the goal's state; ignore events that the state does not allow."""
         state = SERVER_STEPS[event].get(self.status.state)
         if state is not None:
             self.status = Status(self.status.goal, int(state), text)
 
     def fail(self, text: str) -> None:
-        """Reject the goal if it has not been accepted yet, otherwise abort it. ``text`` is the reason."""
+        """Abort the goal, or reject it if it has not been accepted yet. ``text`` is the reason."""
         self.step(GoalEvent.REJECT if self.there is None else GoalEvent.ABORT, text)
 
 
 class GoalsToRos2:
-    """The ROS 1 action server for a ROS 2 action. Runs on the node's loop."""
+    """Forwards goals from ROS 1 clients to a ROS 2 action server. Runs on the node's loop."""
 
     def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
         self._node = node
@@ -107,14 +107,14 @@ class GoalsToRos2:
         self._reach = Reach(self._client)
 
     async def open(self) -> None:
-        """Wait for the ROS 2 server, then register the topics at the master."""
+        """Wait for the ROS 2 server, then register the action's topics with the ROS 1 master."""
         self._reach.start()
         await self._reach.wait(REACH_SECONDS)
         for end in (self._status, self._result, self._feedback, *self._subscriptions):
             await end
 
     async def close(self) -> None:
-        """Close the action and abort its running goals."""
+        """Close the action, and abort its running goals."""
         self._ended.set()
         await self._reach.close()
         if self._tasks:
@@ -172,7 +172,7 @@ class GoalsToRos2:
         self._changed.set()
 
     async def _run(self, goal: _Goal, request: bytes) -> None:
-        """Send a goal to ROS 2, and its result back to ROS 1."""
+        """Send a goal to ROS 2, and return its result to ROS 1."""
         body = self._codec.empty_result
         self._changed.set()
         try:
@@ -206,13 +206,13 @@ class GoalsToRos2:
             self._result.publish_raw(status_and_body(*self._now(), goal.status, body))
 
     async def _become_ready(self) -> None:
-        """Wait for the server: an action that was just discovered may not be connected yet."""
+        """Wait briefly for the server, because a newly discovered action may not be connected yet."""
         end = self._loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready and self._loop.time() < end and not self._ended.is_set():
             await asyncio.sleep(0.02)
 
     async def _watched(self, future: Future[_T]) -> _T:
-        """Return a future's result. Raise BridgeError if the server disappears first."""
+        """Return the result of a future. Raise BridgeError if the server disappears first."""
         answered = asyncio.wrap_future(future)
         ended: asyncio.Future[bool] = asyncio.ensure_future(self._ended.wait())
         awaited: list[asyncio.Future[_T] | asyncio.Future[bool]] = [answered, ended]
@@ -229,7 +229,7 @@ class GoalsToRos2:
         return answered.result()
 
     def _pass_feedback(self, goal: _Goal, data: bytes) -> None:
-        """Pass feedback to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets itself."""
+        """Send feedback to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets directly."""
         try:
             body = self._codec.feedback.to_ros1(data)
             if goal.status.state not in TERMINAL:
@@ -240,9 +240,9 @@ class GoalsToRos2:
             return  # the action was closed in the meantime
 
     async def _publish_statuses(self) -> None:
-        """Publish the statuses of all goals, after each change and at regular intervals."""
+        """Publish the statuses of all goals after each change, and at regular intervals."""
         await self._status
-        # Check the flag: in Python 3.11, wait_for may swallow a cancellation.
+        # Check the flag, because wait_for may swallow a cancellation in Python 3.11.
         while not self._ended.is_set():
             self._changed.clear()
             limit = self._loop.time() - _KEPT_SECONDS

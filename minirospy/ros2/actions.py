@@ -23,7 +23,7 @@ __all__ = ["ActionBridge"]
 
 
 class ActionBridge:
-    """Offers each side's actions on the other side. Runs on the node's loop."""
+    """Makes each side's actions available on the other side. Runs on the node's loop."""
 
     def __init__(
         self, node: Node, side: Ros2Side, actions: NameFilter, rules: Rules, catalogue: Catalogue
@@ -39,11 +39,11 @@ class ActionBridge:
         await self._table.close()
 
     def pairs(self, snapshot: Snapshot) -> list[Pair]:
-        """Return the actions to bridge, and the reasons why some are not bridged."""
+        """Return the actions to bridge, with the reason for each that cannot be bridged."""
         return pairs(self._wanted(snapshot), self._codec)
 
     async def look(self, snapshot: Snapshot) -> bool:
-        """Open and close actions to match both graphs; return whether any changed."""
+        """Open and close actions to match both graphs. Return whether any of them changed."""
         return await self._table.update(self._wanted(snapshot))
 
     def _wanted(self, snapshot: Snapshot) -> list[ActionLink]:

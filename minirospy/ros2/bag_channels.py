@@ -31,7 +31,7 @@ _TIME = {"sec": "int32", "nanosec": "uint32"}
 
 
 class Ros1Channel(NamedTuple):
-    """A channel converted to ROS 1: its type, md5sum and definition, and the function that converts a message's bytes."""
+    """A channel converted to ROS 1: its type, md5sum, definition, and a function that converts the messages' bytes."""
 
     type: str
     md5sum: str
@@ -40,7 +40,7 @@ class Ros1Channel(NamedTuple):
 
 
 def ros1_channel(type_: str, schema_encoding: str, schema: bytes, message_encoding: str) -> Ros1Channel:
-    """Return the conversion for a channel with the ROS 2 type ``pkg/msg/Name``.
+    """Return how to convert a channel of the ROS 2 type ``pkg/msg/Name`` to ROS 1.
 
     Raise MinirospyError, with the reason, if the encoding, type or definition cannot be converted.
     """
@@ -71,13 +71,13 @@ def _lookup(specs: Mapping[str, MessageSpec]) -> Callable[[str], MessageSpec]:
 
 
 def _short(name: str) -> str:
-    """Return ``pkg/Name`` for ``pkg/msg/Name``."""
+    """Return ``pkg/Name`` for a type written as ``pkg/msg/Name``."""
     package, _, rest = name.partition("/")
     return f"{package}/{rest.rpartition('/')[2]}"
 
 
 def _ros2_specs(name: str, text: str) -> dict[str, MessageSpec]:
-    """Return the specs in a schema's text: that of the type, and those of all types that it uses."""
+    """Return the specs in a schema's text: of the type itself, and of all types that it uses."""
     specs = {
         each: ros2_spec(each, _TIME) for each in ("builtin_interfaces/Time", "builtin_interfaces/Duration")
     }
@@ -95,7 +95,7 @@ def _ros2_specs(name: str, text: str) -> dict[str, MessageSpec]:
 
 
 def _fields(name: str, body: str) -> dict[str, str]:
-    """Return a definition's fields with their types, in the form of rclpy's classes."""
+    """Parse the fields of a definition; return their types in the syntax of rclpy's classes."""
     package = name.partition("/")[0]
     found: dict[str, str] = {}
     for number, line in enumerate(body.splitlines(), 1):

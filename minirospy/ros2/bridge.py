@@ -49,16 +49,16 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
-"""Connection header field that marks publishers of data from ROS 2, so that no bridge to the same domain sends it back."""
+"""Connection header field of publishers whose data comes from ROS 2, so that no bridge to that domain returns it."""
 _MIN_REFRESH_INTERVAL = 0.25
 QUERY_SECONDS = 3.0
-"""Seconds to wait for publishers' responses; after that, topics are bridged without them."""
+"""Timeout in seconds for querying publishers, after which topics are bridged without their responses."""
 JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
 _ROS1_QUEUE = 1000
-"""Queue size in messages, except for images; long enough for a pause on a busy machine."""
+"""Queue size in messages for all types but images: enough to bridge a pause on a busy machine."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Ros2Options:
 
 
 class _Types:
-    """Caches specs, interface types and transcoders, keyed by the types on both sides."""
+    """Caches specs, interface types and transcoders, keyed by the types of both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -87,7 +87,7 @@ class _Types:
         self._ros2 = lru_cache(maxsize=None)(self._ros2_spec)
 
     def interface(self, spec: MessageSpec, lookup: Lookup) -> InterfaceType:
-        """Return the type information for a connection header."""
+        """Return the type information that a connection header contains."""
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
@@ -100,7 +100,7 @@ class _Types:
             ) from error
 
     def of_text(self, name: str, text: str) -> tuple[MessageSpec, Lookup]:
-        """Return the type parsed from a publisher's full definition. Raise TypesDiffer if the definition is invalid."""
+        """Parse a publisher's full definition. Raise TypesDiffer if it is invalid."""
         try:
             specs = specs_of_text(name, text)
         except DefinitionError as error:
@@ -114,7 +114,7 @@ class _Types:
         return specs[name], lookup
 
     def transcoder(self, spec: MessageSpec, lookup: Lookup, ros2_type: str) -> Transcoder:
-        """Return the conversion functions for a message type. Raise TypesDiffer if the types cannot be converted."""
+        """Return functions that convert a message type. Raise TypesDiffer if the types cannot be converted."""
         allowed = self._rules.ros2_messages(spec.full_name)
         if ros2_type not in allowed:
             raise TypesDiffer(f"no rule makes [{spec.full_name}] a [{ros2_type}]: write one for --rules")
@@ -125,7 +125,7 @@ class _Types:
 
 
 class Ros2Bridge:
-    """Bridges topics with endpoints on both sides, services and actions that one side offers, and parameters.
+    """Bridges topics used on both sides, services and actions offered on one side, and parameters.
 
     Runs on the node's loop, but ROS 2 messages are forwarded in the thread of ROS 2's executor.
     """
@@ -150,7 +150,7 @@ class Ros2Bridge:
         self._is_closed = False
 
     async def start(self) -> None:
-        """Start bridging; continue until :meth:`close`.
+        """Start to bridge both sides, until :meth:`close`.
 
         Raise MasterUnreachableError or RpcError if a call to the master fails.
         """
@@ -175,7 +175,7 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return the links to bridge without opening them. If a link cannot be bridged, include the reason.
+        """Return the links to bridge, without opening them, and the reason for each that cannot be bridged.
 
         Raise the same errors as :meth:`look`.
         """
@@ -184,12 +184,12 @@ class Ros2Bridge:
         return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
-        """Wait until ``condition()`` is true after a refresh."""
+        """Wait until ``condition()`` is true; check it after each refresh."""
         while not condition():
             await self._changed.wait()
 
     async def look(self) -> bool:
-        """Open and close links to match the graphs; return whether any changed.
+        """Open and close links to match the graphs. Return whether any of them changed.
 
         Raise MasterUnreachableError or RpcError if a call to the master fails.
         """
@@ -204,7 +204,7 @@ class Ros2Bridge:
     async def _watch(self) -> None:
         pause = _MIN_REFRESH_INTERVAL
         is_reported = False
-        # Check the flag: in Python 3.11, wait_for, which these methods call, may swallow a cancellation.
+        # Check the flag, because wait_for, which these methods call, may swallow a cancellation in Python 3.11.
         while not self._is_closed:
             await asyncio.sleep(pause)
             changed = False
@@ -219,14 +219,14 @@ class Ros2Bridge:
             pause = _MIN_REFRESH_INTERVAL if changed else min(pause * 1.5, slowest)
 
     async def _snapshot(self) -> Snapshot:
-        """Return the ROS 1 graph and record its run_id."""
+        """Return the ROS 1 graph; store its run_id."""
         snapshot = await fetch(self.node.call_master)
         run_id = await self.node.get_param("/run_id", "")
         self.header = marker(str(run_id))
         return snapshot
 
     async def _wanted(self, snapshot: Snapshot) -> list[Link]:
-        """Return the topic links for the current graphs."""
+        """Return the topics to bridge in the current graphs."""
         names = self.side.topics()
         ros2 = {
             name: self.side.ends(name)
@@ -237,7 +237,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """Query new ROS 1 publishers on topics with ROS 2 subscribers for their definitions and whether they latch."""
+        """If a topic has ROS 2 subscribers, query its new ROS 1 publishers for their definitions and latching."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()
@@ -254,7 +254,7 @@ class Ros2Bridge:
         return self._headers.found.get((topic, node), {}).get("latching") == "1"
 
     def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
-        """Return the conversion functions for a link's types. Raise TypesDiffer if the types cannot be converted."""
+        """Return functions that convert a link's messages. Raise TypesDiffer if the types cannot be converted."""
         texts = [
             header.get("message_definition", "")
             for (topic, _), header in self._headers.found.items()
@@ -276,7 +276,7 @@ class Ros2Bridge:
 
 
 class TopicPassing:
-    """An open topic link; ``passed`` counts the forwarded messages."""
+    """An open link for a topic; ``passed`` counts the forwarded messages."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link
@@ -288,7 +288,7 @@ class TopicPassing:
         self._statics = StaticTransforms() if is_static else None
 
     def _with_statics(self, message: Frame) -> Frame:
-        """Return the message to send. On a static transform topic, add all known static transforms."""
+        """Return the message to send. For a topic with static transforms, include all known static transforms."""
         if self._statics is None:
             return message
         left_out = self._statics.left_out
@@ -325,7 +325,7 @@ class PassingToRos2(TopicPassing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait until the existing subscribers are connected; they would miss messages published earlier."""
+        """Wait until existing subscribers are connected, because they would miss messages that are published earlier."""
         loop = asyncio.get_running_loop()
         end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
@@ -376,9 +376,9 @@ class _ToRos1(TopicPassing):
         await self._publisher.close()
 
     def _deliver(self, data: bytes) -> None:
-        """Pass a message to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets itself."""
+        """Send a message to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets directly."""
         if data[2:4] == self._bridge.header[2:4]:
-            return  # another bridge to the same ROS 1 graph has sent the message
+            return  # another bridge to this ROS 1 graph has sent the message
         try:
             self._publisher.publish_raw(bytes(self._with_statics(self._made.to_ros1(data))))
         except DeserializationError as error:

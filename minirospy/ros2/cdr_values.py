@@ -25,7 +25,7 @@ _HEADER = len(CDR_HEADER)
 
 
 def decode(name: str, fields: Callable[[str], Fields], data: bytes) -> dict[str, object]:
-    """Decode a message of type ``name``; ``fields(type)`` returns a type's fields.
+    """Decode a message of type ``name``. ``fields(type)`` returns the fields of a type.
 
     Raise DeserializationError if the data is invalid.
     """
@@ -35,14 +35,14 @@ def decode(name: str, fields: Callable[[str], Fields], data: bytes) -> dict[str,
 
 
 def encode(name: str, fields: Callable[[str], Fields], values: Mapping[str, object]) -> bytes:
-    """Encode a message of type ``name``. Fields missing from ``values`` are zero or empty."""
+    """Encode a message of type ``name``. Fields that are missing in ``values`` become zero or empty."""
     writer = _Writer(fields)
     writer.message(name, values)
     return CDR_HEADER + bytes(writer.data)
 
 
 def _shape(text: str) -> tuple[str, bool, int | None]:
-    """Return an element's type, whether the field is an array, and its length if it is fixed."""
+    """Parse a field's type: return the element type, whether it is an array, and the length if that is fixed."""
     if text.startswith("sequence<"):
         return text[len("sequence<") : -1].partition(",")[0], True, None
     base, bracket, length = text.partition("[")
@@ -66,7 +66,7 @@ class _Reader:
         if count is None:
             count = self._length()
         if count > len(self._data) - self._at:
-            # Each element takes at least one byte, so the data is too short for that many elements.
+            # Each element takes at least one byte, so the message has too few bytes for that many elements.
             raise DeserializationError("the message ends too early")
         if base not in _LETTERS:
             return [self._one(base) for _ in range(count)]

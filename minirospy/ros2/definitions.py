@@ -18,7 +18,7 @@ from minirospy.ros2.rules import Rules, snake_case
 
 __all__ = ["NO_HASH", "Definitions"]
 
-NO_HASH = "TypeHashNotSupported"  # used in ROS 2 Humble's keys, which have no hashes
+NO_HASH = "TypeHashNotSupported"  # in place of a hash in the keys of ROS 2 Humble, which has no type hashes
 
 _TIME = {"sec": "int32", "nanosec": "uint32"}
 _STAMP = "builtin_interfaces/Time"
@@ -119,7 +119,7 @@ _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Durat
 
 
 class Definitions:
-    """ROS 2 types (``pkg/Name``) with fields derived from ROS 1 definitions and the rules.
+    """ROS 2 types (``pkg/Name``), whose fields are derived from ROS 1 definitions and the rules.
 
     All methods raise TypesDiffer if a type cannot be derived.
     """
@@ -131,7 +131,7 @@ class Definitions:
         self._hashes: dict[str, str] = {}
 
     def message(self, name: str, *, is_humble: bool = False) -> Fields:
-        """Return a message's fields; if ``is_humble``, those in ROS 2 Humble."""
+        """Return the fields of a message; if ``is_humble`` is true, those in ROS 2 Humble."""
         key = (name, is_humble)
         if key not in self._found:
             self._found[key] = _ONLY_IN_ROS2.get(name) or self._of_ros1(name, is_humble)
@@ -152,7 +152,7 @@ class Definitions:
         )
 
     def hash(self, name: str) -> str:
-        """Return the hash of a message ``pkg/Name``, or of any type that :meth:`fields` accepts."""
+        """Return the type hash of a message ``pkg/Name``, or of any other type that :meth:`fields` accepts."""
         if name not in self._hashes:
             try:
                 self._hashes[name] = type_hash(name, self.fields)
@@ -161,7 +161,7 @@ class Definitions:
         return self._hashes[name]
 
     def fields(self, name: str) -> Fields:
-        """Return the fields of a message, or of a type that ROS 2 generates for services and actions.
+        """Return the fields of a message, or of a type that ROS 2 generates for a service or action.
 
         The generated types are ``pkg/srv/Name``, ``pkg/action/Name_SendGoal``, ``pkg/action/Name_FeedbackMessage``, and
         their parts.
@@ -238,7 +238,7 @@ class Definitions:
 
     def _fields(self, spec: MessageSpec, ros1: str, name: str, is_humble: bool) -> Fields:
         rule = self._rules.message(ros1)
-        # Newer ROS 1 definitions of BatteryState have the temperature, too, so add it only if it is missing.
+        # Add the temperature only if it is missing: newer ROS 1 definitions of BatteryState have it.
         has = {field.name for field in spec.fields}
         found: dict[str, str] = {}
         for field in spec.fields:

@@ -16,13 +16,13 @@ from minirospy.base.errors import DeserializationError
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 
 _COUNT = struct.Struct("<I")
-# number of zero-size elements allowed in addition to one per byte of the message, as in core/idl/cdr.py
+# number of zero-size elements allowed, in addition to one per byte of the message, as in core/idl/cdr.py
 _SPARE = 10_000
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """A field with a fixed size of ``size`` bytes."""
+    """A field that always takes ``size`` bytes."""
 
     size: int
 
@@ -34,7 +34,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Array:
-    """An array of elements; ``length`` is None if the array's length is variable."""
+    """An array of elements; ``length`` is None if it is variable."""
 
     element: Node
     length: int | None = None
@@ -42,7 +42,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Reordered:
-    """A message whose fields are reordered: the fields in the input's order, and their indices in the output's order."""
+    """A message with reordered fields: ``fields`` are in the input's order; ``order`` lists their indices as in the output."""
 
     fields: tuple[Node, ...]
     order: tuple[int, ...]
@@ -52,7 +52,7 @@ Node: TypeAlias = Fixed | Text | Array | Reordered
 
 
 def inverse(node: Node) -> Node:
-    """Return the node that undoes the reordering."""
+    """Return the node that reverses a reordering."""
     if isinstance(node, Array):
         return Array(inverse(node.element), node.length)
     if isinstance(node, Reordered):
@@ -62,19 +62,19 @@ def inverse(node: Node) -> Node:
 
 
 def reorder(node: Node, data: bytes | memoryview) -> bytes:
-    """Return a message with its fields reordered. Raise DeserializationError if the message is too short."""
+    """Reorder the fields of a message. Raise DeserializationError if it is too short."""
     view = memoryview(data)
     parts: list[bytes | memoryview] = []
     try:
         end = _write(node, view, 0, parts)
     except struct.error as error:
         raise DeserializationError("the message ends too early") from error
-    parts.append(view[end:])  # keep trailing data, which the conversion will reject
+    parts.append(view[end:])  # keep trailing data, so that the conversion rejects it
     return b"".join(parts)
 
 
 def _write(node: Node, data: memoryview, start: int, parts: list[bytes | memoryview]) -> int:
-    """Append the bytes of a node that starts at ``start``; return its end offset."""
+    """Append the reordered bytes of the node at offset ``start`` to ``parts``; return the node's end offset."""
     if isinstance(node, Array) and not isinstance(node.element, Fixed):
         count, end = _count(node, data, start)
         parts.append(data[start:end])
@@ -111,7 +111,7 @@ def _write_fields(node: Reordered, data: memoryview, start: int, parts: list[byt
 
 
 def _count(node: Array, data: memoryview, start: int) -> tuple[int, int]:
-    """Return an array's number of elements, and the offset of the first element."""
+    """Return the number of an array's elements, and the offset of the first one."""
     if node.length is not None:
         return node.length, start
     (count,) = _COUNT.unpack_from(data, start)

@@ -44,26 +44,26 @@ class Ros2Publisher(Protocol):
 
 
 class Ros2Handle(Protocol):
-    """A subscription or service. Its callback is called until the handle is closed."""
+    """A subscription or service whose callback is called until the handle is closed."""
 
     def close(self) -> None: ...
 
 
 class Ros2Probe(Protocol):
-    """Probes a client's servers with requests that have no effect. Methods may be called from any thread."""
+    """Sends requests that have no effect to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request and return a future for its response. Once that has arrived, no response to the client is lost."""
+        """Send a request; return a future for the response. Once that has arrived, no response to the client is lost any more."""
 
     def close(self) -> None: ...
 
 
 class Reachable(Protocol):
-    """A client of a service or an action. Methods may be called from any thread."""
+    """A client for a service or an action. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
@@ -71,17 +71,17 @@ class Reachable(Protocol):
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers, to detect lost responses; None if none can be lost."""
+        """Return the IDs of the existing servers, to detect lost responses, or None if none can be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers, or None if there is no request without effect for them."""
+        """Return a probe for the servers, or None if they have no request that is without effect."""
 
 
 class Ros2Client(Reachable, Protocol):
-    """A client of a service. Methods may be called from any thread."""
+    """A client for a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return a future for the response, both as CDR. The future fails with BridgeError."""
+        """Send a request as CDR; return a future for the response as CDR, which may fail with BridgeError."""
 
     def close(self) -> None: ...
 
@@ -92,11 +92,11 @@ class Ros2Goal(Protocol):
     def cancel(self) -> None: ...
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return a future for the status (see action_msgs/GoalStatus) and the result."""
+        """Return a future for the final status (see action_msgs/GoalStatus) and the result."""
 
 
 class Ros2ActionClient(Reachable, Protocol):
-    """A client of an action. Methods may be called from any thread."""
+    """A client for an action. Methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return a future for the accepted goal, or for None if the goal is rejected.
@@ -112,10 +112,10 @@ class GoalOfRos1(Protocol):
 
     @property
     def ended(self) -> Future[tuple[int, bytes | None]]:
-        """Return a future for the final status (see action_msgs/GoalStatus) and the result (None: empty)."""
+        """Return a future for the final status (see action_msgs/GoalStatus) and the result, which is None if empty."""
 
     def cancel(self) -> None:
-        """Send the server a cancel request. May be called from any thread."""
+        """Ask the server to cancel the goal. May be called from any thread."""
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
@@ -131,19 +131,19 @@ class Ros2Parameters(Protocol):
     def names(self, node: str) -> list[str]: ...
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter's value. Its type is 0 if the parameter is not set."""
+        """Return the value of a parameter; its type is 0 if the parameter is not set."""
 
     def set(self, node: str, name: str, value: Value) -> None: ...
 
 
 class Ros2Side(Protocol):
-    """A ROS 2 node."""
+    """The ROS 2 side of the bridge: a node in a ROS 2 domain."""
 
     @property
     def domain(self) -> str: ...
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
-        """Return all topics and their types."""
+        """Return the names of all topics, with their types."""
 
     def ends(self, topic: str) -> Ros2Topic: ...
 
@@ -164,10 +164,10 @@ class Ros2Side(Protocol):
     ) -> Ros2Handle: ...
 
     def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes except for bridges."""
+        """Return the (name, namespace) of all nodes except bridges."""
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of all nodes except this bridge, with their types."""
+        """Return the services of all nodes except this bridge, as a dict from name to type."""
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""
@@ -175,7 +175,7 @@ class Ros2Side(Protocol):
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service. ``answer`` is called in a thread, with a request's CDR, and returns a future for the response.
+        """Offer a service. A thread calls ``answer`` with each request as CDR; ``answer`` returns a future for the response.
 
         The call fails if the future raises MinirospyError.
         """
@@ -186,10 +186,10 @@ class Ros2Side(Protocol):
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action. ``accept`` is called in a thread, with a goal and the function that sends the goal's feedback."""
+        """Offer an action. A thread calls ``accept`` with each goal, and a function that sends the goal's feedback."""
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Offer the ROS 1 parameters as this node's parameters."""
+        """Offer the ROS 1 parameters as parameters of this node."""
 
     def node_parameters(self) -> Ros2Parameters: ...
 

@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """Raised if a ROS 1 type cannot be converted to a ROS 2 type. The message states the reason."""
+    """Raised if a ROS 1 type cannot be converted to a ROS 2 type; the message states the reason."""
 
 
 _WIDTHS = {
@@ -58,7 +58,7 @@ def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
 
 
 def ros2_field_type(text: str) -> FieldType:
-    """Parse a ROS 2 field's type, such as ``sequence<double, 3>``, ``uint8[16]``, ``std_msgs/Header``.
+    """Parse the type of a ROS 2 field, such as ``sequence<double, 3>``, ``uint8[16]`` or ``std_msgs/Header``.
 
     Raise TypesDiffer if ROS 1 has no such type.
     """
@@ -84,7 +84,7 @@ def _base(text: str, whole: str) -> str:
 def transcoder(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Transcoder:
-    """Return the conversion functions for a message type. Raise TypesDiffer if the two types have no common layout."""
+    """Return functions that convert a message type. Raise TypesDiffer if the two types have no common layout."""
     layout = layout_of(ros1, ros1_lookup, ros2, ros2_lookup, rules)
     try:
         made = make_transcoder(ros1.full_name, layout)
@@ -99,7 +99,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return a message's common layout, with ROS 1's fields in ROS 2's order. Raise TypesDiffer if there is none."""
+    """Return the layout of a message, which has ROS 1's fields in ROS 2's order. Raise TypesDiffer if none fits both types."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -108,7 +108,7 @@ def layout_of(
 
 
 class _Pairing:
-    """Walks two specs in parallel and pairs their fields."""
+    """Pairs the fields of a ROS 1 and a ROS 2 spec, recursively."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -139,7 +139,7 @@ class _Pairing:
         for skipped in ros2.fields[place:]:
             items += self._alone(skipped.type, Side.ROS2, around)
         if not ros2.fields:
-            # CDR has no empty structs, so rosidl adds a member to them.
+            # rosidl adds a member to empty structs, which CDR does not allow.
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)
@@ -162,7 +162,7 @@ class _Pairing:
         return self.message(self._ros1(ros1.base), self._ros2(ros2.base), around)
 
     def _alone(self, type_: FieldType, side: Side, around: tuple[str, ...]) -> list[Item]:
-        """Return the layout items for a field that only one side has."""
+        """Return the layout items for a field that exists on only one side."""
         self._enter(around)
         base = _SAME.get(type_.base, type_.base)
         one: Layout
@@ -187,7 +187,7 @@ class _Pairing:
 
 
 class _Ordering:
-    """Walks two specs in parallel, once :class:`_Pairing` has accepted them, to determine the order of their fields."""
+    """Determines the order of the fields in two specs that :class:`_Pairing` has accepted, recursively."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -196,7 +196,7 @@ class _Ordering:
         self._is_changed = False
 
     def message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered | None:
-        """Return how to reorder ROS 1's fields to ROS 2's order, or None if the orders are equal."""
+        """Return how to reorder ROS 1's fields to ROS 2's order, or None if both orders are equal."""
         found = self._message(ros1, ros2)
         return found if self._is_changed else None
 
@@ -230,7 +230,7 @@ class _Ordering:
 
 
 def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
-    """Return conversion functions for ROS 1 messages in ROS 1's field order."""
+    """Wrap conversion functions so that ROS 1 messages have ROS 1's field order."""
     back = inverse(order)
 
     def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
@@ -243,7 +243,7 @@ def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
 
 
 def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
-    """Return ROS 1's fields, replacing an inlined field with the fields it contains."""
+    """Return ROS 1's fields; replace an inlined field with the fields that it contains."""
     found: list[Field] = []
     for each in spec.fields:
         if each.name != rule.inlined:
@@ -256,7 +256,7 @@ def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, 
 
 
 def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
-    """Return the indices of ROS 1's fields in ROS 2's order. A field that ROS 2 lacks stays after its predecessor."""
+    """Return the indices of ROS 1's fields in ROS 2's order. A field missing in ROS 2 follows its predecessor."""
     places = {each.name: number for number, each in enumerate(ros2.fields)}
     keys = []
     place = -1
@@ -276,7 +276,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Return a dict from ROS 1 fields to their ROS 2 counterparts. Raise TypesDiffer if a required one is missing."""
+    """Return the ROS 2 field for each ROS 1 field, keyed by name. Raise TypesDiffer if a required one is missing."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}
@@ -312,13 +312,13 @@ def _spellings(name: str) -> Iterator[str]:
 
 # --- rosgraph_msgs/Log
 
-_LEVEL = 12  # offset of the level in a log message's CDR: after the CDR header and the time
+_LEVEL = 12  # offset of the level in the CDR of a log message, after the CDR header and the time
 _LEVELS_OF_ROS2 = {1: 10, 2: 20, 4: 30, 8: 40, 16: 50}
 _LEVELS_OF_ROS1 = {level: ros1 for ros1, level in _LEVELS_OF_ROS2.items()}
 
 
 def _with_levels(made: Transcoder) -> Transcoder:
-    """Return conversion functions that also map the log level, which in ROS 1 is a bit mask."""
+    """Wrap conversion functions so that they map log levels, which are single bits in ROS 1."""
 
     def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
         found = bytearray(made.to_cdr(data, header))

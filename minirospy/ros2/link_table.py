@@ -22,7 +22,7 @@ _O = TypeVar("_O", bound="OpenLink")
 
 
 class OpenLink(Protocol):
-    """A link that forwards messages, calls or goals after :meth:`open`, until :meth:`close`, which is always called."""
+    """A link that forwards messages, calls or goals from :meth:`open` to :meth:`close`. ``close`` is always called."""
 
     async def open(self) -> None: ...
 
@@ -31,14 +31,14 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link, with the reason why it is not open, or "" if it is open."""
+    """A link to bridge, with the reason why that is impossible, or "" if it is possible."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Return the links. If ``check(link)`` raises TypesDiffer, include the message as the reason."""
+    """Pair each link with the message of the TypesDiffer that ``check(link)`` raises, or with "" if it raises none."""
     found = []
     for link in wanted:
         try:
@@ -51,7 +51,7 @@ def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
 
 
 class LinkTable(Generic[_L, _O]):
-    """The open links, and the reasons why other links are not open. ``make(link)`` may raise TypesDiffer.
+    """The open links, and the reasons why others could not be opened. ``make(link)`` may raise TypesDiffer.
 
     Runs on the node's loop.
     """
@@ -64,7 +64,7 @@ class LinkTable(Generic[_L, _O]):
         self._make: Callable[[_L], _O] = make
 
     async def update(self, wanted: Collection[_L]) -> bool:
-        """Close links that are no longer wanted and open new ones; return whether any link changed."""
+        """Close links that are no longer wanted, and open new ones. Return whether any of them changed."""
         gone = [link for link in self.links if link not in wanted]
         for link in gone:
             await self._close(link)

@@ -16,11 +16,11 @@ __all__ = [
 ]  # fmt: skip
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
-"""Prefix of all bridges' node names, on both sides. Endpoints of bridges are ignored."""
+"""Prefix of the node names of all bridges, on both sides. Endpoints of bridges are ignored."""
 
 
 def parse_domain(text: str) -> str:
-    """Return the ROS 2 domain from a value of ``ROS_DOMAIN_ID`` (empty: 0). Raise BridgeError if the value is invalid."""
+    """Return the ROS 2 domain given by ``ROS_DOMAIN_ID`` (empty: 0). Raise BridgeError if ``text`` is invalid."""
     if not re.fullmatch(r"[0-9]{0,9}", text):
         raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
     return str(int(text or "0"))
@@ -35,7 +35,7 @@ class Direction(Enum):
 
 @dataclass(frozen=True)
 class Ros2End:
-    """A publisher or subscriber in ROS 2; ``type`` is ``pkg/Name``."""
+    """A publisher or subscriber in ROS 2. ``type`` has the form ``pkg/Name``."""
 
     node: str
     type: str
@@ -53,7 +53,7 @@ class Ros2Topic:
 
 @dataclass(frozen=True)
 class Link:
-    """A topic that is bridged in one direction.
+    """A topic to be bridged in one direction.
 
     If ``is_latched``, later subscribers receive the last message. ``is_reliable`` is the reliability of the ROS 2
     subscription.
@@ -73,7 +73,7 @@ class Link:
 
 
 def is_bridge(node: str) -> bool:
-    """Return whether a node's name is that of a bridge. Bridges use the same name prefix in ROS 1 and ROS 2."""
+    """Return whether a node is a bridge, according to its name. The prefix is the same in ROS 1 and ROS 2."""
     return node.rpartition("/")[2].startswith(BRIDGE_PREFIX)
 
 
@@ -83,7 +83,7 @@ def links(
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
-    """Return the topics to bridge: those with endpoints on both sides, not counting bridges'.
+    """Return the topics to bridge: those with endpoints other than bridges' on both sides.
 
     ``is_latched(topic, node)`` returns whether a ROS 1 publisher latches. ``ros1_type(ros2_type)`` returns the ROS 1 type for
     a ROS 1 subscriber to any type, such as `rostopic echo`.
@@ -97,7 +97,7 @@ def links(
         readers = [end for end in ros2[topic].subscribers if not is_bridge(end.node)]
 
         if publishers and readers and type_ is not None:
-            # A subscriber with transient local durability only receives messages from publishers that have it, too.
+            # A transient local subscriber receives messages only from publishers that are transient local, too.
             keeps = any(end.is_transient_local for end in readers)
             latched = keeps or any(is_latched(topic, node) for node in publishers)
             found.append(Link(topic, Direction.TO_ROS2, type_, _type_of(readers, type_), latched))
@@ -109,7 +109,7 @@ def links(
                     type_ or ros1_type(_type_of(writers, "")),
                     _type_of(writers, type_ or ""),
                     all(end.is_transient_local for end in writers),
-                    # A reliable subscription receives nothing from a best-effort publisher.
+                    # A reliable subscriber receives nothing from a best-effort publisher.
                     all(end.is_reliable for end in writers),
                 )
             )
@@ -117,13 +117,13 @@ def links(
 
 
 def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
-    """Choose one type if endpoints' types differ: ROS 1's type name if an endpoint uses it, else the first by name."""
+    """Return the type of a topic. If endpoints differ, prefer ROS 1's type name, then the alphabetically first one."""
     types = sorted({end.type for end in ends})
     return ros1_type if ros1_type in types else types[0]
 
 
 def marker(graph: str) -> bytes:
-    """Return the CDR header for messages from a ROS 1 graph; ``graph`` is its run_id.
+    """Return the CDR header that marks messages from the ROS 1 graph with run_id ``graph``.
 
     Readers ignore the options in the header's last two bytes. The bridge uses these bytes to recognize messages that it
     must not send back. The two lowest bits, which XCDR version 2 uses, stay zero; other publishers do not use the other

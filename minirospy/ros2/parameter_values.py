@@ -46,7 +46,7 @@ _MIN_INT, _MAX_INT = -(2**31), 2**31 - 1
 
 
 class ParameterService(Enum):
-    """The parameter services of each ROS 2 node, and their types in rcl_interfaces."""
+    """The parameter services that each ROS 2 node provides, with their types in rcl_interfaces."""
 
     LIST = "list_parameters", "ListParameters"
     GET = "get_parameters", "GetParameters"
@@ -61,24 +61,24 @@ class ParameterService(Enum):
 
 
 class Value(NamedTuple):
-    """A ROS 2 value: its type, an index of FIELDS, and the field's value. Type 0 means that the parameter is not set."""
+    """A ROS 2 parameter value. ``type`` is an index of FIELDS, or 0 if the parameter is not set."""
 
     type: int
     value: object = None
 
 
 def ros2_name(name: str) -> str:
-    """Return a parameter's name in ROS 2: ``robot.speed`` for ``/robot/speed``."""
+    """Convert a parameter name to ROS 2: ``/robot/speed`` becomes ``robot.speed``."""
     return name.strip("/").replace("/", ".")
 
 
 def ros1_name(name: str) -> str:
-    """Return a parameter's name in ROS 1: ``/robot/speed`` for ``robot.speed``."""
+    """Convert a parameter name to ROS 1: ``robot.speed`` becomes ``/robot/speed``."""
     return "/" + name.strip("./").replace(".", "/")
 
 
 def leaves(value: object, name: str = "") -> Iterator[str]:
-    """Yield the names of all parameters in a namespace's value."""
+    """Yield the names of all parameters in the value of a namespace."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from leaves(inner, f"{name}/{key}")
@@ -87,7 +87,7 @@ def leaves(value: object, name: str = "") -> Iterator[str]:
 
 
 def ros2_value(value: object) -> Value:
-    """Convert a ROS 1 value to ROS 2. If ROS 2 has no such type, convert it to a JSON string."""
+    """Convert a ROS 1 value to ROS 2, as a JSON string if ROS 2 has no such type."""
     if isinstance(value, Binary):
         value = value.data
     if isinstance(value, bytes | bytearray):

@@ -32,7 +32,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class Ros1Parameters:
-    """The master's parameters, under ROS 2 names and with ROS 2 values.
+    """Gives ROS 2 access to the master's parameters, under ROS 2 names and with ROS 2 values.
 
     Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
@@ -45,7 +45,7 @@ class Ros1Parameters:
         return [ros2_name(name) for name in leaves(await self._node.get_param("/", {}))]
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the parameters' values. A value has type 0 if the parameter is not set, or its name is a namespace."""
+        """Return the values of parameters. The type is 0 if a parameter is not set, or if its name is a namespace."""
         found = []
         for name in names:
             value = await self._node.get_param(ros1_name(name), None)
@@ -53,7 +53,7 @@ class Ros1Parameters:
         return found
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error message for each ("" for success).
+        """Set or delete parameters; return an error message for each, or "" if it succeeded.
 
         If ``atomically``, change no parameter if any of them is rejected.
         """
@@ -83,7 +83,7 @@ def _refusal(name: str, value: Value) -> str:
 
 
 class ParameterBridge:
-    """Offers each side's parameters on the other side.
+    """Makes each side's parameters available on the other side.
 
     In ROS 1 the services are ``~get_param``, ``~set_param`` and ``~get_param_names``.
     """
@@ -96,7 +96,7 @@ class ParameterBridge:
         self._services: list[RawService] = []
 
     async def start(self) -> None:
-        """Offer the parameters."""
+        """Offer the parameters on both sides."""
         self._server = self._side.serve_parameters(Ros1Parameters(self._node), asyncio.get_running_loop())
         handlers: dict[str, tuple[str, Callable[[list[str]], Awaitable[bytes]]]] = {
             "get_param": ("rosapi/GetParam", self._get),
@@ -157,7 +157,7 @@ class ParameterBridge:
         found: list[str] = []
         for name, namespace in self._side.nodes():
             node = f"{namespace.rstrip('/')}/{name}"
-            # The node has no parameter services or has just exited.
+            # The node has no parameter services, or has just exited.
             with contextlib.suppress(BridgeError):
                 names = await self._waited(functools.partial(self._side.node_parameters().names, node))
                 found += [f"{node}:{each}" for each in names]
@@ -181,14 +181,14 @@ def _text(text: str) -> bytes:
 
 
 def _two(texts: list[str]) -> list[str]:
-    """Return the two strings of a request. Raise ValueError if the request has fewer."""
+    """Return the two strings of a request. Raise ValueError if there are fewer."""
     if len(texts) < 2:
         raise ValueError("the request ends too early")
     return texts
 
 
 def _texts(data: bytes) -> list[str]:
-    """Parse a request that consists of strings. Raise ValueError if the request is invalid."""
+    """Parse a request that consists of strings. Raise ValueError if it is invalid."""
     found, end = [], 0
     while end < len(data):
         if end + 4 > len(data):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 CANCELED = 5
-"""Statuses of goals that have ended, from action_msgs/GoalStatus."""
+"""Final statuses of goals, from action_msgs/GoalStatus."""
 SUCCEEDED = 4
 ABORTED = 6
 
@@ -36,7 +36,7 @@ _HEADER = 4
 _ID = 16
 
 
-# --- the parts of rclpy used here
+# --- interfaces of the parts of rclpy that are used
 
 
 class _Impl(Protocol):
@@ -90,7 +90,7 @@ class _Closable(Protocol):
 
 
 class GoalOfRos2:
-    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
+    """A goal accepted by a ROS 2 server. Methods may be called from any thread."""
 
     def __init__(self, calls: Calls, handle: _ClientHandle, on_end: Callable[[], None]) -> None:
         self._calls = calls
@@ -98,7 +98,7 @@ class GoalOfRos2:
         self._on_end = on_end
 
     def cancel(self) -> None:
-        """Send the server a cancel request."""
+        """Ask the server to cancel the goal."""
         self._calls.executor.create_task(self._handle.cancel_goal_async)
 
     def result(self) -> Future[tuple[int, bytes]]:
@@ -125,7 +125,7 @@ class GoalOfRos2:
 
 
 class ActionClient:
-    """A client of an action.
+    """A client for a ROS 2 action.
 
     It subscribes to feedback itself, because rclpy's client drops unread feedback when the result arrives.
     """
@@ -136,8 +136,7 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Create the feedback subscription before the client.
-        # A server that has discovered the client's last endpoint has then discovered the subscription, too.
+        # Create the feedback subscription before the client: a server that has discovered the client then knows both.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -158,11 +157,11 @@ class ActionClient:
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the servers. May be called from any thread."""
+        """Return the IDs of the servers. May be called from any thread."""
         return self._calls.servers(send_goal_service(self._name))
 
     def probe(self) -> Ros2Probe:
-        """Return a probe that cancels a nonexistent goal.
+        """Return a probe that asks to cancel a nonexistent goal.
 
         The cancel client is the action client's last endpoint, so its response proves that the earlier ones have also
         been discovered.
@@ -170,7 +169,7 @@ class ActionClient:
         return _CancelProbe(self)
 
     def reach(self) -> Future[None]:
-        """Cancel a nonexistent goal; return a future for the response. May be called from any thread."""
+        """Ask to cancel a nonexistent goal; return a future for the response. May be called from any thread."""
         reached: Future[None] = Future()
 
         def answered(_: object) -> None:
@@ -217,7 +216,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits, and in ROS 1 the goal counts as rejected, so cancel it.
+                # The caller no longer waits and treats the goal as rejected, so cancel it.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -230,21 +229,21 @@ class ActionClient:
             _fail(accepted, error)
 
     def _read_feedback(self) -> None:
-        """Deliver the queued feedback, which was sent before the result."""
+        """Deliver feedback that is still queued, before the result that was sent after it."""
         handle = self._feedback.handle
         with handle:
             while taken := handle.take_message(self._feedback_class, True):
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The goal's id has 16 bytes, so removing it keeps the alignment of the data that follows.
+        # The goal ID has 16 bytes, so the data that follows stays aligned after its removal.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
 
 
 class _CancelProbe:
-    """Probes an action's servers through an existing action client. Closing the probe does not close the client."""
+    """Probes an action's servers through an existing client, which stays open when the probe is closed."""
 
     def __init__(self, client: ActionClient) -> None:
         self._client = client
@@ -265,7 +264,7 @@ def _uuid_message(id: bytes) -> object:
 
 
 def _client_class() -> Callable[..., _RclpyActionClient]:
-    """Return rclpy's action client class with a lock as a class attribute.
+    """Return rclpy's action client class, extended by a lock as a class attribute.
 
     rclpy's constructor adds the client to the executor before it creates the lock, and the executor's thread would fail
     without the lock.
@@ -279,7 +278,7 @@ def _client_class() -> Callable[..., _RclpyActionClient]:
 
 
 class Feedback:
-    """Buffers a goal's feedback until the goal's handle exists, then publishes it.
+    """Buffers a goal's feedback until the goal's handle exists; then publishes it.
 
     Methods may be called from any thread.
     """
@@ -294,7 +293,7 @@ class Feedback:
         self._calls.executor.create_task(self._publish, data)
 
     def start(self, handle: _ServerHandle) -> None:
-        """Publish the buffered feedback."""
+        """Publish the buffered feedback, and from now on publish feedback directly."""
         self._handle = handle
         kept, self._kept = self._kept, []
         for data in kept:
@@ -319,8 +318,7 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # rclpy's constructor adds the server to the executor before it creates the logger.
-        # In between, the executor may call the server with a goal.
+        # Set the logger early: the server may be called before rclpy's constructor has created a logger.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
             calls.node,
@@ -337,7 +335,7 @@ class ActionServer:
         )
 
     def close(self) -> None:
-        """Close the action after sending known results and rejections. Must not be called in the executor's thread."""
+        """Send known results and rejections, then close the action. Must not be called in the executor's thread."""
         sent = threading.Event()
         self._calls.end(functools.partial(self._wait_until_sent, sent))
         sent.wait(CLOSE_SECONDS)
@@ -345,13 +343,13 @@ class ActionServer:
         self._calls.end(self._server.destroy)
 
     def _wait_until_sent(self, sent: threading.Event) -> None:
-        """Set the event in the executor's first iteration without responses to send."""
+        """Set the event in the first iteration of the executor in which no response is left to send."""
         if self._is_closed:
             return
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # rclpy may finish the response in a task that runs after the bridge's own code.
+            # rclpy may finish the response in a task that runs after this code.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:
@@ -370,7 +368,7 @@ class ActionServer:
             accepted = None
         if accepted is None:
             return self._module.GoalResponse.REJECT
-        # Store the goal under its id(), because the goal's handle will later refer to this object.
+        # Store the goal under its id(), because the handle that rclpy creates will refer to the same object.
         self._goals[id(goal)] = (goal, accepted, feedback)
         return self._module.GoalResponse.ACCEPT
 
@@ -395,7 +393,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # ROS 1 has preempted the goal in favour of another one; ROS 2 has no status for that.
+            # Another goal has preempted this one in ROS 1, for which ROS 2 has no status.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

@@ -32,16 +32,16 @@ __all__ = [
 ]
 
 _REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
-"""Names of response fields that may contain the reason for a failure."""
+"""Names of response fields that may state the reason for a failure."""
 
-_DEPTH = 1000  # maximum number of requests or responses queued for the bridge
+_DEPTH = 1000  # maximum number of queued requests or responses of the bridge
 
 _GUID_PREFIX = 12
 
 _T = TypeVar("_T")
 
 
-# --- the parts of rclpy used here
+# --- interfaces of the parts of rclpy that are used
 
 
 class Message(Protocol):
@@ -80,7 +80,7 @@ class RclpyFuture(Protocol):
 
 
 class RclpyHandle(Protocol):
-    """The interface of an rclpy subscription's handle. Enter the handle as a context manager before using it."""
+    """The interface of an rclpy subscription's handle, which must be used as a context manager."""
 
     def __enter__(self) -> object: ...
 
@@ -159,11 +159,11 @@ class ServiceNode(Protocol):
 
 
 class NotAnsweredError(Exception):
-    """Raised to send no response to a request, because ROS 2 services have no error responses."""
+    """Raised to leave a request without a response, because ROS 2 services have no error responses."""
 
 
 class Calls:
-    """Creates clients and servers on one node."""
+    """Creates clients and servers on the bridge's ROS 2 node."""
 
     def __init__(self, node: ServiceNode, executor: Executor) -> None:
         self.node = node
@@ -172,13 +172,13 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
-        # In rmw_zenoh, a response takes the same route as its request, so responses are not lost.
+        # rmw_zenoh sends a response on its request's route, so no responses are lost.
         rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
         self._loses_responses = not rmw.startswith("rmw_zenoh")
-        # Reentrant: a request that waits for its response must not block other requests.
+        # Reentrant, because a request that waits for its response must not block other requests.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
-            # The default QoS for services, but with a longer queue.
+            # The default QoS of services, but with a longer queue.
             "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
         }
 
@@ -191,20 +191,20 @@ class Calls:
         return Server(self, name, class_, answer)
 
     def servers(self, service: str) -> frozenset[bytes] | None:
-        """Return the ids of a service's servers, or None if no response can be lost. May be called from any thread."""
+        """Return the IDs of a service's servers, or None if no response can be lost. May be called from any thread."""
         if not self._loses_responses:
             return None
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return a probe for a service's nodes, or None if a node offers no parameter services or is not known yet.
+        """Return a probe for the nodes of a service, or None if one is unknown or offers no parameter services.
 
         May be called from any thread.
         """
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
-            # If another process has a node of the same name, its response would not prove that this node has been reached.
+            # A node with the same name in another process might respond, which would not prove that this node was reached.
             if {_process(each) for each in self._writers(name)} != {_process(server)}:
                 return None
             names.add(name)
@@ -218,14 +218,14 @@ class Calls:
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy an object in the executor's thread, which may be about to wait on the object.
+        """Destroy an object in the executor's thread, which might otherwise be about to wait on it.
 
         May be called from any thread. rclpy's executor fails if an object is destroyed while the executor builds its wait set.
         """
         self.executor.create_task(destroy)
 
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
-        """Return the result of another thread's future, in a coroutine of the executor.
+        """Await a future of another thread in a coroutine of the executor; return its result.
 
         If ``after_tasks``, return it only after the tasks that the other thread has already submitted to the executor.
         """
@@ -233,7 +233,7 @@ class Calls:
 
         def finish() -> None:
             waiting.set_result(None)
-            # The executor resumes a waiting coroutine in its next iteration.
+            # Wake the executor, which resumes a waiting coroutine only in its next iteration.
             self.executor.wake()
 
         def done(_: object) -> None:
@@ -248,7 +248,7 @@ class Calls:
 
 
 class Client:
-    """A client of a service."""
+    """A client for a ROS 2 service."""
 
     def __init__(self, calls: Calls, name: str, class_: ServiceClass) -> None:
         self._calls = calls
@@ -263,17 +263,17 @@ class Client:
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the servers, or None if no response can be lost. May be called from any thread."""
+        """Return the IDs of the servers, or None if no response can be lost. May be called from any thread."""
         return self._calls.servers(self._name)
 
     def probe(self) -> ParameterProbe | None:
-        """Return a probe that sends requests with an empty list of parameters to the servers' nodes."""
+        """Return a probe that requests an empty list of parameters from the servers' nodes."""
         return self._calls.parameter_probe(self._name)
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return a future for the response, both as CDR. May be called from any thread."""
+        """Send a request as CDR; return a future for the response as CDR. May be called from any thread."""
         answered: Future[bytes] = Future()
-        # Send in the executor's thread, so that the request is recorded before its response can arrive.
+        # Send in the executor's thread, so that the request is recorded before the response can arrive.
         self._calls.executor.create_task(self._send, request, answered)
         return answered
 
@@ -312,7 +312,7 @@ class Client:
 
 
 class ParameterProbe:
-    """Probes nodes through their parameter services by requesting no parameters, which has no effect."""
+    """Probes nodes by requesting an empty list from their parameter services, which has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients
@@ -323,7 +323,7 @@ class ParameterProbe:
         return all(client.is_ready for client in self._clients)
 
     def reach(self) -> Future[None]:
-        """Send a request to each node; return a future for the last response. May be called from any thread."""
+        """Send a request to each node; return a future that completes with the last response. May be called from any thread."""
         reached: Future[None] = Future()
         sent = [client.call_empty() for client in self._clients]
 
@@ -386,14 +386,14 @@ class Server:
         fields = response.get_fields_and_field_types()
         text = next((name for name in _REASONS if fields.get(name) == "string"), "")
         if fields.get("success") != "boolean" or not text:
-            # Send nothing: a response of zeros would look like a valid one.
+            # Send no response, because a response of zeros would look valid.
             raise NotAnsweredError
         setattr(response, text, reason)
         return response
 
 
 def _process(info: _EndpointInfo) -> bytes:
-    """Return the part of an endpoint's id that all endpoints of a process share. Source: RTPS 2.5, 9.3.1."""
+    """Return the part of an endpoint's ID that all endpoints of its process share. Source: RTPS 2.5, 9.3.1."""
     return bytes(info.endpoint_gid)[:_GUID_PREFIX]
 
 

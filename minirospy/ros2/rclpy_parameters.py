@@ -24,7 +24,7 @@ _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
 
 class ParameterStore(Protocol):
-    """The ROS 1 parameters, under ROS 2 names and with ROS 2 values.
+    """Access to the ROS 1 parameters, under ROS 2 names and with ROS 2 values.
 
     Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
@@ -32,14 +32,14 @@ class ParameterStore(Protocol):
     async def names(self) -> list[str]: ...
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the parameters' values. A value has type 0 if the parameter is not set."""
+        """Return the values of parameters. The type is 0 if a parameter is not set, or if its name is a namespace."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error message for each ("" for success)."""
+        """Set or delete parameters; return an error message for each, or "" if it succeeded."""
 
 
 class ParameterServer:
-    """The parameter services of the bridge's node."""
+    """The parameter services of the bridge's ROS 2 node."""
 
     def __init__(
         self, calls: Calls, node: str, store: ParameterStore, loop: asyncio.AbstractEventLoop
@@ -140,7 +140,7 @@ class NodeParameters:
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter's value. Its type is 0 if the parameter is not set."""
+        """Return the value of a parameter; its type is 0 if the parameter is not set."""
         response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)
@@ -169,7 +169,7 @@ class NodeParameters:
             request = type_.Request()
             empty = self._calls.serialize(request)
             try:
-                # Repeat the request: responses are lost until the node has discovered the client (see reach.py).
+                # Repeat the request, because responses are lost until the node has discovered the client (see reach.py).
                 data = _first(lambda: client.call(empty), end)
                 if fields:
                     for name, value in fields.items():
@@ -183,7 +183,7 @@ class NodeParameters:
 
 
 def _first(call: Callable[[], Future[bytes]], end: float) -> bytes:
-    """Repeat a call until it gets a response, and return the response. Raise TimeoutError at ``end``."""
+    """Repeat a call until it gets a response; return the response. Raise TimeoutError at time ``end``."""
     pause = AGAIN_SECONDS
     while True:
         try:
@@ -201,7 +201,7 @@ def _result(future: Future[bytes], end: float) -> bytes:
         future.cancel()
 
 
-# --- access to ROS 2 objects (untyped, because rclpy may not be installed)
+# --- conversion of ROS 2 objects (untyped, because rclpy may not be installed)
 
 
 def _field(message: object, name: str) -> object:

@@ -22,13 +22,13 @@ __all__ = ["Reach"]
 
 _LOOK_SECONDS = 0.02
 AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
-_NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
+_NO_PROBE_SECONDS = 1.0  # seconds to wait if the servers cannot be probed
 MAX_SECONDS = 10.0
-"""Maximum seconds to wait. After that, requests are sent even if a busy server has not responded to a probe."""
+"""Maximum seconds to wait for responses to a probe; after that, requests are sent without them."""
 
 
 class Reach:
-    """Tracks which servers have discovered a client."""
+    """Determines which servers have discovered a client and can therefore send it responses."""
 
     def __init__(self, client: Reachable) -> None:
         self._client = client
@@ -39,13 +39,13 @@ class Reach:
         self._is_closed = False
 
     def start(self) -> None:
-        """Start probing the existing servers, so that later requests need not wait."""
+        """Start to probe the existing servers, so that later requests need not wait."""
         if not self._is_closed and (self._reaching is None or self._reaching.done()):
             self._ready_at = None
             self._reaching = asyncio.ensure_future(self._reach())
 
     async def wait(self, seconds: float = math.inf) -> None:
-        """Wait until the current servers can send responses, for at most ``seconds``.
+        """Wait for at most ``seconds`` until the current servers can send responses.
 
         Wait for ten seconds at most, so that unresponsive servers do not delay every request.
         """
@@ -53,7 +53,7 @@ class Reach:
         if servers is None or (self._reached is not None and servers <= self._reached):
             return
         self.start()
-        # Do not hold up queued calls while their link is being closed.
+        # Do not delay queued calls while their link is being closed.
         if self._is_closed or self._reaching is None:
             return
         seconds = min(seconds, MAX_SECONDS)
@@ -63,7 +63,7 @@ class Reach:
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
 
     async def close(self) -> None:
-        """Stop probing; pending waits return. Idempotent."""
+        """Stop probing, so that pending waits return. Idempotent."""
         self._is_closed = True
         if self._reaching:
             self._reaching.cancel()
@@ -79,7 +79,7 @@ class Reach:
                 return
 
     async def _has_reached(self, servers: frozenset[bytes]) -> bool:
-        """Wait until the servers respond to a probe; do nothing if they do not support probing.
+        """Wait until the servers respond to a probe; return immediately if they cannot be probed.
 
         Return False if a server disappears first.
         """
@@ -99,14 +99,14 @@ class Reach:
             probe = self._client.probe()
             if probe:
                 return probe
-            # A server's node may become known after the server, so try again.
+            # A server may be discovered before its node, so try again.
             await asyncio.sleep(_LOOK_SECONDS)
         return None
 
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = AGAIN_SECONDS
-    # Stop if a server's node has exited: its services will never become ready again.
+    # Stop if a server's node has exited, because its services will never become ready.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)
@@ -116,7 +116,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # Ignore the error: the actual requests will fail for the same reason and report it.
+            # Ignore the error, because the actual requests will fail with the same one and report it.
             await asyncio.sleep(pause)
         else:
             return True

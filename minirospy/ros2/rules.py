@@ -21,7 +21,7 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 
 @dataclass(frozen=True)
 class TypeRule:
-    """The special cases in how a ROS 1 type maps to ROS 2.
+    """The exceptions in how a ROS 1 type corresponds to a ROS 2 type.
 
     ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields. If
     ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side
@@ -40,7 +40,7 @@ _NO_RULE = TypeRule()
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules for messages, services and actions, keyed by ``pkg/Name``.
+    """The rules for messages, services and actions, keyed by ``pkg/Name``.
 
     The requests and responses of services, and the goals, results and feedback of actions, count as messages, with ROS 1's
     names.
@@ -51,15 +51,15 @@ class Rules:
     actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
-        """Return the rule for a message type, or an empty one if there is none."""
+        """Return the rule for a message type, or an empty rule if there is none."""
         return self.messages.get(ros1_type, _NO_RULE)
 
     def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:
-        """Return the names that a message type may have in ROS 2."""
+        """Return the names that a ROS 1 message type may have in ROS 2."""
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the ROS 1 type for a ROS 2 message type: the one in a rule, else the type of the same name."""
+        """Return the ROS 1 type for a ROS 2 message type: as stated in a rule, or of the same name."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]
@@ -67,11 +67,11 @@ class Rules:
         return ros2_type
 
     def ros2_services(self, ros1_type: str) -> tuple[str, ...]:
-        """Return the names that a service type may have in ROS 2."""
+        """Return the names that a ROS 1 service type may have in ROS 2."""
         return self.services.get(ros1_type, _NO_RULE).names or (ros1_type,)
 
     def ros2_actions(self, ros1_type: str) -> tuple[str, ...]:
-        """Return the names that an action type may have in ROS 2."""
+        """Return the names that a ROS 1 action type may have in ROS 2."""
         return self.actions.get(ros1_type, _NO_RULE).names or (ros1_type,)
 
     def ros1_actions(self, ros2_type: str) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ class Rules:
         return _of_ros1(self.services, ros2_type)
 
     def with_(self, other: Rules) -> Rules:
-        """Return these rules, overridden by those in ``other``."""
+        """Return these rules combined with ``other``, whose rules take precedence."""
         return Rules(
             {**self.messages, **other.messages},
             {**self.services, **other.services},
@@ -98,7 +98,7 @@ def _of_ros1(rules: Mapping[str, TypeRule], ros2_type: str) -> tuple[str, ...]:
 
 
 def snake_case(name: str) -> str:
-    """Convert a field's name to ROS 2's style, such as ``seqNumber`` to ``seq_number``."""
+    """Convert a field name to ROS 2's style: ``seqNumber`` becomes ``seq_number``."""
     parts = re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name)
     return re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1_\2", parts).lower()
 
@@ -120,7 +120,7 @@ BUILT_IN = Rules(
             ),
             "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
             "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
-            # Fields added by ROS 2. They are empty in messages from ROS 1, and are dropped from messages to ROS 1.
+            # Fields that exist only in ROS 2: empty in messages from ROS 1, and dropped from messages to ROS 1.
             "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
             "sensor_msgs/Range": _only(ros2=("variance",)),
             "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),
@@ -165,7 +165,7 @@ _KEYS = {
 
 
 def parse_rules(text: str, where: str) -> Rules:
-    """Parse a file of rules. If a rule is invalid, raise BridgeError with the error and the rule's number."""
+    """Parse a file of rules. If one is invalid, raise BridgeError with the reason and its number."""
     try:
         loaded = safe_load(text)
     except yaml.YAMLError as error:

@@ -11,12 +11,12 @@ __all__ = ["ServiceLink", "is_bridged_type", "service_links"]
 
 _OF_EVERY_NODE = {"roscpp/GetLoggers", "roscpp/SetLoggerLevel"}
 _PACKAGES_OF_EVERY_NODE = {"rcl_interfaces", "type_description_interfaces"}
-"""Packages of services that every ROS 2 node provides for ROS 2's tools. These are not offered in ROS 1."""
+"""Packages with services that every ROS 2 node provides for ROS 2's tools; they are not offered in ROS 1."""
 
 
 @dataclass(frozen=True)
 class ServiceLink:
-    """A service that one side offers and the other calls. Requests are sent in ``direction``."""
+    """A service with a server on one side and clients on the other. Requests are sent in ``direction``."""
 
     service: str
     direction: Direction
@@ -30,12 +30,12 @@ class ServiceLink:
 
 
 def is_bridged_type(type_: str) -> bool:
-    """Return whether services of a type (``pkg/Name``, on either side) are for nodes rather than for tools."""
+    """Return whether to bridge services of a type (``pkg/Name``, on either side): those for tools are excluded."""
     return type_ not in _OF_EVERY_NODE and type_.partition("/")[0] not in _PACKAGES_OF_EVERY_NODE
 
 
 def is_hidden(name: str) -> bool:
-    """Return whether a ROS 2 name is hidden: a part starts with an underscore, as in the services of actions."""
+    """Return whether a ROS 2 name is hidden: some part starts with an underscore, as in an action's services."""
     return "/_" in name
 
 
@@ -45,7 +45,7 @@ def service_links(
     ros2: Mapping[str, str],
     partner: Callable[[str, Direction], str],
 ) -> list[ServiceLink]:
-    """Return the services to bridge: those that only one side offers. Ignore those that bridges offer.
+    """Return the services to bridge: those that only one side offers, ignoring those that bridges offer.
 
     ``ros1`` maps services to their nodes, ``ros1_types`` to their types if known. ``ros2`` maps services to their types.
     ``partner(type, direction)`` returns the type on the calling side.

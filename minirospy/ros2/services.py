@@ -43,18 +43,18 @@ if TYPE_CHECKING:
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
 QUERY_SECONDS = 1.0
-"""Seconds to wait for types; after that, only the services with known types are bridged."""
+"""Timeout in seconds for querying types, after which only services with known types are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
-"""Maximum number of concurrent calls from a ROS 2 service to ROS 1; further calls fail with an error."""
+"""Maximum number of concurrent calls from ROS 2 to a ROS 1 service; further calls fail with an error."""
 _MAX_UNDER_WAY = 8
-"""Maximum number of concurrent requests to a ROS 2 server. Its queue holds 10; further requests would be lost."""
+"""Maximum number of concurrent requests to a ROS 2 server, which queues only 10 and would lose further ones."""
 
 
 @dataclass(frozen=True)
 class ServiceCodec:
-    """Converts a service's requests and responses; ``type`` is the ROS 1 type."""
+    """Converts the requests and responses of a service. ``type`` is the ROS 1 type."""
 
     type: InterfaceType
     request: Transcoder
@@ -62,7 +62,7 @@ class ServiceCodec:
 
 
 class _Types:
-    """Creates service codecs, and caches them keyed by the service's ROS 1 and ROS 2 types."""
+    """Creates and caches the codecs of services, keyed by the ROS 1 and ROS 2 types."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -71,7 +71,7 @@ class _Types:
         self._codecs: dict[tuple[str, str], ServiceCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type on the calling side, given the type on the offering side."""
+        """Return a service's type on the client's side, given its type on the server's side."""
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_services(type_)
             return next((name for name in names if self._is_in_ros2(name)), names[0])
@@ -79,7 +79,7 @@ class _Types:
         return next((name for name in names if self._is_in_ros1(name)), names[0])
 
     def codec(self, ros1_type: str, ros2_type: str) -> ServiceCodec:
-        """Return a service's codec. Raise TypesDiffer if its types cannot be converted."""
+        """Return the codec for a service. Raise TypesDiffer if its types cannot be converted."""
         key = (ros1_type, ros2_type)
         if key not in self._codecs:
             self._codecs[key] = self._made(ros1_type, ros2_type)
@@ -124,7 +124,7 @@ class _Types:
 
 
 class ServiceBridge:
-    """Offers each side's services on the other side. Runs on the node's loop."""
+    """Makes each side's services available on the other side. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -149,11 +149,11 @@ class ServiceBridge:
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return the services to bridge, and the reasons why some are not bridged, given the services in ROS 1."""
+        """Return the services to bridge, with the reason for each that cannot be bridged, given the services in ROS 1."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
-        """Open and close services to match both graphs; return whether any changed."""
+        """Open and close services to match both graphs. Return whether any of them changed."""
         return await self._table.update(await self._wanted(ros1))
 
     async def _wanted(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServiceLink]:
@@ -167,7 +167,7 @@ class ServiceBridge:
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Query a server for its connection header, because the ROS 1 master does not know service types."""
+        """Query a server for its connection header, because the master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -191,7 +191,7 @@ class ServiceBridge:
 
 
 class _InRos1:
-    """A ROS 2 service that the bridge offers in ROS 1."""
+    """A ROS 2 service, offered in ROS 1 by the bridge."""
 
     def __init__(
         self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # Make the running calls fail with an error.
+        # Makes the running calls fail with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -262,7 +262,7 @@ class _InRos1:
         return answered.result()
 
     async def _becomes_ready(self) -> bool:
-        """Wait for the server; return whether it is connected.
+        """Wait briefly for the server; return whether it is connected.
 
         This may take a moment for a service that was just discovered.
         """
@@ -276,7 +276,7 @@ class _InRos1:
 
 
 class _InRos2:
-    """A ROS 1 service that the bridge offers in ROS 2."""
+    """A ROS 1 service, offered in ROS 2 by the bridge."""
 
     def __init__(
         self, node: Node, side: Ros2Side, link: ServiceLink, codec: ServiceCodec, call_seconds: float
@@ -322,7 +322,7 @@ class _InRos2:
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
-        """Forward a request. Put the response or error into ``answered``, a future that belongs to another thread."""
+        """Forward a request. Set the result or exception of ``answered``, a future that belongs to another thread."""
         try:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:

@@ -39,10 +39,10 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Maximum number of messages to read per executor callback; a callback costs more than reading a message."""
+"""Maximum number of messages to read per executor callback, which costs more than reading a message."""
 
 
-# --- the parts of rclpy used here (untyped, because rclpy may not be installed)
+# --- interfaces of the parts of rclpy that are used (untyped, because rclpy may not be installed)
 
 
 class _Profile(Protocol):
@@ -84,7 +84,7 @@ class _Node(Protocol):
 
 
 def require_rclpy() -> None:
-    """Raise BridgeError with instructions if ROS 2 cannot be imported."""
+    """Raise BridgeError with instructions if rclpy cannot be imported."""
     try:
         importlib.import_module("rclpy")
     except ImportError as error:
@@ -95,7 +95,7 @@ def require_rclpy() -> None:
 
 
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
-"""Environment variables that name Fast DDS's settings file.
+"""Environment variables that name the settings file of Fast DDS.
 
 Fast DDS 2 and older, used by the _OLD_DISTRIBUTIONS, reads the second one.
 """
@@ -106,7 +106,7 @@ _OTHER_SETTINGS = ("FASTDDS_BUILTIN_TRANSPORTS", "ROS_LOCALHOST_ONLY")
 
 
 def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment variables that enlarge Fast DDS's buffers for large messages.
+    """Return environment variables that enlarge Fast DDS's buffers for large messages.
 
     Return {} if the user has configured Fast DDS.
     """
@@ -119,7 +119,7 @@ def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 class RclpySide:
-    """The rclpy backend, with one node and one executor in one thread."""
+    """The rclpy backend: one node, with one executor in one thread."""
 
     def __init__(self, name: str) -> None:
         """Start the node. Raise BridgeError if ROS 2 reports an error."""
@@ -132,7 +132,7 @@ class RclpySide:
         self._context = importlib.import_module("rclpy.context").Context()
         no_signals = importlib.import_module("rclpy.signals").SignalHandlerOptions.NO
         try:
-            # The bridge handles Ctrl-C itself.
+            # Do not let rclpy handle Ctrl-C, because the bridge does.
             rclpy.init(args=[], context=self._context, signal_handler_options=no_signals)
             self._node = rclpy.create_node(
                 name,
@@ -154,11 +154,11 @@ class RclpySide:
 
     @property
     def domain(self) -> str:
-        """Return the ROS 2 domain."""
+        """Return the ROS 2 domain's number."""
         return parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
-        """Return all topics and their types."""
+        """Return the names of all topics, with their types."""
         found = self._node.get_topic_names_and_types()
         return {str(name): tuple(_short(type_) for type_ in types) for name, types in found}
 
@@ -174,7 +174,7 @@ class RclpySide:
         return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a reliable publisher; such a publisher is compatible with every subscriber.
+        """Return a reliable publisher, which is compatible with all subscribers.
 
         Raise TypesDiffer if the type is not installed.
         """
@@ -192,7 +192,7 @@ class RclpySide:
         is_reliable: bool,
         is_latched: bool,
     ) -> Ros2Handle:
-        """Call ``deliver`` for each serialized message, in the executor's thread.
+        """Subscribe to a topic; call ``deliver`` for each serialized message, in the executor's thread.
 
         Raise TypesDiffer if the type is not installed.
         """
@@ -200,13 +200,13 @@ class RclpySide:
         return TopicSubscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
 
     def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes except for bridges."""
+        """Return the (name, namespace) of all nodes except bridges."""
         found = self._node.get_node_names_and_namespaces()
         return [(str(name), str(space)) for name, space in found if not name.startswith(BRIDGE_PREFIX)]
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of all nodes except this bridge, with their types."""
-        # The list also contains services that have only clients.
+        """Return the services of all nodes except this bridge, as a dict from name to type."""
+        # This list also contains services that have only clients.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
             own = tuple(self._served)
@@ -215,10 +215,10 @@ class RclpySide:
                 for name, type_ in named.items()
                 if self._node.count_services(name) > own.count(name)
             }
-        # Before ROS 2 Jazzy, every node must be queried.
+        # Before ROS 2 Jazzy, every node must be queried for its services.
         offered: dict[str, str] = {}
         for name, namespace in self.nodes():
-            # The node has just exited.
+            # Ignore a node that has just exited.
             with contextlib.suppress(RuntimeError):
                 found = self._node.get_service_names_and_types_by_node(name, namespace)
                 offered.update((str(service), _short(types[0])) for service, types in found)
@@ -233,7 +233,7 @@ class RclpySide:
         )
 
     def client(self, service: str, type_: str) -> Ros2Client:
-        """Return a client. Raise TypesDiffer if the type is not installed."""
+        """Return a client for a service. Raise TypesDiffer if the type is not installed."""
         return self._calls.client(service, self.service_class(type_))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
@@ -251,7 +251,7 @@ class RclpySide:
         return goal, result, feedback
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Return a client of an action. Raise TypesDiffer if the type is not installed."""
+        """Return a client for an action. Raise TypesDiffer if the type is not installed."""
         return ActionClient(self._calls, action, self.action_class(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
@@ -262,7 +262,7 @@ class RclpySide:
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Offer the ROS 1 parameters as this node's parameters."""
+        """Offer the ROS 1 parameters as parameters of this node."""
         return ParameterServer(self._calls, str(self._node.get_name()), store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
@@ -288,7 +288,7 @@ class RclpySide:
             except NotAnsweredError:
                 continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
-                # Only this callback has failed, so go on with the others.
+                # Only this callback has failed, so continue with the others.
                 _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
@@ -312,7 +312,7 @@ class RclpySide:
     @staticmethod
     def message_class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
-        # The class may be a ROS 1 class from one of minirospy's own packages, which lacks this method.
+        # The class may be a ROS 1 class from one of minirospy's packages, which does not have this method.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("MessageClass", found)
@@ -333,7 +333,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service that the bridge offers. Until it is closed, it is listed as the bridge's own."""
+    """A service that the bridge offers. Until closed, it is not listed among the services of other nodes."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls
@@ -386,7 +386,7 @@ class TopicSubscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message and those queued behind it; the executor would deliver one per iteration, which is slow."""
+        """Deliver a message and those queued behind it: the executor is slow, because it delivers one per iteration."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:
@@ -405,7 +405,7 @@ class TopicSubscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
-    # Check the name: it comes from a remote node, and importing an arbitrary module would execute it.
+    # Check the name, which comes from a remote node: importing an arbitrary module would execute it.
     if not (_PACKAGE.fullmatch(package) and _NAME.fullmatch(name) and _is_interface_package(package)):
         return None
     try:
@@ -415,7 +415,7 @@ def _imported(type_: str, kind: str) -> object:
 
 
 def _is_interface_package(package: str) -> bool:
-    """Return whether a package contains rosidl's generated type support library, without importing it."""
+    """Return whether a package contains rosidl's generated type support library. Does not import the package."""
     if package in sys.stdlib_module_names:
         return False
     try:
@@ -428,6 +428,6 @@ def _is_interface_package(package: str) -> bool:
 
 
 def _short(type_: str) -> str:
-    """Convert ``pkg/msg/Name`` to ``pkg/Name``."""
+    """Return ``pkg/Name`` for a type written as ``pkg/msg/Name``."""
     package, _, rest = type_.partition("/")
     return f"{package}/{rest.rpartition('/')[2]}"

@@ -39,10 +39,10 @@ _BODY = _HEADER + 16
 _NO_ID = bytes(16)
 _SECOND = 1_000_000_000
 _ACCEPTED, _EXECUTING, _CANCELING = 1, 2, 3
-"""Statuses of a goal that has not ended, from action_msgs/GoalStatus; 0 means unknown."""
+"""Statuses of running goals, from action_msgs/GoalStatus; 0 means unknown."""
 _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
 """Error codes from action_msgs/srv/CancelGoal."""
-_KEPT_SECONDS = 60.0  # seconds for which to store a goal's result after the goal has ended
+_KEPT_SECONDS = 60.0  # seconds to store the result of a goal that has ended
 _MAX_GOALS = 2_000
 CLOSE_SECONDS = 1.0
 
@@ -58,7 +58,7 @@ class ActionEnds(NamedTuple):
 
 
 class ActionType:
-    """Encodes and decodes the messages that contain an action's goals, results and feedback.
+    """Encodes and decodes the messages that carry an action's goals, results and feedback.
 
     ``name`` is ``pkg/action/Name``; ``fields`` is a function that returns a part's fields.
     """
@@ -68,15 +68,15 @@ class ActionType:
         self._fields = fields
 
     def write(self, part: str, values: Mapping[str, object]) -> bytes:
-        """Return the CDR of a part such as ``SendGoal_Response``."""
+        """Encode a part of the action, such as ``SendGoal_Response``, as CDR."""
         return encode(f"{self._name}_{part}", self._fields, values)
 
     def read(self, part: str, data: bytes) -> dict[str, object]:
-        """Return the values of a part. Raise DeserializationError if ``data`` is invalid."""
+        """Decode a part of the action from CDR. Raise DeserializationError if ``data`` is invalid."""
         return decode(f"{self._name}_{part}", self._fields, data)
 
     def response(self, status: int, result: bytes | None) -> bytes:
-        """Return the response to a request for a result. None means an empty result.
+        """Encode the response to a result request. A ``result`` of None means an empty result.
 
         Raise DeserializationError if the result is invalid.
         """
@@ -84,7 +84,7 @@ class ActionType:
         return self.write("GetResult_Response", {"status": status, "result": values})
 
     def result(self, response: bytes) -> tuple[int, bytes]:
-        """Return the status and the result from a response to a request for a result.
+        """Return the status and result in the response to a result request.
 
         Raise DeserializationError if the response is invalid.
         """
@@ -94,11 +94,11 @@ class ActionType:
         )
 
     def message(self, name: str, values: Mapping[str, object]) -> bytes:
-        """Return the CDR of a message from action_msgs."""
+        """Encode an action_msgs message as CDR."""
         return encode(name, self._fields, values)
 
     def cancelled(self, request: bytes) -> tuple[bytes, int]:
-        """Return the goal's id and time from a cancel request. Raise DeserializationError if the request is invalid."""
+        """Return the goal's id and stamp in a cancel request. Raise DeserializationError if the request is invalid."""
         found = decode("action_msgs/srv/CancelGoal_Request", self._fields, request)
         info = cast("dict[str, dict[str, object]]", found["goal_info"])
         stamp = cast("dict[str, int]", info["stamp"])
@@ -106,7 +106,7 @@ class ActionType:
 
 
 def _info(id: bytes, stamp: int = 0) -> dict[str, object]:
-    """Return an action_msgs/GoalInfo."""
+    """Return the values of an action_msgs/GoalInfo."""
     return {"goal_id": {"uuid": id}, "stamp": _time(stamp)}
 
 
@@ -115,7 +115,7 @@ def _time(stamp: int) -> dict[str, object]:
 
 
 def _split(data: bytes) -> tuple[bytes, bytes]:
-    """Return a goal's id and the data after it. Raise DeserializationError if the data is too short."""
+    """Split a goal's id from the data that follows it. Raise DeserializationError if the data is too short."""
     if len(data) < _BODY:
         raise DeserializationError("the message ends too early")
     return data[_HEADER:_BODY], data[:_HEADER] + data[_BODY:]
@@ -129,14 +129,14 @@ def _joined(id: bytes, data: bytes) -> bytes:
 
 
 class _SentGoal:
-    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
+    """A goal accepted by a ROS 2 server. Methods may be called from any thread."""
 
     def __init__(self, client: ZenohActionClient, id: bytes) -> None:
         self._client = client
         self._id = id
 
     def cancel(self) -> None:
-        """Send the server a cancel request."""
+        """Ask the server to cancel the goal."""
         self._client.cancel(self._id)
 
     def result(self) -> Future[tuple[int, bytes]]:
@@ -145,7 +145,7 @@ class _SentGoal:
 
 
 class ZenohActionClient:
-    """A client of an action, without a subscription to its statuses. Methods may be called from any thread."""
+    """A client for an action. Does not subscribe to the statuses. Methods may be called from any thread."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType) -> None:
         self._graph = node.graph
@@ -159,20 +159,20 @@ class ZenohActionClient:
 
     @property
     def is_ready(self) -> bool:
-        """Return whether a server with all its endpoints exists."""
+        """Return whether there is a server with all its endpoints."""
         publishers = self._graph.of_name(self._ends.feedback.name, Kind.PUBLISHER)
         clients = (self._send_goal, self._get_result, self._cancel_goal)
         return bool(publishers) and all(each.is_ready for each in clients)
 
     @property
     def servers(self) -> None:
-        """Return None: responses cannot be lost.
+        """Return None, because no response can be lost.
 
         A response takes the same route as its request, and the tokens prove that the route exists.
         """
 
     def probe(self) -> None:
-        """Return None, because no probe is needed."""
+        """Return None, because the servers need no probe."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return a future for the accepted goal, or for None if it is rejected.
@@ -192,7 +192,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits, and in ROS 1 the goal counts as rejected, so cancel it.
+                # The caller no longer waits and treats the goal as rejected, so cancel it.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -204,13 +204,13 @@ class ZenohActionClient:
         return accepted
 
     def cancel(self, id: bytes) -> None:
-        """Send the server a request to cancel a goal. The goal's result shows whether it was cancelled."""
+        """Ask the server to cancel a goal, whose result will show whether it was cancelled."""
         self._cancel_goal.call(
             self._type.message("action_msgs/srv/CancelGoal_Request", {"goal_info": _info(id)})
         )
 
     def result(self, id: bytes) -> Future[tuple[int, bytes]]:
-        """Return a future for a goal's status and result. The future fails with BridgeError."""
+        """Return a future for a goal's status and result, which may fail with BridgeError."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: Future[bytes]) -> None:
@@ -249,7 +249,7 @@ def _fail(future: Future[Ros2Goal | None] | Future[tuple[int, bytes]], error: Ex
 
 @dataclass
 class _Goal:
-    """A ROS 2 client's goal.
+    """A goal from a ROS 2 client.
 
     ``status`` is 0 until the goal is accepted; ``response`` contains the result once the goal has ended.
     """
@@ -265,7 +265,7 @@ class _Goal:
 
 
 class ZenohActionServer:
-    """An action that the bridge offers in ROS 2. Runs in a single thread, so that messages are sent in order."""
+    """An action that the bridge offers in ROS 2. A single thread sends the messages in order."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType, accept: Accept) -> None:
         self._name = ends.send_goal.name.removesuffix("/_action/send_goal")
@@ -285,9 +285,9 @@ class ZenohActionServer:
         ]
 
     def close(self) -> None:
-        """Close the action after sending known results. Idempotent."""
+        """Send known results, then close the action. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The first call may submit responses for goals that have just ended; the second one waits for these.
+            # The first call may submit responses for goals that have just ended; the second one waits for those.
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
         for server in self._servers:
@@ -333,7 +333,7 @@ class ZenohActionServer:
             answered.set_result(self._decision(None))
             return
         goal.stamp, goal.status = time.time_ns(), _ACCEPTED
-        # The response is sent before any message submitted later.
+        # Send the response before any message that is submitted later.
         answered.set_result(self._decision(goal))
         self._submit(lambda: self._start(goal))
         goal.there.ended.add_done_callback(lambda end: self._submit(lambda: self._end(goal, end)))
@@ -363,7 +363,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # ROS 1 has preempted the goal in favour of another one; ROS 2 has no status for that.
+            # Another goal has preempted this one in ROS 1, for which ROS 2 has no status.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

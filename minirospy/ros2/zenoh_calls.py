@@ -31,7 +31,7 @@ __all__ = ["MAX_UNDER_WAY", "ZenohClient", "ZenohServer"]
 _log = logging.getLogger(__name__)
 
 MAX_BYTES = 64 << 20
-# maximum number of requests to a service that await a response or whose response has not been written
+# maximum number of pending requests to a service, including those whose response has not been written yet
 MAX_UNDER_WAY = 200
 _MAX_OF_ACTION = 2_000
 """Maximum number of pending requests to an action.
@@ -39,39 +39,37 @@ _MAX_OF_ACTION = 2_000
 This limit exceeds the number of goals, because a request for a result waits until its goal has ended.
 """
 _MAX_SECONDS = 10_000_000
-"""Timeout in seconds; practically unlimited, because the bridge has timeouts of its own, and Zenoh must not time out long
-goals.
-"""
+"""Timeout in seconds, practically unlimited: the bridge has its own timeouts, and Zenoh must not time out long goals."""
 
 
 class ZenohClient:
-    """A client of a service. Methods may be called from any thread."""
+    """A client for a service. Methods may be called from any thread."""
 
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
-        # Send requests in a thread: on a slow network, sending may block for seconds, which would block the event loop.
+        # Send requests in a thread, because sending may block for seconds on a slow network and must not block the loop.
         self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 
     @property
     def is_ready(self) -> bool:
-        """Return whether a server exists."""
+        """Return whether there is a server."""
         servers = self._node.graph.of_name(self._end.name, Kind.SERVICE)
         return any(each.key == self._end.key for each in servers)
 
     @property
     def servers(self) -> None:
-        """Return None: responses cannot be lost.
+        """Return None, because no response can be lost.
 
         A response takes the same route as its request, and the tokens prove that the route exists.
         """
 
     def probe(self) -> None:
-        """Return None, because no probe is needed."""
+        """Return None, because the servers need no probe."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return a future for the response, both as CDR. The future fails with BridgeError."""
+        """Send a request as CDR; return a future for the response as CDR, which may fail with BridgeError."""
         answered: Future[bytes] = Future()
         name = self._end.name
 
@@ -142,7 +140,7 @@ class ZenohServer:
         self._under_way = 0
         self._lock = threading.Lock()
         self._most = MAX_UNDER_WAY if thread is None else _MAX_OF_ACTION
-        # Send replies in a thread: sending may block on a slow network.
+        # Send replies in a thread, because sending may block on a slow network.
         self._replies = thread or concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
         self._own = None if thread else self._replies
         handler = node.handler(self._arrived)
@@ -168,7 +166,7 @@ class ZenohServer:
                 self._replies.submit(self._take, query)
             except RuntimeError:
                 self._done()
-                query.drop()  # the action has been closed
+                query.drop()  # the action is closed
 
     def _take(self, query: Query) -> None:
         try:
@@ -187,12 +185,12 @@ class ZenohServer:
                 self._replies.submit(self._finish, query, back, answered)
             except RuntimeError:
                 self._done()
-                query.drop()  # the service has been closed
+                query.drop()  # the service is closed
 
         answered.add_done_callback(finished)
 
     def _finish(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
-        # Count a response until it has been written: responses that wait for a slow network use memory.
+        # Count a request until its response has been written: responses waiting for a slow network take memory.
         try:
             self._reply(query, back, answered)
         finally:
@@ -205,10 +203,10 @@ class ZenohServer:
             reason = " ".join(str(error).split())
             _log.error("service [%s] of ROS 1: %s", self._end.name, reason)
             if self._response != ["bool", "string"]:
-                # Send an error: a response of zeros would look like a valid one.
+                # Send an error, because a response of zeros would look valid.
                 self._refuse(query, reason)
                 return
-            # The response is a bool and a string, as for SetBool and Trigger: send false for success, then the reason.
+            # The response is a bool and a string, as in SetBool and Trigger: send False, then the reason as the string.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

@@ -35,7 +35,7 @@ _DEFAULT_DEPTH = 42
 
 
 class Kind(Enum):
-    """The kinds of entities declared by tokens."""
+    """The kinds of entities that tokens declare."""
 
     NODE = "NN"
     PUBLISHER = "MP"
@@ -46,20 +46,20 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Qos:
-    """The parts of an endpoint's quality of service that the bridge uses."""
+    """The QoS settings of an endpoint that the bridge uses."""
 
     is_reliable: bool = True
     is_transient_local: bool = False
     depth: int = 10
 
     def __str__(self) -> str:
-        """Return the QoS in a token's format, which lists only the differences from rmw_zenoh's default."""
+        """Return the settings in the format of a token, which lists only those that differ from rmw_zenoh's defaults."""
         depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
         return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
 
 
 class Entity(NamedTuple):
-    """A node, or an endpoint of a topic or service.
+    """A node, or an endpoint: a publisher, subscriber, service or client.
 
     ``type`` is ``pkg/Name``, ``pkg/srv/Name`` or ``pkg/action/Name``. ``session`` is the id of the entity's Zenoh session.
     """
@@ -83,22 +83,22 @@ class Entity(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Return the key for the entity's messages or requests."""
+        """Return the key of the entity's messages or requests."""
         return data_key(self.domain, self.name, self.type, self.hash)
 
 
 def tokens_pattern(domain: str) -> str:
-    """Return the key expression that matches all tokens in a domain."""
+    """Return a key expression that matches all tokens in a domain."""
     return f"{_SPACE}/{domain}/**"
 
 
 def data_key(domain: str, name: str, type_: str, hash_: str) -> str:
-    """Return the key for a topic's messages or a service's requests."""
+    """Return the key on which a topic's messages or a service's requests are sent."""
     return f"{domain}/{name.strip('/')}/{dds_name(type_)}/{hash_}"
 
 
 def dds_name(type_: str) -> str:
-    """Convert ``pkg/Name`` to ``pkg::msg::dds_::Name_``, and ``pkg/srv/Name`` to ``pkg::srv::dds_::Name_``."""
+    """Convert a type name to DDS: ``pkg/Name`` to ``pkg::msg::dds_::Name_``, ``pkg/srv/Name`` to ``pkg::srv::dds_::Name_``."""
     package, _, rest = type_.partition("/")
     kind, _, name = rest.rpartition("/")
     return f"{package}::{kind or 'msg'}::dds_::{name}_"
@@ -115,7 +115,7 @@ def format_token(entity: Entity) -> str:
 
 
 def parse_token(key: str) -> Entity | None:
-    """Parse a token's key; return None if it is not in a format that the bridge supports."""
+    """Parse a token's key; return None if the bridge does not support its format."""
     parts = key.split("/")
     if len(key) > _MAX_LENGTH or len(parts) < 9 or parts[0] != _SPACE:
         return None
@@ -153,13 +153,13 @@ def _mangled(name: str) -> str:
 
 
 def gid_of(token: str) -> bytes:
-    """Return the id of the entity that a token declares."""
+    """Return the gid of the entity that a token declares."""
     return xxh3_128(token.encode())
 
 
 def xxh3_128(data: bytes) -> bytes:
-    """Return the 128-bit XXH3 hash in rmw_zenoh's byte order, little-endian."""
-    # The extra `fleet` installs xxhash. The rest of this module works without it.
+    """Return the 128-bit XXH3 hash in little-endian byte order, as in rmw_zenoh."""
+    # xxhash comes with the extra `fleet`; the rest of this module works without it.
     import xxhash
 
     return xxhash.xxh3_128_intdigest(data).to_bytes(16, "little")
@@ -172,16 +172,16 @@ _TIME = slice(8, 16)
 
 
 def attachment(sequence: int, time: int, gid: bytes) -> bytes:
-    """Return the attachment of a message or request; ``time`` is in nanoseconds since 1970."""
+    """Return the attachment for a message or request. ``time`` is in nanoseconds since 1970."""
     return _ATTACHMENT.pack(sequence, time, len(gid), gid)
 
 
 def reply_attachment(data: bytes, time: int) -> bytes:
-    """Return the attachment of a response to a request with the attachment ``data``.
+    """Return the attachment for the response to a request with the attachment ``data``.
 
     Raise ValueError if ``data`` is invalid.
     """
-    # Other versions of rmw_zenoh may send the id without its length; reply in the format of the request.
+    # Some versions of rmw_zenoh send the gid without its length. Reply in the request's format.
     if len(data) not in (_ATTACHMENT.size, _ATTACHMENT.size - 1):
         raise ValueError("this is not an attachment of rmw_zenoh")
     return data[: _TIME.start] + struct.pack("<q", time) + data[_TIME.stop :]

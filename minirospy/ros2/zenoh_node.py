@@ -39,7 +39,7 @@ _MAX_ENTITIES = 50_000
 
 
 class Graph:
-    """The nodes and endpoints in other sessions, from their tokens. Methods may be called from any thread."""
+    """The nodes and endpoints in other sessions, known from their tokens. Methods may be called from any thread."""
 
     def __init__(self, own_session: str = "") -> None:
         self._own = own_session
@@ -49,7 +49,7 @@ class Graph:
         self._lock = threading.Lock()
 
     def set(self, key: str, is_there: bool) -> None:
-        """Add or remove a token; ignore a token that cannot be parsed."""
+        """Add or remove the entity of a token; ignore tokens that cannot be parsed."""
         entity = parse_token(key)
         if entity is None or entity.session == self._own:
             return
@@ -65,28 +65,28 @@ class Graph:
                 self._by_name.pop(entity.name, None)
 
     def nodes(self) -> list[Entity]:
-        """Return the nodes."""
+        """Return the nodes in other sessions."""
         with self._lock:
             return list(self._nodes.values())
 
     def ends(self, *kinds: Kind) -> list[Entity]:
-        """Return the endpoints of these kinds for all topics and services."""
+        """Return all endpoints of the given kinds."""
         with self._lock:
             found = [each for ends in self._by_name.values() for each in ends.values()]
         return [each for each in found if each.kind in kinds]
 
     def of_name(self, name: str, *kinds: Kind) -> list[Entity]:
-        """Return the endpoints of these kinds for one topic or service."""
+        """Return the endpoints of the given kinds for one topic or service."""
         with self._lock:
             found = list(self._by_name.get(name, {}).values())
         return [each for each in found if each.kind in kinds]
 
 
 class ZenohNode:
-    """A session with one node. ``graph`` contains the nodes and endpoints in other sessions."""
+    """A Zenoh session with one ROS 2 node. ``graph`` contains the nodes and endpoints in other sessions."""
 
     def __init__(self, name: str, options: NetworkOptions) -> None:
-        """Open the session and wait for the router. Raise BridgeError if that fails."""
+        """Open the session, and wait for the router. Raise BridgeError if that fails."""
         require_zenoh("ros2-bridge --zenoh", needs_hash=True)
         self.zenoh = importlib.import_module("zenoh")
         self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
@@ -108,26 +108,26 @@ class ZenohNode:
     def entity(
         self, kind: Kind, name: str = "", type_: str = "", hash_: str = "", qos: Qos | None = None
     ) -> Entity:
-        """Return a new endpoint of this node; a :class:`Handle` declares its token. The first one is the node itself."""
+        """Return a new entity of this node: first the node itself, then endpoints, whose tokens a :class:`Handle` declares."""
         id = next(self._ids)
         return Entity(self.domain, self._zid, id, kind, self._name, "/", name, type_, hash_, qos or Qos())
 
     def close(self) -> None:
-        """Close the session with all its declarations. Idempotent."""
+        """Close the session and all its declarations. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
-        # Undeclaring fails on a broken link, but the peer detects the loss by itself.
+        # Undeclaring fails on a broken link, but the peer then detects the loss itself.
         with contextlib.suppress(self.zenoh.ZError):
             self.session.close()
 
     def handler(self, function: Callable[..., object], ended: Callable[[], object] | None = None) -> object:
-        """Return a handler that Zenoh calls in its own thread; otherwise Zenoh would start a thread per handler."""
+        """Return a handler that Zenoh calls in its own thread; by default it starts a thread for each handler."""
         return self.zenoh.handlers.Callback(function, ended, indirect=False)
 
     def _opened(self, options: NetworkOptions) -> Session:
         config = configured(options)
-        # Enable time stamps, which the messages stored for late subscribers need.
+        # Messages stored for late subscribers need time stamps.
         config.insert_json5("timestamping/enabled", "true")
         try:
             session: Session = self.zenoh.open(config)
@@ -144,7 +144,7 @@ class ZenohNode:
 
 
 class Handle:
-    """A node's endpoint, with its token and declarations, until it is closed."""
+    """An endpoint of the node, with its token and declarations; all are undeclared by :meth:`close`."""
 
     def __init__(self, node: ZenohNode, end: Entity, *declared: Declared) -> None:
         key = format_token(end)

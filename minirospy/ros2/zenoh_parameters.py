@@ -27,7 +27,7 @@ _Values = Mapping[str, object]
 
 
 class ZenohParameterServer:
-    """The parameter services of the bridge's node. ``fields`` returns a type's fields, like ``Definitions.fields``."""
+    """The parameter services of the bridge's node. ``fields`` returns the fields of a type, like ``Definitions.fields``."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class ZenohParameterServer:
                 return encode(f"{whole}_Response", self._fields, response)
             except (MinirospyError, DeserializationError):
                 raise
-            except Exception as error:  # the client waits for a response, regardless of the error
+            except Exception as error:  # the client waits for a response, whatever the error
                 raise BridgeError(f"parameters of ROS 1: {' '.join(str(error).split())}") from error
 
         return lambda request: asyncio.run_coroutine_threadsafe(answered(request), self._loop)
@@ -121,7 +121,7 @@ class ZenohNodeParameters:
         return _texts(cast("_Values", result)["names"])
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter's value. Its type is 0 if the parameter is not set."""
+        """Return the value of a parameter; its type is 0 if the parameter is not set."""
         found = self._call(node, ParameterService.GET, {"names": [name]})["values"]
         values = cast("list[_Values]", found)
         return _read(values[0]) if values else Value(0)

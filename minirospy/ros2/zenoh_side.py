@@ -41,10 +41,10 @@ _LATCHED = Qos(True, True, 1)
 
 
 class ZenohSide:
-    """The Zenoh backend: one session with one node."""
+    """The Zenoh backend: one session, with one node."""
 
     def __init__(self, name: str, options: NetworkOptions, definitions: Definitions) -> None:
-        """Open the session and wait for the router. Raise BridgeError if that fails."""
+        """Open the session, and wait for the router. Raise BridgeError if that fails."""
         self._name = name
         self._node = ZenohNode(name, options)
         self._graph = self._node.graph
@@ -52,11 +52,11 @@ class ZenohSide:
 
     @property
     def domain(self) -> str:
-        """Return the ROS 2 domain."""
+        """Return the ROS 2 domain's number."""
         return self._node.domain
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
-        """Return all topics and their types."""
+        """Return the names of all topics, with their types."""
         found: dict[str, set[str]] = {}
         for end in self._graph.ends(*_TOPIC):
             found.setdefault(end.name, set()).add(end.short_type)
@@ -70,7 +70,7 @@ class ZenohSide:
         )
 
     def nodes(self) -> list[tuple[str, str]]:
-        """Return the names and namespaces of all nodes except for bridges."""
+        """Return the (name, namespace) of all nodes except bridges."""
         return [(each.node, each.namespace) for each in self._graph.nodes() if not is_bridge(each.node)]
 
     def fields(self, type_: str) -> dict[str, str]:
@@ -82,7 +82,7 @@ class ZenohSide:
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a publisher. Raise TypesDiffer like :meth:`fields`."""
+        """Return a publisher. Raise TypesDiffer, like :meth:`fields`."""
         end = self._topic_end(Kind.PUBLISHER, topic, type_, Qos(True, is_latched, depth))
         return ZenohPublisher(self._node, end)
 
@@ -96,7 +96,7 @@ class ZenohSide:
         is_reliable: bool,
         is_latched: bool,
     ) -> Ros2Handle:
-        """Call ``deliver`` for each serialized message, in one of Zenoh's threads.
+        """Subscribe to a topic; call ``deliver`` for each serialized message, in one of Zenoh's threads.
 
         Raise TypesDiffer like :meth:`fields`.
         """
@@ -104,7 +104,7 @@ class ZenohSide:
         return subscribe(self._node, end, deliver)
 
     def services(self) -> Mapping[str, str]:
-        """Return the services of nodes other than bridges, and their types."""
+        """Return the services of all nodes except bridges, as a dict from name to type."""
         ends = self._graph.ends(Kind.SERVICE)
         return {end.name: end.short_type for end in ends if not is_bridge(end.node)}
 
@@ -115,7 +115,7 @@ class ZenohSide:
         return dict(request), dict(response)
 
     def client(self, service: str, type_: str) -> Ros2Client:
-        """Return a client. Raise TypesDiffer like :meth:`fields`."""
+        """Return a client for a service. Raise TypesDiffer, like :meth:`fields`."""
         return ZenohClient(self._node, self._service_end(Kind.CLIENT, service, type_.replace("/", "/srv/")))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
@@ -135,7 +135,7 @@ class ZenohSide:
         return dict(goal), dict(result), dict(feedback_fields)
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Return a client of an action. Raise TypesDiffer like :meth:`fields`."""
+        """Return a client for an action. Raise TypesDiffer, like :meth:`fields`."""
         ends = self._action_ends(action, type_, Kind.CLIENT, Kind.SUBSCRIPTION)
         return ZenohActionClient(self._node, ends, self._action_type(type_))
 
@@ -145,7 +145,7 @@ class ZenohSide:
         return ZenohActionServer(self._node, ends, self._action_type(type_), accept)
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
-        """Offer the ROS 1 parameters as this node's parameters."""
+        """Offer the ROS 1 parameters as parameters of this node."""
         return ZenohParameterServer(self, self._name, self._definitions.fields, store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
@@ -153,7 +153,7 @@ class ZenohSide:
         return ZenohNodeParameters(self, self._definitions.fields)
 
     def close(self) -> None:
-        """Close the session with all its declarations. Idempotent."""
+        """Close the session and all its declarations. Idempotent."""
         self._node.close()
 
     def _topic_end(self, kind: Kind, topic: str, type_: str, qos: Qos) -> Entity:
@@ -161,7 +161,7 @@ class ZenohSide:
         return self._node.entity(kind, topic, type_, hash_, qos)
 
     def _service_end(self, kind: Kind, name: str, type_: str) -> Entity:
-        """Return a service's endpoint. ``type_`` is ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
+        """Return an endpoint of a service with the type ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
         hash_ = self._agreed(type_, self._definitions.hash(type_), _SERVICE, name)
         return self._node.entity(kind, name, type_, hash_, Qos())
 
@@ -180,7 +180,7 @@ class ZenohSide:
         return ActionType(type_.replace("/", "/action/"), self._definitions.fields)
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
-        """Return a type's hash for use in keys: the local hash, or NO_HASH if the other side uses no hashes.
+        """Return the hash to use for a type in keys: the local one, or NO_HASH if the other side uses no hashes.
 
         Raise TypesDiffer if the other side's endpoints have a different hash.
         """
@@ -194,7 +194,7 @@ class ZenohSide:
             raise TypesDiffer(
                 f"[{type_}] has another definition in ROS 2: its hash there is {min(hashes)}, here {own}"
             )
-        # No endpoint has this type, so use NO_HASH only if all other endpoints do.
+        # No endpoint uses this type, so use NO_HASH only if all other endpoints do.
         are_humble = [end.hash == NO_HASH for end in self._graph.ends(*_TOPIC, *_SERVICE)]
         return NO_HASH if are_humble and all(are_humble) else own
 

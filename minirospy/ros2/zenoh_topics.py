@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class ZenohPublisher(Handle):
-    """A publisher with the quality of service of its endpoint."""
+    """A publisher that uses its endpoint's QoS settings."""
 
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         outlet = _outlet(node, end)
@@ -32,10 +32,10 @@ class ZenohPublisher(Handle):
 
     @property
     def subscribers(self) -> int:
-        """Return the number of subscribers; it is 0 until subscribers in other sessions are connected."""
+        """Return the number of known subscribers, or 0 if a message sent now would not reach them."""
         found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
         count = len([each for each in found if each.key == self._end.key])
-        # A transient local publisher stores its messages, so none of them is lost.
+        # A transient local publisher stores its messages, so no message is lost.
         is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
         return count if is_ready else 0
 
@@ -48,7 +48,7 @@ class ZenohPublisher(Handle):
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
-    # Count only remote subscribers: the bridge's own subscription to the topic ignores this session's messages.
+    # Count only remote subscribers, because the bridge's own subscription ignores messages from this session.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)
@@ -66,7 +66,7 @@ def _outlet(node: ZenohNode, end: Entity) -> Outlet:
 
 
 def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) -> Handle:
-    """Call ``deliver`` for each serialized message, in one of Zenoh's threads, until the handle is closed."""
+    """Call ``deliver`` for each serialized message on a topic, in one of Zenoh's threads, until the handle is closed."""
 
     def arrived(sample: Sample) -> None:
         if sample.kind != node.zenoh.SampleKind.PUT:
@@ -77,7 +77,7 @@ def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) ->
             _log.exception("a message of ROS 2 could not be passed on")
 
     handler = node.handler(arrived)
-    # Do not receive messages from the bridge itself.
+    # Ignore messages that the bridge itself publishes.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         declared = node.session.declare_subscriber(end.key, handler, allowed_origin=remote)

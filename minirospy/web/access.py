@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 TOKEN_PROTOCOL = "minirospy.token."
-"""Prefix of a sub-protocol that carries a token: a page cannot set a WebSocket's headers, but it can choose sub-protocols."""
+"""Prefix of a sub-protocol that carries a token, because a page can choose sub-protocols but not set WebSocket headers."""
 
 DESKTOP_ORIGINS = ("file://", "lichtblick://*", "foxglove://*", "app://*", "vscode-webview://*")
 APP_ORIGINS = (
@@ -47,16 +47,16 @@ _TOKEN = re.compile(r"[A-Za-z0-9_-]{8,200}")
 
 
 class Grant(Enum):
-    """A client's rights."""
+    """The rights of a client."""
 
     READ = "read-only"
     WRITE = "read-write"
     OWN = "read-write, with the token"
-    """The client has its user's token, so it may also start programs and open files as the server's user."""
+    """The client has the user's token, so it may also start programs, and open files as the server's user."""
 
 
 class Refusal(NamedTuple):
-    """The reason why a request is refused: the HTTP status, and one line for the user.
+    """Why a request is refused: the HTTP status, and one line for the user.
 
     ``names_option``: the text names an option of the bridge. Only the bridge's terminal shows it, for the bridge's owner.
     """
@@ -67,7 +67,7 @@ class Refusal(NamedTuple):
 
 
 class Credentials(NamedTuple):
-    """The parts of a request that identify its sender: Host, Origin and Authorization headers, sub-protocols and path."""
+    """The parts of a request that identify its sender: the Host, Origin and Authorization headers, sub-protocols and path."""
 
     host: str
     origin: str | None
@@ -77,7 +77,7 @@ class Credentials(NamedTuple):
 
     @property
     def token(self) -> str:
-        """Return the token from the header, a sub-protocol or the query, or "" if there is none."""
+        """Return the token in the header, a sub-protocol or the query, or "" if there is none."""
         scheme, _, rest = self.authorization.partition(" ")
         if scheme.lower() == "bearer":
             return rest.strip()
@@ -90,7 +90,7 @@ class Credentials(NamedTuple):
 
 @dataclass(frozen=True)
 class Access:
-    """The access rules for one listener.
+    """The rules for access to one listener.
 
     ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns for pages that may
     connect in addition to those from this machine and the front ends. A token is "" if there is none. ``requires_token``
@@ -114,12 +114,12 @@ class Access:
             raise BridgeError("a listener beyond loopback needs a token")
 
     def check(self, request: Credentials) -> Grant | Refusal:
-        """Return the rights of a request's sender, or the reason for refusing the request."""
+        """Return the rights of the sender of a request, or the reason for refusing it."""
         if refusal := self.check_host(request.host):
             return refusal
         grant = self._grant_of(request.token)
         if grant:
-            # The user has given the token to this page, so do not check the page's origin.
+            # The user has given this page the token, so any origin is accepted.
             return grant
 
         if request.token and (self.read_token or self.write_token):
@@ -131,7 +131,7 @@ class Access:
         return Grant.READ if self.default_is_read else Grant.WRITE
 
     def check_host(self, host: str) -> Refusal | None:
-        """Return the reason for refusing a request with this Host header, or None if it is allowed."""
+        """Return the reason for refusing a Host header, or None if it is allowed."""
         if self._knows_host(host):
             return None
         return Refusal(
@@ -151,7 +151,7 @@ class Access:
 
     def _grant_of(self, token: str) -> Grant | None:
         given = token.encode()
-        # Compare with both tokens, so that the response time does not reveal which one matches.
+        # Always compare with both tokens, so that the response time does not reveal which one matches.
         is_write = bool(self.write_token) and hmac.compare_digest(given, self.write_token.encode())
         is_read = bool(self.read_token) and hmac.compare_digest(given, self.read_token.encode())
         return Grant.OWN if is_write else Grant.READ if is_read else None
@@ -168,7 +168,7 @@ class Access:
 
     def _knows_origin(self, origin: str | None, host: str) -> bool:
         if origin is None:
-            return True  # the request is not from a browser
+            return True  # no browser has sent this request
         lowered = origin.lower()
         parts = urlsplit(lowered)
         if parts.scheme in ("http", "https") and (
@@ -185,12 +185,12 @@ def new_token() -> str:
 
 
 def is_token(value: object) -> bool:
-    """Return whether a value is a valid token: a string of the right length and characters."""
+    """Return whether a value is a string with the length and characters of a token."""
     return isinstance(value, str) and bool(_TOKEN.fullmatch(value))
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is a loopback address, or localhost."""
+    """Return whether a host is localhost or a loopback address."""
     if host in _LOCAL_NAMES or host.endswith(".localhost"):
         return True
     try:
@@ -200,12 +200,12 @@ def is_loopback(host: str) -> bool:
 
 
 def header_items(headers: Mapping[str, str], name: str) -> list[str]:
-    """Return the items of a header whose value is a comma-separated list."""
+    """Split a header's comma-separated value into its items."""
     return [item.strip() for item in headers.get(name, "").split(",") if item.strip()]
 
 
 def _host_name(host: str) -> str:
-    """Return the name or address in a Host header, without its port."""
+    """Return the host name or address in a Host header, without the port."""
     try:
         return (urlsplit(f"//{host}").hostname or "").lower()
     except ValueError:

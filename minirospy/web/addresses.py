@@ -15,7 +15,7 @@ LICHTBLICK_APP = "https://lichtblick-suite.github.io/lichtblick/"
 
 
 class Links(NamedTuple):
-    """The URLs for one listener. The front ends' links are for a browser on this machine, and contain no token."""
+    """A listener's URLs. The links to the front ends are for a browser on this machine, and contain no token."""
 
     websocket: list[str]
     foxglove: str
@@ -23,7 +23,7 @@ class Links(NamedTuple):
 
 
 def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
-    """Return the links for a listener at these addresses; the front ends' links use the first address."""
+    """Return the URLs of a listener at these addresses; the front ends' links use the first address."""
     scheme = "wss" if encrypted else "ws"
     websocket = [f"{scheme}://{_in_uri(address)}:{port}" for address in addresses]
     query = f"ds=foxglove-websocket&ds.url={quote(websocket[0], safe='')}"
@@ -31,7 +31,7 @@ def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
 
 
 def own_addresses() -> list[str]:
-    """Return this machine's IPv4 addresses that other machines can reach, the default route's address first."""
+    """Return this machine's IPv4 addresses that others can reach, starting with the default route's."""
     import psutil
 
     found: dict[str, None] = {}
@@ -48,13 +48,13 @@ def own_addresses() -> list[str]:
 
 
 def host_names() -> list[str]:
-    """Return the names that other machines may use to reach this machine: its host name and its mDNS name."""
+    """Return the names under which other machines may reach this one: its host name and its mDNS name."""
     name = socket.gethostname()
     return [name, f"{name.partition('.')[0]}.local"]
 
 
 def qr_code(text: str) -> str:
-    """Return a QR code for a terminal, or "" if the segno library is missing."""
+    """Return a QR code to print on a terminal, or "" if the segno library is missing."""
     try:
         import segno
     except ImportError:

@@ -77,32 +77,32 @@ class BridgeOptions:
     rosapi: bool = False
     transforms: bool = False
     """Options for rosbridge clients: ``rosapi`` also runs rosapi's services, ``transforms`` also runs tf2_web_republisher."""
-    name: str = "minirospy bridge"  # the Foxglove server's name
+    name: str = "minirospy bridge"  # name of the Foxglove server
 
 
 @dataclass(frozen=True)
 class Extras:
-    """Additional endpoints and pages for the Foxglove listener; ``pages`` are public and need no token."""
+    """Additional endpoints and pages of the Foxglove listener. ``pages`` are public: they need no token."""
 
     endpoints: Sequence[Endpoint] = ()
     pages: Mapping[str, HttpHandler] = field(default_factory=dict)
 
 
 def tls_of(options: BridgeOptions) -> ssl.SSLContext | None:
-    """Return the TLS context for the options, or None without a certificate. Raise BridgeError if it cannot be used."""
+    """Return the TLS context, or None if there is no certificate. Raise BridgeError if the certificate is unusable."""
     if not options.certificate:
         if options.key:
             raise BridgeError("a key is given without its certificate: give both PEM files")
         return None
     try:
         return tls_context(options.certificate, options.key)
-    except OSError as error:  # covers ssl.SSLError, which is a subclass
+    except OSError as error:  # includes ssl.SSLError
         name = error.filename or f"{options.certificate} {options.key}".strip()
         raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
 
 
 class Bridge:
-    """Makes a node's graph accessible to browsers. Runs on the node's loop."""
+    """Serves a node's graph to browsers. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -138,7 +138,7 @@ class Bridge:
             self._beside.append(client_topics)
         self._extras = extras or Extras()
         self._account = Account(self.options.limits.memory)
-        self._refusals = RateLimitedLogger(node.log)  # refused clients that an option would admit
+        self._refusals = RateLimitedLogger(node.log)  # for refused clients that another option would admit
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None
@@ -166,7 +166,7 @@ class Bridge:
         tls: ssl.SSLContext | None,
         public: Mapping[str, HttpHandler],
     ) -> Listener:
-        """Create a protocol's listener and return it.
+        """Create the listener for a protocol and open its port.
 
         Raise BridgeError if the port is in use, unless ``retry_delay`` is set.
         """
@@ -196,7 +196,7 @@ class Bridge:
                 return listener
 
     async def _start_beside(self) -> None:
-        """Start rosapi and tf2_web_republisher for rosbridge clients, unless another node provides them."""
+        """Start rosapi and tf2_web_republisher for rosbridge clients, if no other node provides them."""
         graph = await fetch(self.node.call_master)
         if self.options.rosapi and "/rosapi/topics" not in graph.services:
             from minirospy.web.rosapi.services import Rosapi
@@ -218,7 +218,7 @@ class Bridge:
         await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:
-        """Return the bridge's listeners and clients as values for JSON."""
+        """Return the bridge's listeners and clients as JSON-compatible values."""
         clients = []
         for endpoint, listener in self.listeners.items():
             for connection in listener.connections:
@@ -266,7 +266,7 @@ class Bridge:
         exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")
 
     async def _report(self) -> None:
-        """Publish the clients' status as diagnostics, once a second while any client is connected."""
+        """Publish the clients' status as diagnostics once per second while clients are connected."""
         from diagnostic_msgs.msg import DiagnosticArray
 
         publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)

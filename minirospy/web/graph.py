@@ -36,23 +36,23 @@ __all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", 
 
 _log = logging.getLogger(__name__)
 
-MIN_REFRESH_INTERVAL = 0.25  # seconds between refreshes while the graph changes
+MIN_REFRESH_INTERVAL = 0.25  # minimum interval in seconds between refreshes while the graph changes
 
 _QUEUE = 100
 _MAX_WAITING = 32_000_000
-"""Maximum bytes of clients' messages that are queued for the subscribers of new topics.
+"""Maximum total size in bytes of client messages queued for subscribers of new topics.
 
 Above this limit, only the newest message per topic is queued.
 """
 
-CHECK_SECONDS = 2.0  # between checks of a known service's type; a check is one connection
+CHECK_SECONDS = 2.0  # seconds between checks of known services' types; each check takes one connection
 _QUERY_SECONDS = 2.0
-"""Seconds to wait for service types; after that, report the graph without the types that are still unknown."""
+"""Timeout in seconds for querying service types, after which the graph is reported without the unknown ones."""
 
 
 @dataclass(frozen=True)
 class Filters:
-    """The filters for topic, service and parameter names that clients may use."""
+    """Filters for the names of topics, services and parameters that clients may use."""
 
     topics: NameFilter = field(default_factory=NameFilter)
     publishable: NameFilter = field(default_factory=NameFilter)
@@ -62,7 +62,7 @@ class Filters:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A received message: its bytes, its publisher's connection header, and its receive time (nanoseconds of the node's time)."""
+    """A received message: its bytes, its publisher's connection header, and its receive time in ns of the node's time."""
 
     body: bytes | memoryview
     header: Header
@@ -76,7 +76,7 @@ GraphListener = Callable[[Changes], object]
 
 
 class SharedTopic:
-    """A topic to which at least one client listens."""
+    """A topic with at least one listening client."""
 
     def __init__(self, graph: SharedGraph, topic: str) -> None:
         self.topic = topic
@@ -84,14 +84,14 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # The last message of each publisher, keyed by the id of its connection header, which is one object per connection.
+        # The last message of each publisher, keyed by the id() of the connection header; each connection has one header object.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
-        self._has_connected = asyncio.Event()  # set when a publisher has connected; a wait clears it
+        self._has_connected = asyncio.Event()  # set when a publisher has connected; cleared before a wait
 
     @property
     def headers(self) -> list[Header]:
-        """Return the connection headers of the publishers that are connected."""
+        """Return the connection headers of the connected publishers."""
         return self._subscription.headers if self._subscription else []
 
     @property
@@ -100,13 +100,13 @@ class SharedTopic:
         return bool(self._listeners)
 
     def add(self, listener: TopicListener) -> None:
-        """Call ``listener`` with the last message of each latched publisher, then with each new message."""
+        """Call ``listener`` with the last message of each latched publisher, and then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(
                 self.topic, self._deliver, on_change=self._has_connected.set
             )
             self._graph.subscribed_own(self.topic)
-        # While an unsubscription is in progress, the connections are open, and would not deliver the latched messages again.
+        # During an unsubscription, connections are still open, but do not deliver the latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -118,7 +118,7 @@ class SharedTopic:
             self._listeners.remove(listener)
 
     async def wait_for_publisher(self, name: str) -> None:
-        """Wait until the node ``name`` has connected as a publisher, or the topic has no listeners. At most a second."""
+        """Wait, at most a second, until the node ``name`` has connected as a publisher or no listener is left."""
 
         async def connected() -> None:
             while self.is_wanted and not any(header.get("callerid") == name for header in self.headers):
@@ -129,7 +129,7 @@ class SharedTopic:
             await asyncio.wait_for(connected(), JOIN_SECONDS)
 
     async def close(self) -> None:
-        """Unsubscribe."""
+        """Unsubscribe from the topic."""
         subscription, self._subscription = self._subscription, None
         if subscription:
             await subscription.close()
@@ -152,7 +152,7 @@ class SharedTopic:
 
 
 class Publication:
-    """One client's handle for a topic that this node publishes; clients call ``publish(bytes)``."""
+    """A client's handle for a topic that this node publishes with ``publish(bytes)``."""
 
     def __init__(self, graph: SharedGraph, topic: str, shared: _SharedPublisher) -> None:
         self.topic = topic
@@ -163,11 +163,11 @@ class Publication:
 
     @property
     def has_joined(self) -> bool:
-        """Return whether all subscribers that the master listed at registration have connected."""
+        """Return whether the subscribers known to the master at the registration have connected."""
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait, for at most a second, until the subscribers that the master listed when the topic was advertised are connected.
+        """Wait, at most a second, until the subscribers known to the master when the topic was advertised have connected.
 
         Subscribers do not receive messages published before they connect.
         """
@@ -181,7 +181,7 @@ class Publication:
             shared.publisher.publish_raw(body)
 
     def publish_when_joined(self, body: bytes) -> None:
-        """Publish after all current subscribers have connected. Messages keep their order.
+        """Publish a message after the current subscribers have connected. The order of messages is preserved.
 
         Does not block; a full queue drops its oldest message.
         """
@@ -206,7 +206,7 @@ class Publication:
             self.publish(body)
 
     def close(self) -> None:
-        """Release one handle. Unadvertise the topic when the last handle is released. Idempotent."""
+        """Release this handle. Unadvertise the topic when its last handle is released. Idempotent."""
         self._publish_waiting()
         shared, self._shared = self._shared, None
         if shared:
@@ -223,7 +223,7 @@ class _SharedPublisher:
 
 
 class SharedGraph:
-    """The graph for all clients of the bridge. Runs on the node's loop."""
+    """The ROS graph as shared by all clients of the bridge. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -254,12 +254,12 @@ class SharedGraph:
         self._reporter = ErrorReporter(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
         self.tasks: set[asyncio.Task[None]] = set()
-        self._service_infos: dict[ServiceKey, ServiceInfo] = {}  # the types at the last refresh
+        self._service_infos: dict[ServiceKey, ServiceInfo] = {}  # types of services at the last refresh
         self._service_order: tuple[
             ServiceKey, ...
-        ] = ()  # the services at the last refresh, in the master's order
-        self._check_after = 0.0  # loop time at which the next known service's type is checked
-        self._unchecked: list[ServiceKey] = []  # services whose types are still to be checked in this round
+        ] = ()  # services at the last refresh, in the master's order
+        self._check_after = 0.0  # loop time at which to check the type of the next known service
+        self._unchecked: list[ServiceKey] = []  # services whose types have not been checked in this round
         self._service_types = NodeQueries(
             self._service_type,
             ErrorReporter(_log, "the query for a service's type"),
@@ -267,7 +267,7 @@ class SharedGraph:
         )
 
     def now(self) -> int:
-        """Return the time for messages, in nanoseconds: ``clock``'s time if it is set, else the node's."""
+        """Return the time for messages in nanoseconds: from ``clock`` if it is set, otherwise the node's time."""
         if self._clock:
             return self._clock()
         now = self.node.now()
@@ -286,7 +286,7 @@ class SharedGraph:
     # --- graph
 
     def watch(self, listener: GraphListener) -> None:
-        """Call ``listener`` with each graph change. The first change passed to the first listener is the whole graph."""
+        """Call ``listener`` with each change of the graph. The first change that the first listener gets is the whole graph."""
         self._listeners.append(listener)
         if self._watching is None:
             self.snapshot = Snapshot()
@@ -295,7 +295,7 @@ class SharedGraph:
         self._refresh_soon.set()
 
     def unwatch(self, listener: GraphListener) -> None:
-        """Stop calling ``listener``. Without listeners, the graph is not polled."""
+        """Stop calling ``listener``. The graph is not polled without listeners."""
         with contextlib.suppress(ValueError):
             self._listeners.remove(listener)
         if not self._listeners and self._watching:
@@ -303,12 +303,12 @@ class SharedGraph:
             self._watching = None
 
     def refresh_soon(self) -> None:
-        """Refresh the graph soon, because something in it has changed."""
+        """Schedule a refresh of the graph, because something has changed."""
         self._refresh_soon.set()
 
     async def look(self) -> None:
-        """Refresh the graph and report changes. Raise MasterUnreachableError or RpcError if the master's call fails."""
-        # Run one refresh at a time, so that an earlier refresh does not replace a later snapshot.
+        """Refresh the graph and report changes. Raise MasterUnreachableError or RpcError if a call to the master fails."""
+        # Run one refresh at a time, so that an older snapshot does not replace a newer one.
         async with self._looking:
             found = await fetch(self.node.call_master)
             await self._look_up_services(found)
@@ -330,7 +330,7 @@ class SharedGraph:
         pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
-        # Check the task: before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the event.
+        # Check the task, because asyncio.wait_for may lose a cancellation that coincides with the event before Python 3.12.
         task = asyncio.current_task()
         while self._watching is task:
             self._refresh_soon.clear()
@@ -351,17 +351,17 @@ class SharedGraph:
                 await asyncio.wait_for(self._refresh_soon.wait(), pause)
 
     def service_info(self, service: str) -> ServiceInfo | None:
-        """Return a service's type, or None if it is unknown or not installed."""
+        """Return the type of a service, or None if it is unknown or not installed."""
         return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
 
     async def _look_up_services(self, found: Snapshot) -> None:
-        """Query the nodes of new services for the services' types, because the master does not store them."""
+        """Query the nodes of new services for the types, because the master does not store them."""
         wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
         self._check_known_services(dict(wanted))
         await self._service_types.look(wanted, _QUERY_SECONDS)
 
     def _check_known_services(self, wanted: dict[ServiceKey, None]) -> None:
-        """Query again the types that may have changed: between two refreshes, a node can offer a service again with another type.
+        """Query types that may have changed: since the last refresh, a node may have offered a service again with another type.
 
         The master then moves the service to the end of its list, which reveals the change unless the service was already last.
         Therefore one service is also checked every few seconds, in turn.
@@ -376,11 +376,11 @@ class SharedGraph:
         self._check_after = now + CHECK_SECONDS
         self._unchecked = [key for key in self._unchecked if key in wanted] or [*wanted]
         if self._unchecked:
-            # Check the last service in the master's list first: the list reveals changes of all others.
+            # Check the service last in the master's list first, because the list reveals changes of all others.
             self._service_types.refresh(self._unchecked.pop())
 
     def check_service(self, service: str) -> None:
-        """Query a service's type again, because a call shows that it has changed."""
+        """Query the type of a service again, because a call has shown that it changed."""
         self._service_types.refresh((service, self.snapshot.services.get(service, ())))
 
     async def _service_type(self, key: ServiceKey) -> ServiceInfo:
@@ -389,14 +389,14 @@ class SharedGraph:
     # --- topics
 
     def subscribe(self, topic: str, listener: TopicListener) -> None:
-        """Call ``listener`` with each message of a topic, and immediately with the last messages of latched publishers."""
+        """Call ``listener`` with each message on a topic, and immediately with the last message of each latched publisher."""
         shared = self.topics.get(topic)
         if shared is None:
             shared = self.topics[topic] = SharedTopic(self, topic)
         shared.add(listener)
 
     def unsubscribe(self, topic: str, listener: TopicListener) -> None:
-        """Stop calling ``listener``; unsubscribe from the topic when its last listener is removed."""
+        """Stop calling ``listener``. Unsubscribe from the topic when its last listener has been removed."""
         shared = self.topics.get(topic)
         if shared:
             shared.remove(listener)
@@ -405,13 +405,13 @@ class SharedGraph:
 
     async def _end_topic(self, shared: SharedTopic) -> None:
         if shared.is_wanted:
-            return  # a new listener has been added in the meantime
+            return  # a new listener has been added meanwhile
         await shared.close()
         if not shared.is_wanted and self.topics.get(shared.topic) is shared:
             del self.topics[shared.topic]
 
     def advertise(self, topic: str, type_: InterfaceType, *, latch: bool = False) -> Publication:
-        """Advertise a topic.
+        """Advertise a topic; return a handle for publishing on it.
 
         Raise BridgeError if clients may not publish it, or if it is already published with another type.
         """
@@ -432,18 +432,18 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def subscribed_own(self, topic: str) -> None:
-        """Let the messages of this node's publisher wait for this node's own subscription, which was just created."""
+        """Delay messages of this node's publisher until this node's own, new subscription is connected."""
         shared = self.publishers.get(topic)
         if shared:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))
 
     async def _join(self, topic: str, shared: _SharedPublisher) -> None:
-        """Wait until the subscribers that the master listed, and this node's own subscription, are connected."""
+        """Wait until the subscribers known to the master and this node's own subscription are connected."""
         await shared.publisher.wait_for_expected()
         await self._join_own(topic)
 
     async def _join_own(self, topic: str, before: asyncio.Task[None] | None = None) -> None:
-        """Wait for ``before``, then until this node's own subscription is connected."""
+        """Wait for the task ``before``, then until this node's own subscription is connected."""
         if before:
             await asyncio.wait([before])
         own = self.topics.get(topic)
@@ -451,7 +451,7 @@ class SharedGraph:
             await own.wait_for_publisher(self.node.name)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Unadvertise a topic after the last client that publishes it has left."""
+        """Record that a client has stopped publishing a topic. Unadvertise the topic if it was the last one."""
         shared.clients -= 1
         if not shared.clients and self.publishers.get(topic) is shared:
             del self.publishers[topic]
@@ -461,7 +461,7 @@ class SharedGraph:
     # --- services
 
     async def call(self, service: str, md5sum: str, request: bytes) -> bytes:
-        """Call a service; return the response's bytes.
+        """Call a service; return the serialized response.
 
         Raise ServiceException if the call fails, or BridgeError if clients may not call the service.
         """
@@ -475,7 +475,7 @@ class SharedGraph:
             raise
 
     def spawn(self, work: Coroutine[object, object, object]) -> asyncio.Task[None]:
-        """Run a coroutine as a task until :meth:`close`; log its exception."""
+        """Run a coroutine as a task until :meth:`close`; log any exception."""
 
         async def guarded() -> None:
             try:
@@ -488,6 +488,6 @@ class SharedGraph:
         task = asyncio.ensure_future(guarded())
         self.tasks.add(task)
         task.add_done_callback(self.tasks.discard)
-        # A task that is cancelled before its first step has not started its coroutine, so close the coroutine.
+        # If the task is cancelled before its first step, the coroutine was never started and must be closed.
         task.add_done_callback(lambda _: work.close())
         return task

@@ -24,27 +24,27 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 4_000_000  # maximum number of values in one JSON string; decoded as numbers, they take 160 MB
-# maximum number of strings in one JSON string, including field names; they take 150 MB
+_MAX_VALUES = 4_000_000  # maximum number of values in a JSON string; if they are numbers, they take 160 MB
+# maximum number of strings in a JSON string, including field names, which take 150 MB
 _MAX_STRINGS = 2_000_000
-# maximum number of lists and objects in one JSON string; they take 100 to 240 MB
+# maximum number of lists and objects in a JSON string, which take 100 to 240 MB
 _MAX_COLLECTIONS = 1_000_000
-# maximum characters in any string that is parsed on the event loop; parsing takes at most 2 ms
+# maximum length of any JSON string parsed on the event loop, which takes at most 2 ms
 MAX_QUICK_CHARACTERS = 64 * 1024
-# Maximum characters in a string with few values, such as a base64 image, that is parsed on the event loop
+# maximum length of a JSON string with few values, such as a base64 image, parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
-PIECE_NUMBERS = 32 * 1024  # maximum number of characters, all numbers, to parse per call
+PIECE_NUMBERS = 32 * 1024  # maximum length of a sequence of numbers parsed per call, in characters
 
-_PIECE_VALUES = 1000  # maximum number of list values to encode per call; 1000 floats take 1 ms
-_PIECE_CHARACTERS = 64 * 1024  # maximum number of characters of a string to encode per call
+_PIECE_VALUES = 1000  # maximum number of list values encoded per call; 1000 floats take 1 ms
+_PIECE_CHARACTERS = 64 * 1024  # maximum number of a string's characters encoded per call
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
 
 
 _HEAD_SIZE = sys.getsizeof("\u0100") - 2 * 2
-"""Size in bytes of a non-ASCII str, without its characters and the terminating character."""
+"""Size in bytes of an empty non-ASCII str, without the terminating character."""
 
 _BEYOND_LATIN = re.compile(rb"[\xc4-\xff]")
 _BEYOND_BMP = re.compile(rb"[\xf0-\xff]")
@@ -52,7 +52,7 @@ _CONTINUATIONS = bytes(range(0x80, 0xC0))
 
 
 def size_in_memory(data: bytes | bytearray) -> int:
-    """Return the memory, in bytes, of the str that UTF-8 data decodes to.
+    """Return the memory in bytes that the str decoded from UTF-8 data takes.
 
     If one character is wide, every character takes two or four bytes.
     """
@@ -65,22 +65,22 @@ def size_in_memory(data: bytes | bytearray) -> int:
 
 
 def width_of(text: str) -> int:
-    """Return the number of bytes per character (1, 2 or 4) that Python uses for a str in memory."""
+    """Return how many bytes (1, 2 or 4) Python uses per character of a str in memory."""
     if text.isascii():
         return 1
     if len(text) == 1:
-        # Do not use sys.getsizeof() of a single-character string: since Python 3.12 it includes the string's UTF-8 copy.
+        # sys.getsizeof() is unusable for a single character, because since Python 3.12 it includes a UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
-    # In longer strings, the UTF-8 copy is also counted, so the result is at worst too large.
+    # For longer strings, it also includes the UTF-8 copy, if there is one, so the result may be too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 
 
 def is_quick_text(text: str) -> bool:
-    """Return whether a string can be parsed in a few milliseconds."""
+    """Return whether parsing a string takes only a few milliseconds."""
     if len(text) <= MAX_QUICK_CHARACTERS:
         return True
-    # Brackets and commas in strings count as well. This is harmless, because a large base64 string contains none.
+    # This also counts brackets and commas within strings, which is harmless: a large base64 string contains none.
     return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
 
 
@@ -95,7 +95,7 @@ def load_json(
 
 
 def load_json_in_pieces(text: str) -> object:
-    """Like :func:`load_json`, but without holding the GIL for long.
+    """Parse JSON like :func:`load_json`, but without holding the GIL for long.
 
     Use it in a thread alongside the event loop.
     """
@@ -105,7 +105,7 @@ def load_json_in_pieces(text: str) -> object:
 
 
 def _check_counts(text: str, max_values: int, max_collections: int) -> None:
-    """Raise ValueError if JSON text has too many values. Brackets and commas inside strings count, too."""
+    """Raise ValueError if a JSON string has too many values. Brackets and commas within strings also count."""
     for marks, most in ((",", max_values), ("[{", max_collections)):
         if len(text) > most and sum(map(text.count, marks)) > most:
             raise ValueError(f"more than {most} values")
@@ -114,7 +114,7 @@ def _check_counts(text: str, max_values: int, max_collections: int) -> None:
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
-    """The standard library's pure-Python decoder, except that long arrays of numbers use the C parser. Lets other threads run."""
+    """Python's own decoder, in pure Python so that other threads can run; parses long arrays of numbers in C."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,7 +123,7 @@ class _PiecewiseDecoder(json.JSONDecoder):
 
 
 def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object, int]]) -> tuple[object, int]:
-    """Parse the array that follows an opening bracket; return the array and its end index.
+    """Parse an array after its opening bracket; return the array, and the index of its end.
 
     Raise JSONDecodeError or StopIteration if it is invalid.
     """
@@ -137,7 +137,7 @@ def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object,
         mark = _MARKS.search(text, at, at + PIECE_NUMBERS)
         if mark and mark[0] == "]":
             return values + _numbers(text, at, mark.start()), mark.end()
-        # Parse numbers up to the next value that is not a number, or up to the end of the piece.
+        # Parse numbers up to the next value of another type, or up to the end of the piece.
         comma = text.rfind(",", at, mark.start() if mark else at + PIECE_NUMBERS)
         if comma >= 0:
             values += _numbers(text, at, comma)
@@ -165,7 +165,7 @@ def _skip_space(text: str, at: int) -> int:
 
 
 def _numbers(text: str, start: int, end: int) -> list[object]:
-    """Parse the values in a part of an array. Raise JSONDecodeError if they are invalid or if there are none."""
+    """Parse the values in a part of an array. Raise JSONDecodeError if there are none or one is invalid."""
     found: list[object] = json.loads(f"[{text[start:end]}]")
     if not found:
         raise json.JSONDecodeError("Expecting value", text, start)
@@ -181,7 +181,7 @@ def dump_json(value: object) -> str:
 
 
 def dump_json_in_pieces(value: object) -> str:
-    """Like :func:`dump_json`, but without holding the GIL for long. For use in a thread alongside the event loop.
+    """Encode JSON like :func:`dump_json`, but without holding the GIL for long. For use in a thread beside the event loop.
 
     Dictionary keys must be strings.
     """
@@ -189,7 +189,7 @@ def dump_json_in_pieces(value: object) -> str:
 
 
 def _pieces(value: object) -> Iterator[str]:
-    """Yield the JSON of a value in parts."""
+    """Yield the pieces of a value's JSON."""
     if isinstance(value, dict):
         mark = "{"
         for name, each in value.items():
@@ -199,7 +199,7 @@ def _pieces(value: object) -> Iterator[str]:
         yield "}" if value else "{}"
     elif isinstance(value, list):
         yield "["
-        # Check only the first element, because all elements of a message's array have the same type.
+        # Check only the first element, because the elements of a message's array all have the same type.
         is_nested = bool(value) and isinstance(value[0], dict | list | str)
         yield from _nested_elements(value) if is_nested else _numbers_of(value)
         yield "]"
@@ -213,13 +213,13 @@ def _pieces(value: object) -> Iterator[str]:
 
 
 def _numbers_of(values: list[object]) -> Iterator[str]:
-    """Yield the JSON of a list's elements (numbers or null), with the commas between them."""
+    """Yield the JSON of a list's elements, which are numbers or null, with the commas between them."""
     for at in range(0, len(values), _PIECE_VALUES):
         yield ("," if at else "") + dump_json(values[at : at + _PIECE_VALUES])[1:-1]
 
 
 def _nested_elements(values: list[object]) -> Iterator[str]:
-    """Yield the JSON of dictionaries, lists and strings in a list; one call encodes many small elements."""
+    """Yield the JSON of the dictionaries, lists and strings in a list. Small elements are encoded in batches."""
     mark, batch, size = "", list[object](), 0
     for each in values:
         of_each = _size(each)
@@ -238,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return the cost of encoding a value, where 1 is the cost of a number. Stop counting early if the value is large."""
+    """Return the cost of encoding a value, in numbers. Stop counting when it is certain that the value is large."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

@@ -18,13 +18,13 @@ __all__ = ["access_of", "address_of", "globs", "number", "private_parameters", "
 _T = TypeVar("_T", str, int, bool)
 
 _OFF = (None, False, 0, "", "None")
-"""Parameter values that mean "off"."""
+"""Parameter values that mean that a feature is off."""
 
 
 async def private_parameters(
     node: Node, without_effect: Iterable[str] = (), given: Mapping[str, object] = MappingProxyType({})
 ) -> dict[str, object]:
-    """Return a node's private parameters, including the arguments ``given``.
+    """Return a node's private parameters, overridden by ``given``.
 
     Warn about each parameter in ``without_effect`` that is set.
     """
@@ -37,7 +37,7 @@ async def private_parameters(
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
-    """Return a parameter of type ``kind``. Raise BridgeError if it has a different type."""
+    """Return a parameter. Raise BridgeError if its type is not ``kind``."""
     found = private.get(name, default)
     if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")
@@ -45,7 +45,7 @@ def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T)
 
 
 def number(private: Mapping[str, object], name: str, default: float) -> float:
-    """Return a numeric parameter. Raise BridgeError if it is not a number."""
+    """Return a parameter as a number. Raise BridgeError if it is not one."""
     found = private.get(name, default)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a number")
@@ -53,7 +53,7 @@ def number(private: Mapping[str, object], name: str, default: float) -> float:
 
 
 def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> list[str]:
-    """Return a parameter that is a list of strings. Raise BridgeError if it is not one."""
+    """Return a parameter as a list of strings. Raise BridgeError if it is not one."""
     found = private.get(name, default)
     if not isinstance(found, list | tuple) or not all(isinstance(each, str) for each in found):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a list of strings")
@@ -61,7 +61,7 @@ def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> l
 
 
 def globs(private: Mapping[str, object], name: str) -> list[str]:
-    """Return globs, given in one of the formats that rosbridge accepts: a list, or a string such as "['/tf', '/odom*']".
+    """Return the globs in a parameter, in either of rosbridge's formats: a list, or a string such as "['/tf', '/odom*']".
 
     An empty list allows all names.
     """
@@ -72,14 +72,14 @@ def globs(private: Mapping[str, object], name: str) -> list[str]:
 
 
 def address_of(private: Mapping[str, object]) -> str:
-    """Return the address to listen on. Raise BridgeError if the parameter is invalid."""
+    """Return the address to bind. Raise BridgeError if the parameter is invalid."""
     return value(private, "address", str, "") or "127.0.0.1"
 
 
 def access_of(
     private: Mapping[str, object], environ: Mapping[str, str], origins: Iterable[str] = ()
 ) -> Access:
-    """Return the access rules, with the tokens from the environment.
+    """Return the access rules, with tokens from the environment.
 
     If other machines may connect and the environment has no tokens, use this user's stored tokens. Raise BridgeError if a
     parameter is invalid or the tokens cannot be stored.

@@ -23,7 +23,7 @@ _MAX_RATE = 100.0
 
 
 class PlayerPlayback:
-    """Adapts a player to the interface for clients of the Foxglove protocol."""
+    """Lets clients of the Foxglove protocol control a player."""
 
     def __init__(self, player: Player, span: tuple[int, int]) -> None:
         self.range = span
@@ -32,11 +32,11 @@ class PlayerPlayback:
         self._did_seek = False
 
     def now(self) -> int:
-        """Return the bag's current time, which messages use as their timestamp."""
+        """Return the time in the bag, in nanoseconds, with which messages are stamped."""
         return self._player.state().time
 
     def state(self) -> PlaybackState:
-        """Return the player's state, with the id of the request that it answers. An id is returned only once."""
+        """Return the player's state. The first call after a request includes the request's id."""
         state = self._player.state()
         status = (
             PlaybackStatus.ENDED
@@ -50,7 +50,7 @@ class PlayerPlayback:
         return answer
 
     def control(self, control: PlaybackControl) -> None:
-        """Execute a client's playback request."""
+        """Execute a playback request from a client."""
         self._request_id, self._did_seek = control.request_id, control.seek is not None
         self._player.control(
             is_paused=control.command is PlaybackCommand.PAUSE,
@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """Context manager that runs a player's bridge on a separate loop. Raise BridgeError if the bridge cannot start."""
+    """Context manager that runs a bridge for a player on a separate loop. Raise BridgeError if the bridge cannot start."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)
@@ -101,7 +101,7 @@ class PlayerBridge:
         self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), reporter))
 
     async def _tick(self, bridge: Bridge) -> None:
-        """Send the bag's time. Also send the player's state if a client or a key has changed it."""
+        """Send the time in the bag and, if a client or a key has changed it, the player's state."""
         shown: tuple[object, ...] = ()
         time = -1
         while True:

@@ -37,16 +37,14 @@ LIBRARIES = (
     "websockets",
     "segno",
     "cbor2",
-)  # packages that the dashboard and the bridges need; minirospy depends on them
+)  # packages that the dashboard and the bridges need, and on which minirospy depends
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Minimum size, in bytes, of freed blocks that are returned to the system. It exceeds the size of camera images, because
-mapping memory for each image is slow.
-"""
+"""Minimum size in bytes of freed blocks to return to the system, larger than camera images, for which that is too slow."""
 
 
 class Part(Protocol):
-    """A bridge or services that a node runs."""
+    """A bridge, or a set of services, that a node runs."""
 
     async def start(self) -> None: ...
 
@@ -55,12 +53,12 @@ class Part(Protocol):
 
 _P = TypeVar("_P", bound=Part)
 
-# GIL switch interval in seconds; with Python's default of 5 ms, the loop could wait that long after each call
+# GIL switch interval in seconds: with Python's default of 5 ms, the loop could wait that long after each call
 _SWITCH_SECONDS = 0.0005
 
 
 def prefer_the_loop() -> None:
-    """Reduce the event loop's delays caused by the garbage collector and by threads that process large messages.
+    """Reduce delays of the event loop by the garbage collector and by threads that process large messages.
 
     Call this after all imports: otherwise the collector visits the imported objects, which takes 15 ms each time a client
     sends thousands of arrays.
@@ -81,7 +79,7 @@ def require_libraries() -> None:
 
 
 def run_program(name: str, module: str) -> int:
-    """Run a node's program from ``module``, which imports the libraries. Return its exit status, 1 if a library is missing."""
+    """Run the program in ``module``, which imports the libraries. Return its exit status, or 1 if a library is missing."""
 
     def body() -> int:
         require_libraries()
@@ -91,7 +89,7 @@ def run_program(name: str, module: str) -> int:
 
 
 def exit_status(name: str, body: Callable[[], int]) -> int:
-    """Return a program's exit status; if ``body`` raises MinirospyError, print the error in one line and return 1."""
+    """Run ``body``; return its exit status. If it raises MinirospyError, print the error on one line and return 1."""
     try:
         return body()
     except MinirospyError as error:
@@ -100,7 +98,7 @@ def exit_status(name: str, body: Callable[[], int]) -> int:
 
 
 def announce(bridge: Bridge, endpoint: str, text: str, scheme: str = "ws") -> None:
-    """Log an endpoint's URL, and whether it requires a token."""
+    """Log the URL of an endpoint, and whether it requires a token."""
     listener = bridge.listeners[endpoint]
     scheme += "s" if listener.is_encrypted else ""
     bridge.node.log.info("%s %s://%s:%d", text, scheme, listener.host, listener.port)
@@ -120,7 +118,7 @@ def run(
     registration_fault_lines: int = MAX_REGISTRATION_FAULTS,
     connect: Callable[[_P], Awaitable[None]] | None = None,
 ) -> int:
-    """Run a bridge on a node called ``name`` until it is shut down; return the exit status.
+    """Run a bridge on a node called ``name`` until the node shuts down; return the exit status.
 
     ``argv``: remappings, as a launch file passes them (None: the process's own arguments). ``start`` creates the bridge,
     ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time,
@@ -158,7 +156,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # If there is no master yet, cancel the wait for it; otherwise, shut down the node.
+        # If the node is still waiting for a master, cancel that; otherwise, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:
@@ -168,7 +166,7 @@ async def _run(
         number: signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
         for number in (*interrupt_signals(), signal.SIGTERM)
     }
-    # On Windows, Python handles a signal only when the loop next wakes up.
+    # On Windows, Python handles signals only when the loop wakes up, so wake it periodically.
     ticking = asyncio.ensure_future(_tick())
     bridge: _P | None = None
     try:
@@ -193,7 +191,7 @@ async def _run(
             raise
     finally:
         if bridge is not None:
-            await bridge.close()  # necessary if the node has not been started
+            await bridge.close()  # needed if the node was not started
         ticking.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -20,7 +20,7 @@ _NAME = "bridge-tokens.json"
 
 
 class Tokens(NamedTuple):
-    """The tokens: ``write`` lets a client publish, call services and set parameters; ``read`` gives read-only access."""
+    """The tokens of a user: ``write`` permits publishing, calling services and setting parameters, ``read`` only reading."""
 
     write: str
     read: str
@@ -40,12 +40,12 @@ def read_tokens(home: Path) -> Tokens | None:
 
 
 def _is_own(found: os.stat_result) -> bool:
-    """Return whether a file belongs to this user and is private. In a shared folder, another user may have created it."""
+    """Return whether a file belongs to this user and is private: others may create files in a shared folder."""
     return found.st_uid == os.geteuid() and not stat.S_IMODE(found.st_mode) & 0o077
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:
-    """Return the tokens in ROS_HOME. Create new ones if there are none, or if ``renews`` is set.
+    """Return the tokens in ROS_HOME. If there are none, or if ``renews`` is set, create new ones.
 
     Raise BridgeError if they cannot be stored.
     """

@@ -79,7 +79,7 @@ with open(__file__, "rb") as _source:
 """
 
 
-# Use the interpreter that has rospy, unless its path is too long or contains white space, which shebang lines do not allow.
+# Use the interpreter that has rospy, unless its path is too long or has white space, which shebang lines do not allow.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)
@@ -94,7 +94,7 @@ sys.path[0] = {folder!r}
 
 
 class Workspace(NamedTuple):
-    """The folders of a workspace."""
+    """The folders that belong to a workspace."""
 
     root: Path
     source: Path
@@ -104,7 +104,7 @@ class Workspace(NamedTuple):
 
     @classmethod
     def at(cls, root: Path) -> Workspace:
-        """Return the workspace rooted at ``root``, with the default folder layout."""
+        """Return the workspace with root folder ``root`` and the default folder layout."""
         return cls(root, *(root / name for name in ("src", "build", "devel", "install")))
 
 
@@ -119,7 +119,7 @@ def find_workspace(start: Path) -> Path:
         if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
             return folder
     for folder in (start, *start.parents):
-        # A folder such as ~ may have an unrelated src; its other subfolders do not belong to that workspace.
+        # A folder such as ~ may have an unrelated src folder; its other subfolders then do not belong to a workspace.
         is_inside = start == folder or start.is_relative_to(folder / "src")
         if is_inside and (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return folder
@@ -127,7 +127,7 @@ def find_workspace(start: Path) -> Path:
 
 
 def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list[Plan]:
-    """Return the build plans of all packages below a folder, in build order.
+    """Return the plans for all packages below a folder, in build order.
 
     ``variables`` are passed to read_plan; packages in CATKIN_BLACKLIST_PACKAGES are skipped. Raise BuildError if a
     package name is duplicated or dependencies form a cycle, or ManifestError or DefinitionError if a file is invalid.
@@ -150,7 +150,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Sort the plans topologically: each follows its build dependencies. Raise BuildError if there is a cycle."""
+    """Sort plans topologically, so that each follows its build dependencies. Raise BuildError if there is a cycle."""
     also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
     try:
         names = build_order({name: plan.manifest for name, plan in plans.items()}, also)
@@ -164,7 +164,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """The result of building a package.
+    """The result of building one package.
 
     ``made`` describes the generated parts, and is empty if nothing has changed. ``stand_ins`` lists the names of
     minirospy's programs and modules that replace compiled ones.
@@ -184,7 +184,7 @@ def build(
     chosen: Collection[str] | None = None,
     report: Callable[[Report], None] = lambda each: None,
 ) -> None:
-    """Build the ``chosen`` packages, or all, into the devel folder. Call ``report`` with each package's result.
+    """Build packages (``chosen``, or all) into the devel folder. Call ``report`` with the result of each.
 
     ``outside``: the packages in other workspaces and in minirospy. Raise BuildError if a package cannot be built, or
     DefinitionError if a definition is invalid.
@@ -198,7 +198,7 @@ def build(
 
 
 def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...]) -> SetUp:
-    """Return this minirospy installation's data for the setup files."""
+    """Return the data for the setup files, as they apply to this minirospy installation."""
     return SetUp(
         prefix=prefix,
         sources=sources,
@@ -212,11 +212,11 @@ def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...
 def write_set_up(
     prefix: Path, sources: tuple[Path, ...], environment: Mapping[str, str] = os.environ
 ) -> None:
-    """Write the setup files. Workspaces sourced in the environment become this workspace's parents.
+    """Write a workspace's setup files. The workspaces sourced in ``environment`` become its parents.
 
     If no workspace is sourced, the parents of the previous build remain.
     """
-    # If the workspace's own setup file is sourced, leave the workspace out of its own parents.
+    # A workspace is not its own parent, even if its setup file is sourced.
     own = {
         prefix,
         *(prefix.parent / name for name in ("devel", "install", "devel_isolated", "install_isolated")),
@@ -234,7 +234,7 @@ def write_set_up(
 
 
 class _Builder:
-    """Builds the packages of one workspace one by one."""
+    """Builds the packages of a workspace, one after the other."""
 
     def __init__(self, workspace: Workspace, plans: Sequence[Plan], outside: Packages) -> None:
         self._workspace = workspace
@@ -243,14 +243,14 @@ class _Builder:
         self._stamps = workspace.build / "minirospy"
         self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
-        # Generated code depends on the definitions, the CMakeLists.txt files, and the message compiler's own code.
+        # Generated code depends on the definitions, the CMakeLists.txt files, and the code of the message compiler.
         ours = Path(__file__).parents[1]
         compiler = [
             *(ours / "core" / "idl").glob("*.py"),
             *(ours / "ros" / "dynamic_reconfigure" / "dynamic_reconfigure").glob("*.py"),
         ]
         made_of = [path for plan in plans for path in (*plan.definitions, *_option_files(plan))]
-        # A package that is left out need not have a CMakeLists.txt.
+        # A skipped package need not have a CMakeLists.txt.
         made_of += [plan.cmake_lists for plan in plans if plan.cmake_lists.is_file()]
         self._key = _key([*made_of, *compiler])
 
@@ -296,14 +296,14 @@ class _Builder:
         return Report(plan, _counts(plan, setup), bool(changed), warnings, stand_ins.names())
 
     def remove_gone(self) -> None:
-        """Remove the outputs of packages that are no longer in the workspace."""
+        """Remove the build outputs of packages that are no longer in the workspace."""
         for stamp in self._stamps.glob("*.json"):
             if stamp.stem not in self._plans:
                 self._remove(_read_stamp(stamp).get("outputs", []))
                 stamp.unlink()
 
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
-        """Return a package's generated modules, as a dict from file to source text.
+        """Return the modules generated for a package, as a dict from file to source text.
 
         Raise DefinitionError if a definition is invalid, or BuildError if a type is missing.
         """
@@ -311,7 +311,7 @@ class _Builder:
         try:
             texts = compile_package(self._catalogue, plan.name)
         except DefinitionError as error:
-            # If a type contains itself, the error names the type: replace that name with the type's file.
+            # If a type contains itself, the error names the type, so replace the name with the type's file.
             files = {f"{plan.name}/{path.stem}": str(path) for path in plan.definitions}
             raise DefinitionError(files.get(error.file, error.file), error.line, error.text) from error
         modules = {folder / name: text for name, text in texts.items()}
@@ -320,7 +320,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of other workspaces' messages, which change if a parent workspace is rebuilt."""
+        """Return a fingerprint of the messages in other workspaces, which changes if one of those is rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -330,7 +330,7 @@ class _Builder:
         )
 
     def _finish(self, stamp: Path, outputs: Iterable[Path], outside: list[str]) -> None:
-        """Record the outputs; remove outputs of the previous build that are not generated any more."""
+        """Record the outputs, and remove outputs of the previous build that are no longer generated."""
         names = sorted(map(str, outputs))
         self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
         note = {
@@ -346,7 +346,7 @@ class _Builder:
             path = Path(name)
             path.unlink(missing_ok=True)
             for folder in path.parents:
-                # Also remove a folder that contains only Python's cache.
+                # A folder that contains only Python's cache is removed, too.
                 if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
                     break
                 for cached in folder.glob("__pycache__/*.pyc"):
@@ -358,7 +358,7 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Return warnings about the package's name, and about nonexistent packages in find_package()."""
+        """Return warnings about the package's name, and about find_package() for packages that do not exist."""
         warnings = [warning] if (warning := naming_warning(plan.name)) else []
         hidden = next((root / plan.name for root in built_in_roots() if package_name(root / plan.name)), None)
         if hidden and plan.name not in OF_THE_WORKSHOP and (hidden / "msg").is_dir() and not plan.definitions:
@@ -376,7 +376,7 @@ class _Builder:
         return tuple(warnings)
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
-        """Check that every type used in a package's definitions exists, in a package that CMakeLists.txt declares."""
+        """Check that each type in a package's definitions exists, and that CMakeLists.txt declares the type's package."""
         for name in plan.message_depends:
             if name not in self._folders:
                 raise BuildError(
@@ -425,7 +425,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages whose messages may be used, directly or indirectly, by the messages of ``names``."""
+        """Return the packages whose messages the messages of ``names`` may use, directly or indirectly."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -446,13 +446,13 @@ class _Builder:
 
 
 def _option_files(plan: Plan) -> set[Path]:
-    """Return a package's .cfg files and the modules next to them, which they may import."""
+    """Return a package's .cfg files, and the modules in the same folders, which they may import."""
     folders = {path.parent for path in plan.options}
     return {*plan.options, *(module for folder in folders for module in folder.glob("*.py"))}
 
 
 def _key(files: Iterable[Path]) -> str:
-    """Return a fingerprint of files: their names, modification times and sizes."""
+    """Return a fingerprint of files, made of their names, modification times and sizes."""
     import hashlib
 
     marks = []
@@ -471,7 +471,7 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 
 
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return the stub programs of the devel space as a dict from file to source; each runs a source folder's program.
+    """Return stub programs for the devel space, as {file: source}. Each runs a program in a source folder.
 
     These stubs put the programs from setup.py on PATH, and let real ROS run a program that is not executable itself.
     """
@@ -484,13 +484,13 @@ def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, 
 
 
 def _program(path: Path) -> str:
-    """Return the source text of a stub that runs the program ``path``."""
+    """Return the source of a stub that runs the program ``path``."""
     head = _PROGRAM.format(python=_SHEBANG, name=path.name, folder=str(path.parent))
     return head + _RELAY_RUN.format(file=str(path))
 
 
 def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]:
-    """Return the stubs that run minirospy's programs and modules in place of compiled ones.
+    """Return stubs that run minirospy's programs and modules in place of a package's compiled ones.
 
     The result is a dict from file below ``prefix`` to text.
     """
@@ -505,7 +505,7 @@ def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]
 
 
 def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return the stub modules of the devel space as a dict from file to source; each stub loads a source folder's module."""
+    """Return stub modules for the devel space, as {file: source}. Each loads a module in a source folder."""
     if setup is None:
         return {}
     modules = devel / DIST_PACKAGES
@@ -522,7 +522,7 @@ def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
 
 
 def _counts(plan: Plan, setup: PythonSetup | None) -> str:
-    """Return a summary of a package's contents, such as ``2 messages, 1 service, package foo``."""
+    """Summarize the contents of a package, as in ``2 messages, 1 service, package foo``."""
     words = []
     for suffix, word in _KINDS.items():
         count = sum(path.suffix == suffix for path in plan.definitions)
@@ -537,7 +537,7 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
 
 
 def _line_of(file: Path, name: str) -> int:
-    """Return the number of the first line in a file that contains a word, or 1 if there is none."""
+    """Return the number of the first line in a file that contains a word, or 1 if no line does."""
     word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
     for number, line in enumerate(read_definition(file).split("\n"), 1):
         if word.search(line.split("#", 1)[0]):

@@ -22,7 +22,7 @@ _RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
 def build_order(
     manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
 ) -> list[str]:
-    """Return the package names in topological order: each follows its build dependencies.
+    """Return the names of the packages in topological order, so that each follows its build dependencies.
 
     Among the packages whose dependencies are done, the alphabetically first one is next. A package's build dependencies
     are those that it needs to build and test, their run dependencies, and the packages that ``also`` lists for its name.
@@ -50,7 +50,7 @@ def build_order(
 
 
 def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
-    """Return a package's direct and indirect build dependencies, as a dict from each one to the package that depends on it."""
+    """Return a package's direct and indirect build dependencies, each mapped to the package that requires it."""
     found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
     waiting = list(found)
     for each in waiting:
@@ -62,7 +62,7 @@ def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str])
 
 
 def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[str, str]]) -> set[str]:
-    """Return the packages that export a message generator, with their build dependencies."""
+    """Return the packages that export a message generator, and the build dependencies of these packages."""
     waiting = {
         name
         for name, manifest in manifests.items()
@@ -77,14 +77,14 @@ def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[
 
 
 def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """Return the names in a cycle, each before its dependency, starting and ending with the alphabetically first name.
+    """Return the names in a cycle, each before a dependency of it. The alphabetically first name is both first and last.
 
     ``nodes`` is graphlib's cycle: each name before a package that depends on it, with the first name repeated at the end.
     """
     backwards: list[str] = []
     for needed, name in pairwise(nodes):
         backwards.append(needed)
-        # Add the packages between these two in the cycle; only run dependencies connect them.
+        # Add the packages between these two, which are connected only by run dependencies.
         between = routes[name][needed]
         while between != name:
             backwards.append(between)

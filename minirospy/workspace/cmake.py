@@ -34,14 +34,14 @@ _OPENERS = {end: name for name, end in _ENDS.items()}
 
 
 class Word(NamedTuple):
-    """An argument as written. A ``quoted`` argument remains one word, whatever it contains."""
+    """An argument as written in the file. If ``quoted``, it remains a single word, whatever it contains."""
 
     text: str
     quoted: bool = False
 
 
 class Statement(NamedTuple):
-    """A command: its name in lower case, its arguments, the line where it starts, and its body.
+    """A command: its name in lower case, its arguments, the line in which it starts, and its body.
 
     ``body`` contains the commands before the closing ``endif()`` or ``endforeach()``, including ``else()``.
     """
@@ -53,7 +53,7 @@ class Statement(NamedTuple):
 
 
 def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
-    """Parse a CMakeLists.txt; ``where`` is the file name to use in error messages.
+    """Parse a CMakeLists.txt. ``where`` is the file name for error messages.
 
     Raise BuildError if a quote, a bracket, an ``if`` or a loop is not closed.
     """
@@ -61,7 +61,7 @@ def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
 
 
 def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> dict[str, list[str]]:
-    """Group arguments by the preceding keyword. Arguments before the first keyword are under ``""``."""
+    """Group arguments by the keyword before them. Arguments before the first keyword have the key ``""``."""
     found: dict[str, list[str]] = {"": []}
     current = ""
     for word in arguments:
@@ -74,13 +74,13 @@ def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> d
 
 
 def _nested(commands: Iterator[Statement], where: str, opener: Statement | None) -> tuple[Statement, ...]:
-    """Return the commands up to the one that closes ``opener``, with nested bodies."""
+    """Return the commands up to the one that closes ``opener``. The bodies of blocks are nested."""
     statements: list[Statement] = []
     for statement in commands:
         if opener and statement.name == _ENDS[opener.name]:
             return tuple(statements)
         if statement.name in _OPENERS:
-            # If a block is open, report that it is not closed. Otherwise report a closing command without a block.
+            # Report the open block as unclosed; if there is none, report a closing command without a block.
             line, missing = (
                 (opener.line, _ENDS[opener.name]) if opener else (statement.line, _OPENERS[statement.name])
             )
@@ -132,7 +132,7 @@ def _commands(text: str, where: str) -> Iterator[Statement]:
 
 
 def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
-    """Return whether the bracket that opens here is closed later. If not, record that in ``unclosed``.
+    """Return whether the bracket that opens here is closed. If not, record that in ``unclosed``.
 
     Without the record, each of thousands of opening brackets would cause a search to the end of the file.
     """
@@ -143,7 +143,7 @@ def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
 
 
 def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
-    """Yield each token with its line number."""
+    """Yield each token with the number of its line."""
     position, line = 0, 1
     unclosed: set[str] = set()
     while position < len(text):
@@ -159,13 +159,13 @@ def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
 
 
 def _shown(text: str) -> str:
-    """Return the first words of a string, for an error message."""
+    """Return the first words of a text, for an error message."""
     return " ".join(text[:40].split())
 
 
 def _word(match: re.Match[str]) -> Word:
     if match["bracket"] is not None:
-        # A bracket argument contains no variable references: escape those that look like one.
+        # A bracket argument has no variable references, so escape text that looks like one.
         return Word(re.sub(r"([\\$])", r"\\\1", match["bracket"]), True)
     quoted = match["quoted"] is not None
     return Word(match["quoted"] if quoted else match["word"], quoted)

@@ -23,19 +23,19 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages look for. They are reported as found."""
+"""Optional packages that Python packages may require, and that are reported as found."""
 _ROS_2 = re.compile(
     r"(ament|rcl|rosidl)"
-)  # ROS 2 packages that a CMakeLists.txt for both ROS 1 and ROS 2 may look for
+)  # prefixes of ROS 2 packages, for a CMakeLists.txt that supports both ROS 1 and ROS 2
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
-_MAX_LOOPS = 100_000  # maximum iterations of a foreach() with RANGE
-# maximum depth of nested files and macros; anything deeper is a file that includes itself
+_MAX_LOOPS = 100_000  # maximum number of iterations of foreach() with RANGE
+# maximum nesting of files and macros; a file nested more deeply must include itself
 _MAX_DEPTH = 40
 
 
 class Command(NamedTuple):
-    """A command: its name in lower case, its arguments, and its location (line, file and folder)."""
+    """A command that is run: its name in lower case, its arguments, and its location (line, file and folder)."""
 
     name: str
     arguments: tuple[str, ...]
@@ -45,7 +45,7 @@ class Command(NamedTuple):
 
 
 class _Macro(NamedTuple):
-    """A macro or function defined by ``macro()`` or ``function()``, and its file."""
+    """A macro or function, as defined by ``macro()`` or ``function()``, and the file that defines it."""
 
     has_scope: bool
     parameters: list[str]
@@ -54,13 +54,13 @@ class _Macro(NamedTuple):
 
 
 class _Leave(Exception):
-    """Raised by ``return()``, ``break()`` or ``continue()``."""
+    """Raised to run ``return()``, ``break()`` or ``continue()``."""
 
 
 def run_cmake(
     file: Path, variables: Mapping[str, str], own: Collection[str] = frozenset()
 ) -> Iterator[Command]:
-    """Yield the commands that a CMakeLists.txt runs.
+    """Run a CMakeLists.txt; yield its commands.
 
     ``variables`` holds the initial variables; a key ``ENV{X}`` sets an environment variable. Raise BuildError if the file
     does not exist, a bracket is not closed, or a condition or pattern cannot be parsed.
@@ -79,7 +79,7 @@ def _escaped(text: str) -> str:
 
 
 def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
-    """Substitute a macro's arguments into its commands as text, as CMake does before it expands variables."""
+    """Replace the arguments of a macro in its commands as text, as CMake does before it expands variables."""
 
     def value(match: re.Match[str]) -> str:
         given = None if match[1] else values.get(match[2])
@@ -94,7 +94,7 @@ def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> 
 
 
 class _Run:
-    """Runs the commands of one folder.
+    """Runs the commands of a folder.
 
     ``_known``: the variables of the current scope; ``_raised``: those that ``PARENT_SCOPE`` sets in the enclosing scope;
     ``_macros``: the defined macros and functions; ``_own``: names that macros and functions cannot redefine.
@@ -141,7 +141,7 @@ class _Run:
         }
 
     def file(self, file: Path) -> Iterator[Command]:
-        """Yield a file's commands. Raise BuildError if the file cannot be read."""
+        """Yield the commands of a file. Raise BuildError if it cannot be read."""
         try:
             text = file.read_text(encoding="utf-8", errors="replace")
         except OSError as error:
@@ -157,7 +157,7 @@ class _Run:
 
     @contextmanager
     def _nested(self, statements: Sequence[Statement], file: Path) -> Iterator[None]:
-        """Enter one nesting level for the context. Raise BuildError if there are too many levels."""
+        """Count a nesting level for the duration of the context. Raise BuildError if there are too many."""
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
@@ -182,7 +182,7 @@ class _Run:
                 yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
 
     def _arguments(self, words: Sequence[Word]) -> list[str]:
-        """Return words with their variables expanded. A list in an unquoted word expands to several words."""
+        """Expand the variables in words. A list in an unquoted word becomes several words."""
         found: list[str] = []
         for word in words:
             text = self._filled(word.text)
@@ -190,7 +190,7 @@ class _Run:
         return found
 
     def _filled(self, text: str) -> str:
-        """Expand variables, innermost first, as in ``${${NAME}_SOURCE_DIR}``."""
+        """Expand variables, starting with the innermost, as in ``${${NAME}_SOURCE_DIR}``."""
 
         def value(match: re.Match[str]) -> str:
             name = f"ENV{{{match[2]}}}" if match[1] else match[2]
@@ -236,7 +236,7 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """Return the items of a loop: words, the numbers of a ``RANGE``, or ``IN LISTS`` with variables and ``ITEMS``.
+        """Return the items of a loop: the words, the numbers of a ``RANGE``, or for ``IN``, the ``LISTS`` and ``ITEMS``.
 
         Raise ValueError if a ``RANGE`` has more than ``_MAX_LOOPS`` numbers.
         """
@@ -263,7 +263,7 @@ class _Run:
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
-        """Yield the commands of a function or macro.
+        """Yield the commands that a function or macro runs.
 
         A function gets a new scope; a macro's arguments are substituted as text.
         """
@@ -276,7 +276,7 @@ class _Run:
             "ARGC": str(len(arguments)),
         }
         if not macro.has_scope:
-            # A macro's commands run as if they were in the caller, so return() leaves the caller.
+            # The commands of a macro run as part of the caller, so return() leaves the caller.
             with self._nested(macro.body, macro.file):
                 yield from self._run(_substituted(macro.body, values), macro.file)
             return
@@ -287,7 +287,7 @@ class _Run:
         self._known, self._raised = {**around, **self._raised}, raised
 
     def _include(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        """Yield the commands of an included file in the package; skip CMake's own modules."""
+        """Yield the commands of an included file in the package. Skip modules of CMake itself."""
         for name in arguments[:1]:
             folders = [self._folder, *self._module_folders()]
             paths = [folder / f"{name}{ending}" for folder in folders for ending in ("", ".cmake")]
@@ -305,7 +305,7 @@ class _Run:
             break
 
     def _find(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        """Yield find_package() itself, then the commands of the package's own module ``FindNAME.cmake``."""
+        """Yield find_package() itself, then the commands in the package's ``FindNAME.cmake``, if there is one."""
         self._find_package(arguments)
         yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
         for name in arguments[:1]:
@@ -390,20 +390,20 @@ class _Run:
         found: list[Path] = []
         for pattern in words:
             path = self._folder / pattern
-            # Match below the package's folder: the folder's own path may contain characters that are special in a pattern.
+            # Match below the package's folder, because the path of the folder may contain special characters of patterns.
             top = self._folder if path.is_relative_to(self._folder) else Path(path.anchor)
             *folders, last = path.relative_to(top).parts or ("*",)
             if arguments[0] == "GLOB":
                 found += top.glob("/".join([*folders, last]))
             elif top == self._folder:
-                # Search only inside the package: if a variable is unset, `${UNSET}/*` would search the whole disk.
+                # Search only within the package: with an unset variable, `${UNSET}/*` would search the whole disk.
                 found += filter(Path.is_file, top.glob("/".join([*folders, "**", last])))
 
         names = [path.relative_to(base) if base and path.is_relative_to(base) else path for path in found]
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
     def _find_package(self, arguments: list[str]) -> None:
-        """Report packages as found, because the build itself reports missing packages.
+        """Report packages as found, because the build itself reports those that are missing.
 
         Optional packages (QUIET) and those of ROS 2 are not found.
         If a library is reported as missing, a file often ends with return(), before the commands that matter to Python.
@@ -415,12 +415,12 @@ class _Run:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "1"))
 
     def _handle_standard_args(self, arguments: list[str]) -> None:
-        """Report a library found by ``FindNAME.cmake`` or pkg-config as found: nothing is compiled with it."""
+        """Report a library, sought by ``FindNAME.cmake`` or pkg-config, as found, because nothing is compiled with it."""
         for name in arguments[:1]:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "TRUE"))
 
     def _check(self, arguments: list[str]) -> None:
-        """Run ``check_include_files(header NAME)``. Report the header as found: nothing is compiled with it."""
+        """Run ``check_include_files(header NAME)``. Report the header as found, because nothing is compiled with it."""
         for name in arguments[1:2]:
             self._known[name] = "1"
 
@@ -471,7 +471,7 @@ def _version(text: str) -> list[int]:
 
 _COMPARE: dict[str, Callable[[str, str], bool]] = {
     "MATCHES": lambda left, right: bool(re.search(right, left)),
-    # Generated files do not exist yet. Return true for them, as CMake does, so that they are generated.
+    # Generated files do not exist yet. As in CMake, return true for them, so that they are generated.
     "IS_NEWER_THAN": lambda left, right: True,
     **{
         prefix + name: lambda left, right, read=read, test=test: test(read(left), read(right))  # type: ignore[misc]
@@ -491,7 +491,7 @@ _OPERATORS = {Word(text) for text in (*_COMPARE, "IN_LIST", "AND", "OR", ")")}
 
 
 class _Condition:
-    """Parses and evaluates a condition.
+    """Parses and evaluates the condition of an if() or while().
 
     The grammar is ``any := one {AND one | OR one}``, ``one := NOT one | ( any ) | TEST word | word [COMPARE word]``.
     """
@@ -506,7 +506,7 @@ class _Condition:
             "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
             "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
             "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
-            # Only targets for generated code exist. Commands and policies are CMake's own, so they exist.
+            # Targets exist only for generated code. Commands and policies are always CMake's own, so they exist.
             "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
             "COMMAND": lambda name: True,
             "POLICY": lambda name: True,
@@ -519,7 +519,7 @@ class _Condition:
         return result
 
     def _any(self) -> bool:
-        # CMake evaluates AND and OR from left to right, with equal precedence.
+        # CMake evaluates AND and OR from left to right, without precedence.
         result = self._one()
         while self._next < len(self._words):
             if self._took("AND"):
@@ -553,16 +553,16 @@ class _Condition:
             return self._value(left) in _items(self._known.get(self._word().text, ""))
 
         if _TRUE.match(left.text) or _FALSE.match(left.text):
-            # A constant stands for itself, even if a variable has the same name.
+            # A constant has its own value, even if there is a variable of the same name.
             return bool(_TRUE.match(left.text))
         return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
 
     def _value(self, word: Word) -> str:
-        """Return the value of the variable named by an unquoted word, or the word itself."""
+        """Return the value of the variable that an unquoted word names, otherwise the word itself."""
         return word.text if word.quoted else self._known.get(word.text, word.text)
 
     def _word(self) -> Word:
-        # An empty variable expands to no word at all, as in `if(${UNSET} STREQUAL "x")`.
+        # An empty variable expands to nothing, not even an empty word: `if(${UNSET} STREQUAL "x")`.
         if self._next >= len(self._words) or self._words[self._next] in _OPERATORS:
             return Word("", True)
         self._next += 1

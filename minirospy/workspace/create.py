@@ -33,7 +33,7 @@ class NewPackage(NamedTuple):
 
 
 def create_package(parent: Path, package: NewPackage) -> list[Path]:
-    """Create the package's folder below ``parent``; return the created files and folders.
+    """Create a package's folder below ``parent``; return the files and folders created.
 
     Raise UsageError if the description is invalid or the package exists.
     """
@@ -63,7 +63,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
     if package.meta:
         return made
     if "roscpp" in package.depends:
-        # This folder is for the package's C++ headers.
+        # The folder for the package's C++ headers.
         made.append(folder / "include" / package.name)
     made.append(folder / "src")
 
@@ -73,7 +73,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
 
 
 def _person(tag: str, person: str, user: str) -> str:
-    """Return the XML tag for a person, given as a name or as ``Name <mail>``. A maintainer must have an address."""
+    """Return the XML tag of a person, given as a name or as ``Name <mail>``. A maintainer must have an e-mail address."""
     match = re.match(r"^(.*?)\s*<([^<>]+)>$", person)
     name, mail = (match[1], match[2]) if match else (person, "")
     if not mail and tag == "maintainer":

@@ -24,7 +24,7 @@ _RUNNING = ("run_depend", "exec_depend", "depend")
 
 
 class CircularDependencyError(MinirospyError):
-    """Packages depend on each other. ``circle`` lists them, starting and ending with the same package."""
+    """Raised if packages depend on each other. ``circle`` lists them, and ends with its first package."""
 
     def __init__(self, circle: tuple[str, ...]) -> None:
         super().__init__(circle)
@@ -37,7 +37,7 @@ class CircularDependencyError(MinirospyError):
 
 
 class Dependencies:
-    """The dependencies between packages. Each manifest is read once, on first use.
+    """The dependencies between packages. Each manifest is read once, when it is first needed.
 
     Metapackages are left out, as in rospack; ``with_metapackages`` includes them and leaves out packages for rosbuild, as in
     rosstack. When all manifests are searched, ``complain`` is called with the error for each manifest that cannot be read.
@@ -59,12 +59,12 @@ class Dependencies:
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """Return the folders that are searched for packages."""
+        """Return the folders in which packages are searched."""
         return self._packages.roots
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, sorted, each with the folders that contain a package of that name.
+        """Return all packages, sorted by name, each with all folders that contain a package of this name.
 
         The first folder is the one used.
         """
@@ -76,7 +76,7 @@ class Dependencies:
 
     @cached_property
     def metapackages(self) -> dict[str, Path]:
-        """Return a dict from metapackage to folder."""
+        """Return the folders of the metapackages, keyed by name."""
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
@@ -92,7 +92,7 @@ class Dependencies:
         Raise NotFoundError if it does not exist, ManifestError if it is invalid.
         """
         if name not in self._manifests:
-            # Imported here, because `rospack find` does not need it.
+            # Import this here, because `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
 
             self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
@@ -100,11 +100,11 @@ class Dependencies:
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """Return (package, dependency) for the packages that do not exist and that a manifest.xml read so far names."""
+        """Return (package, dependency) for each nonexistent dependency in the manifest.xml files that have been read."""
         return list(self._missing)
 
     def direct(self, name: str) -> list[str]:
-        """Return a package's direct dependencies, sorted by the kind of tag. Raise the same exceptions as :meth:`manifest`."""
+        """Return a package's direct dependencies, ordered by the kind of tag. Raise the same exceptions as :meth:`manifest`."""
         wanted = self._wanted(name)
         if self.manifest(name).is_rosbuild:
             absent = (each for each in wanted if each != name and each not in self.copies)
@@ -120,7 +120,7 @@ class Dependencies:
         return [each for each in wanted if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies in topological order: each follows its own dependencies.
+        """Return a package's direct and indirect dependencies in topological order, so that each follows its own.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """
@@ -138,14 +138,14 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield (dependency, depth), each dependency after the package that depends on it. Depths start at 0.
+        """Yield (dependency, depth) for each dependency, after the package that has it. Depths start at 0.
 
         A dependency of several packages is yielded several times. Raise the same exceptions as :meth:`all`.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Return every dependency path from the package ``name`` to ``target``. Raise the same exceptions as :meth:`all`."""
+        """Return all dependency paths from the package ``name`` to ``target``. Raise the same exceptions as :meth:`all`."""
         found = []
         path: list[str] = [name]
         for depth, each in self.tree(name):
@@ -155,12 +155,12 @@ class Dependencies:
         return found
 
     def dependents(self, name: str) -> list[str]:
-        """Return the packages that directly depend on this one, sorted. Raise NotFoundError if it does not exist."""
+        """Return the packages that depend on this one directly, sorted. Raise NotFoundError if it does not exist."""
         self.folder(name)
         return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
 
     def all_dependents(self, name: str) -> list[str]:
-        """Return the packages that directly or indirectly depend on this one, sorted.
+        """Return the packages that depend on this one directly or indirectly, sorted.
 
         Raise NotFoundError if it does not exist.
         """
@@ -174,7 +174,7 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Return all of a package's dependencies, of every kind, sorted; for rosbuild, only its rosdep keys.
+        """Return the names of all dependencies of a package, of any kind, sorted; for rosbuild, only rosdep keys.
 
         Raise the same exceptions as :meth:`manifest`.
         """
@@ -205,7 +205,7 @@ class Dependencies:
 def is_metapackage(folder: Path) -> bool:
     """Return whether the package in a folder is a metapackage."""
     try:
-        # Do not parse a file that does not contain this tag at all.
+        # Parse only a file that contains this tag.
         if b"<metapackage" not in (folder / "package.xml").read_bytes():
             return False
         from minirospy.workspace.manifest import read_manifest

@@ -16,7 +16,7 @@ from minirospy.workspace.plan import Download, Plan
 
 __all__ = ["download"]
 
-_TIMEOUT = 30.0  # maximum number of seconds without any data from the server
+_TIMEOUT = 30.0  # maximum seconds without receiving any data from the server
 
 
 def download(plan: Plan, wanted: Iterable[Download]) -> None:
@@ -44,7 +44,7 @@ def download(plan: Plan, wanted: Iterable[Download]) -> None:
 
 
 def _is_right(wanted: Download) -> bool:
-    """Return whether the file exists and, if an MD5 sum is given, matches it."""
+    """Return whether a file exists and, if its MD5 sum is given, has this sum."""
     if not wanted.path.is_file():
         return False
     if not wanted.md5:
@@ -57,8 +57,8 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file; it appears under its own name only once it is complete."""
-    # Imported here: the import takes as long as a build without downloads.
+    """Download a file under a temporary name, and rename it when it is complete."""
+    # Import these modules here, because importing them takes as long as a whole build without downloads.
     from http.client import HTTPException
     from urllib.request import Request, urlopen
 

@@ -19,7 +19,7 @@ _QT = "{command}, clone {repository} into a workspace's src, `catkin_make`, and 
 
 _NAVIGATION = "localization and navigation, in C++"
 CPP = {
-    # Navigation and maps.
+    # navigation and maps
     "amcl": _NAVIGATION,
     "base_local_planner": _NAVIGATION,
     "carrot_planner": _NAVIGATION,
@@ -48,7 +48,7 @@ CPP = {
     "slam_toolbox": "SLAM, in C++",
     "teb_local_planner": _NAVIGATION,
     "voxel_grid": _NAVIGATION,
-    # Arms and controllers.
+    # arms and controllers
     "moveit_commander": "MoveIt, in C++",
     "moveit_core": "MoveIt, in C++",
     "moveit_fake_controller_manager": "MoveIt, in C++",
@@ -63,7 +63,7 @@ CPP = {
     "trac_ik_kinematics_plugin": "inverse kinematics, in C++",
     # Simulators.
     "stage_ros": "the simulator Stage, in C++",
-    # Images, clouds, sensors.
+    # images, point clouds and sensors
     "apriltag_ros": "a detector in images, in C++",
     "aruco_ros": "a detector in images, in C++",
     "ar_track_alvar": "a detector in images, in C++",
@@ -96,7 +96,7 @@ CPP = {
     "fiducial_slam": "SLAM, in C++",
     "velodyne_driver": "a laser scanner's driver, in C++",
     "velodyne_pointcloud": "a laser scanner's driver, in C++",
-    # Inputs, plug-ins, tools.
+    # inputs, plug-ins and tools
     "imu_complementary_filter": "filters of an IMU, in C++",
     "imu_filter_madgwick": "filters of an IMU, in C++",
     "interactive_marker_twist_server": "interactive markers, in C++",
@@ -176,7 +176,7 @@ SUBMODULES = {
 
 
 def advice(name: str) -> str:
-    """Describe a ROS 1 package or module and its replacement in one line; return "" if it is unknown."""
+    """Return one line about a ROS 1 package or module that minirospy lacks, and its replacement; "" if it is unknown."""
     if name in CPP:
         what = f"{CPP[name]}, which minirospy does not have"
         there = _RUN_IT_THERE.format(conda=name.replace("_", "-"))

@@ -12,7 +12,7 @@ _OVERLAY = Path(minirospy.__file__).parent / "overlay"
 
 
 def hiding_files(folder: Path) -> list[Path]:
-    """Return the Python files and packages in ``folder`` that have the name of one of minirospy's modules, sorted.
+    """Return the Python files and packages in ``folder`` that hide one of minirospy's modules by their name, sorted.
 
     Python searches the program's folder, or the current folder, before all others.
     """
@@ -28,7 +28,7 @@ def hiding_files(folder: Path) -> list[Path]:
 
 
 def warning_of_hiding_file(program: Path) -> str:
-    """Return a warning if a file next to a program hides a module, else an empty string."""
+    """Return a warning if a file beside a program hides one of minirospy's modules, otherwise ""."""
     if program.suffix != ".py":
         return ""
     for file in hiding_files(program.parent):

@@ -21,7 +21,7 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy the files that a package installs; return the number of files copied.
+    """Copy the files that a package installs; return their number.
 
     Raise BuildError if a folder exists where a file belongs.
     """
@@ -37,7 +37,7 @@ def install(workspace: Workspace, plan: Plan) -> int:
 
 
 def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path, bool]]]:
-    """Yield (target, (source, whether to make it executable)) for each file to install."""
+    """Yield (target, (source, whether to make the target executable)) for each file to install."""
     share = workspace.install / "share" / plan.name
     modules = workspace.install / DIST_PACKAGES
     yield share / "package.xml", (plan.folder / "package.xml", False)
@@ -78,11 +78,11 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         if source.is_file():
             yield place / (rule.rename or source.name), (source, rule.program)
             continue
-        # As in CMake, install the contents of the folder if there is a trailing slash, otherwise the folder itself.
+        # As in CMake, a trailing slash means the contents of a folder, no slash means the folder itself.
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
             below = path.relative_to(source)
-            # A pattern may exclude a file by its own name or by that of a parent folder.
+            # A pattern may exclude a file by its own name or by the name of a folder above it.
             parents = [f"/{each.as_posix()}" for each in (below, *below.parents)]
             left_out = any(re.search(pattern, parent) for pattern in rule.excluded for parent in parents)
             if not left_out and (not rule.chosen or any(re.search(each, parents[0]) for each in rule.chosen)):
@@ -90,7 +90,7 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
 
 
 def _is_compiled(workspace: Workspace, name: str) -> bool:
-    """Return whether CMake or a compiler would generate the file.
+    """Return whether a missing file is one that CMake or a compiler would generate.
 
     ``name`` is then a generator expression, or a file that is missing in the build or devel folder.
     """

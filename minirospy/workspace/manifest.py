@@ -38,14 +38,14 @@ __all__ = [
 ]
 
 VARIABLES: Mapping[str, str] = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
-"""The default values of variables in conditions."""
+"""Default values of the variables in conditions."""
 
 _CONVENTIONAL_NAME = re.compile(r"^[a-z][a-z0-9_-]*$")
 PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
 
 
 class Kind(Enum):
-    """The purpose of a dependency. The value is the tag of formats 2 and 3."""
+    """What a dependency is needed for. The value is the tag in formats 2 and 3."""
 
     BUILD = "build_depend"
     BUILD_EXPORT = "build_export_depend"
@@ -57,7 +57,7 @@ class Kind(Enum):
 
 
 class Dependency(NamedTuple):
-    """A dependency on a package or a rosdep key. ``tag`` is its tag in the file (``run_depend``); ``line`` is the tag's line."""
+    """A dependency on a package or rosdep key. ``tag`` is the tag used in the file (``run_depend``), ``line`` its line."""
 
     name: str
     kinds: frozenset[Kind]
@@ -73,14 +73,14 @@ class Person(NamedTuple):
 
 
 class Url(NamedTuple):
-    """A URL of the package; ``type`` is website, bugtracker or repository."""
+    """A URL of the package. ``type`` is website, bugtracker or repository."""
 
     url: str
     type: str
 
 
 class Export(NamedTuple):
-    """A tag inside ``<export>``, for other tools."""
+    """A tag within ``<export>``, intended for other tools."""
 
     tag: str
     attributes: Mapping[str, str]
@@ -89,14 +89,14 @@ class Export(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """An error that catkin would report, and its line."""
+    """An error that catkin would report, with its line."""
 
     line: int
     text: str
 
 
 class Manifest(NamedTuple):
-    """A package.xml, or a manifest.xml for rosbuild, whose ``format`` is 0.
+    """A package.xml or, with ``format`` 0, a manifest.xml for rosbuild.
 
     Conditions have been evaluated: elements whose condition is false are left out.
 
@@ -117,7 +117,7 @@ class Manifest(NamedTuple):
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
-        """Return the names of all dependencies, or of those of the given kinds, without duplicates, in file order."""
+        """Return the names of all dependencies, or those of the given kinds, in file order without duplicates."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
@@ -137,7 +137,7 @@ class Manifest(NamedTuple):
 
 
 def naming_warning(name: str) -> str | None:
-    """Return catkin's warning if a package name does not follow the conventions (REP 144), else None."""
+    """Return catkin's warning about a package name that violates the conventions (REP 144), otherwise None."""
     if _CONVENTIONAL_NAME.match(name):
         return None
     return (
@@ -147,7 +147,7 @@ def naming_warning(name: str) -> str | None:
 
 
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Read the manifest from a file, or from a folder's package.xml. ``variables`` override VARIABLES in conditions.
+    """Read a manifest: a file, or the package.xml in a folder. ``variables`` override VARIABLES in conditions.
 
     A folder without a package.xml may have a manifest.xml, for rosbuild.
 
@@ -165,7 +165,7 @@ def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Man
 
 
 def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Parse a manifest. ``path`` is used in error messages. Raise the same exceptions as :func:`read_manifest`."""
+    """Parse a manifest. ``path`` is for error messages. Raise the same exceptions as :func:`read_manifest`."""
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
@@ -187,7 +187,7 @@ def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
 
 
 class _Element:
-    """A tag, with its line, its children, and all text inside it, including the children's."""
+    """A tag: its line, its children, and all text within it, including that of the children."""
 
     __slots__ = ("attributes", "children", "line", "parts", "tag")
 
@@ -200,7 +200,7 @@ class _Element:
 
     @property
     def text(self) -> str:
-        """Return the text, with each run of white space replaced by a single space."""
+        """Return the text. Any sequence of white space is replaced by a single space."""
         return " ".join("".join(self.parts).split())
 
 
@@ -231,7 +231,7 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     except XmlError as error:
         raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
-        # If Python does not know the encoding, the error is a LookupError without a code.
+        # For an encoding that Python does not know, the error is a LookupError, which has no code.
         code = getattr(error, "code", None)
         why = expat.ErrorString(code) if code is not None else str(error)
         raise ManifestError(str(path), parser.CurrentLineNumber, f"not XML: {why}") from error
@@ -239,7 +239,7 @@ def _parse(text: bytes | str, path: Path) -> _Element:
 
 
 def _rosbuild_manifest(root: _Element, path: Path) -> Manifest:
-    """Return the parts of a manifest.xml. Source: http://wiki.ros.org/Manifest."""
+    """Convert the root tag of a manifest.xml. Source: http://wiki.ros.org/Manifest."""
     dependencies = []
     for element in root.children:
         attribute = {"depend": "package", "rosdep": "name"}.get(element.tag)
@@ -287,7 +287,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Formats 2 and 3 do not have this tag, but packages use it there, too.
+    # Formats 2 and 3 do not define this tag, but packages use it in them, too.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -312,11 +312,11 @@ _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
-"""Addresses that catkin accepts. catkin exits with an error for all others."""
+"""E-mail addresses that catkin accepts; it exits with an error for others."""
 
 
 class _Reader:
-    """Reads <package>'s children, tag by tag, into the parts of a manifest."""
+    """Converts the children of <package>, tag by tag, to the fields of a Manifest."""
 
     def __init__(self, root: _Element, path: Path, variables: Mapping[str, str]) -> None:
         self._path = path
@@ -442,7 +442,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
-# maximum number of nested brackets in a condition; the parser recurses three times per level
+# maximum nesting of brackets in a condition; the parser recurses three times per level
 _MAX_BRACKETS = 50
 _COMPARE = {
     "==": str.__eq__,
@@ -455,7 +455,7 @@ _COMPARE = {
 
 
 class _Condition:
-    """Parses and evaluates a condition.
+    """Parses and evaluates the condition of a dependency.
 
     The grammar is ``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``.
     """

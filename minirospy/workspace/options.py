@@ -21,7 +21,7 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 
 
 def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """Run a package's .cfg files. Return the files written to devel, and warnings.
+    """Run the .cfg files of a package. Return the files written to devel, and the warnings.
 
     Raise BuildError if a .cfg file fails.
     """
@@ -50,7 +50,7 @@ def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
 
 
 def _run(file: Path, plan: Plan, folders: list[Path], modules: Path) -> None:
-    """Run a .cfg file with minirospy's generator, and with the messages and modules of the file's workspace."""
+    """Run a .cfg file with minirospy's generator, which can import the messages and modules of the workspace."""
     base = next(root / "dynamic_reconfigure" for root in built_in_roots())
     path = [str(_OVERLAY), str(modules), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(

@@ -37,7 +37,7 @@ DIST_PACKAGES = "lib/python3/dist-packages"
 """The folder for Python packages in a devel or install folder, as in ROS on Debian and Ubuntu."""
 
 _MANIFEST = "package.xml"
-ROSBUILD_MANIFEST = "manifest.xml"  # of rosbuild packages; rosbuild preceded catkin
+ROSBUILD_MANIFEST = "manifest.xml"  # manifest of packages for rosbuild, the predecessor of catkin
 _IGNORE = {"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"}
 _NO_SUBFOLDERS = "rospack_nosubdirs"
 _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
@@ -47,12 +47,12 @@ _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
 OF_THE_WORKSHOP = frozenset(
     ["rpi_msgs", "rpi_feros", "rpi_feros_bringup"]
-)  # packages that workshop participants write themselves
-_SHOWN = 12  # maximum number of programs to list in an error: about one line
+)  # packages that participants of the workshop write themselves
+_SHOWN = 12  # maximum number of programs listed in an error, about one line
 
 
 class NotExecutableError(MinirospyError):
-    """A file with that name exists, but it is neither Python nor executable."""
+    """Raised if a file with the program's name exists, but is neither Python nor executable."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -63,20 +63,20 @@ class NotExecutableError(MinirospyError):
 
 
 class Packages:
-    """The packages that are visible in an environment.
+    """The packages that are visible in an environment, as found through ROS_PACKAGE_PATH.
 
     A package's name is taken from its package.xml. A package for rosbuild has the name of its folder.
     """
 
     def __init__(self, environment: Environment | None = None) -> None:
-        # Packages do not depend on ROS_MASTER_URI or the machine's name, so skip both look-ups.
+        # Packages depend on neither ROS_MASTER_URI nor the host name, so do not look these up.
         environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
 
     @classmethod
     def below(cls, *roots: Path) -> Packages:
-        """Return only the packages in the folders ``roots``."""
+        """Return only the packages below the folders ``roots``."""
         packages = cls.__new__(cls)
         packages.roots = roots
         packages._crawls = {}
@@ -85,7 +85,7 @@ class Packages:
     def find(self, name: str) -> Path:
         """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
         for root in self.roots:
-            # Before searching, try the folder that has the package's name.
+            # Try the folder with the package's name first, which avoids a search.
             if package_name(root / name) == name:
                 return root / name
             for folder in self._crawled(root):
@@ -105,11 +105,11 @@ class Packages:
         return sorted(self.folders())
 
     def folders(self) -> dict[str, Path]:
-        """Return a dict from package to folder."""
+        """Return the folders of all packages, keyed by name."""
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, each with the folders that contain a package of that name. The first folder is the one used."""
+        """Return all folders of each package, keyed by name. The first one is used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -122,7 +122,7 @@ class Packages:
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """Return the command that runs a package's program. If several programs have this name, use the first.
+        """Return the command that runs a program in a package; if several have this name, the first one.
 
         Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError, with similar
         names, if there is none, or NotExecutableError if the file cannot be run.
@@ -130,7 +130,7 @@ class Packages:
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return the commands for a program's name or path in a package. Several folders may contain a program of that name.
+        """Return the commands for a program in a package, given its name or path: several folders may contain such a program.
 
         Raise the same exceptions as :meth:`find_executable`.
         """
@@ -143,7 +143,7 @@ class Packages:
         candidates = [path for path in candidates if path.is_file()]
         runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
-            # Ignore the copies of scripts that a build puts into devel.
+            # Ignore copies of scripts that a build has put into devel.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
             return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
@@ -157,7 +157,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Find a package's launch file, by its path in the package or by its name.
+        """Find a launch file in a package, given its name or its path in the package.
 
         Raise NotFoundError if there is none.
         """
@@ -173,7 +173,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if another package with the same name, hidden by the one found, has the file; otherwise return ""."""
+        """Return a hint if a hidden package with the same name as ``found`` has the file, otherwise ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -186,7 +186,7 @@ class Packages:
 
 
 class CrawlTime(NamedTuple):
-    """The time to search a folder and its subfolders, in seconds, and whether the folder contains a package."""
+    """The time in seconds that searching a folder and its subfolders takes, and whether it contains a package."""
 
     folder: Path
     seconds: float
@@ -194,7 +194,7 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """Measure the time to search a folder and each of its subfolders, except for packages."""
+    """Measure how long searching a folder and each of its subfolders takes, excluding packages."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
@@ -225,7 +225,7 @@ def built_in_roots() -> tuple[Path, ...]:
 
 
 def crawl(root: Path, *, rosbuild: bool = False) -> Iterator[Path]:
-    """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages.
+    """Yield the folders of packages at or below ``root``. Like rospack, skip hidden folders, and folders inside packages.
 
     ``rosbuild``: also yield rosbuild packages, which have a manifest.xml and no package.xml; catkin ignores them.
     """
@@ -242,7 +242,7 @@ def crawl(root: Path, *, rosbuild: bool = False) -> Iterator[Path]:
 
 
 def _entries(folder: Path) -> list[os.DirEntry[str]]:
-    """Return a folder's entries, sorted, or [] if a marker file marks the folder as ignored."""
+    """Return the sorted entries of a folder, or [] if a marker file says to ignore the folder."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
@@ -251,7 +251,7 @@ def _entries(folder: Path) -> list[os.DirEntry[str]]:
 
 
 def _subfolders(entries: list[os.DirEntry[str]]) -> list[Path]:
-    """Return the subfolders that may contain packages, or [] if a marker file says that they contain none."""
+    """Return the subfolders that may contain packages, or [] if a marker file says that there are none."""
     if any(entry.name == _NO_SUBFOLDERS for entry in entries):
         return []
     return [
@@ -262,26 +262,26 @@ def _subfolders(entries: list[os.DirEntry[str]]) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to one of its parent folders; following it would make the search infinite."""
+    """Return whether an entry is a link to a folder above it, which would make the search endless."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in a folder's package.xml (default: the folder's name), or None if the folder is not a package.
+    """Return the package name of a folder (from package.xml, or the folder's name), or None if it is not a package.
 
     A folder with a manifest.xml is a package for rosbuild, which has the name of its folder.
     """
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
-        # Unlike Path.is_file(), this does not raise an error for a name that is too long.
+        # Unlike Path.is_file(), os.path.isfile() raises no error if the name is too long.
         return folder.name if os.path.isfile(folder / ROSBUILD_MANIFEST) else None
     match = _NAME.search(text)
     return match[1].decode("utf-8", "replace") if match else folder.name
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield a package's files: first those in its own folder, then programs from builds and installations.
+    """Yield the files of a package: those in its folder, then programs from builds and installations.
 
     The Python modules in minirospy's own packages are skipped, because `rosrun` does not run them.
     """
@@ -301,7 +301,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # The programs of a package in /usr/share/PKG are in /usr/lib/PKG, whichever workspace is sourced.
+        # If a package is in /usr/share/PKG, its programs are in /usr/lib/PKG, whichever workspace is sourced.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -323,7 +323,7 @@ def _is_program(path: Path) -> bool:
 
 
 def is_python(path: Path) -> bool:
-    """Return whether a file is a Python program, judging by its name or its first line."""
+    """Return whether a file is a Python program, according to its name or first line."""
     if path.suffix == ".py":
         return True
     with path.open("rb") as file:
@@ -331,7 +331,7 @@ def is_python(path: Path) -> bool:
 
 
 def why_ros_refuses(program: Path) -> str | None:
-    """Return the reason why ROS 1 would not run a Python program that minirospy runs, with a remedy, or None if ROS 1 would.
+    """Return why ROS 1, unlike minirospy, would not run a Python program, and a remedy; None if ROS 1 would run it.
 
     ROS 1 lets the system choose the interpreter, which requires execute permission and a shebang line.
     """
@@ -349,7 +349,7 @@ def why_ros_refuses(program: Path) -> str | None:
 
 
 def with_prefix(prefix: list[str], command: list[str]) -> list[str]:
-    """Return a program's command with a prefix such as ``gdb --args`` or ``python3 -m pdb``.
+    """Insert a prefix, such as ``gdb --args`` or ``python3 -m pdb``, into a program's command.
 
     If the prefix is a Python command, it is followed by only the program's file, as in ROS 1.
     """
@@ -369,7 +369,7 @@ _PROGRAM = re.compile(r"\badd_executable\s*\(\s*([^\s)]+)")
 
 
 def is_compiled_program(folder: Path, name: str) -> bool:
-    """Return whether the CMakeLists.txt in ``folder`` has a C++ program of this name, which catkin_make skips."""
+    """Return whether CMakeLists.txt in ``folder`` defines a C++ program of this name, which catkin_make skips."""
     try:
         text = (folder / "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -64,12 +64,12 @@ _BEFORE = {
 }
 """Commands that catkin requires before certain other commands. The order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
-"""Packages that define CMake's message macros; at least one must be found before the macros are used."""
-_CMAKE_VERSION = "3.25.1"  # CMake's version, as seen by CMakeLists.txt files
+"""Packages that define CMake's message macros. CMake must find one of them before the macros are used."""
+_CMAKE_VERSION = "3.25.1"  # CMake version that CMakeLists.txt files see
 
 
 class Install(NamedTuple):
-    """Files to install. ``sources`` are below the package's folder; ``destination`` is below the install folder.
+    """Files to install. ``sources`` are paths in the package's folder; ``destination`` is a path in the install folder.
 
     For a folder with a trailing slash, its contents are copied; otherwise the folder itself. ``chosen`` and
     ``excluded`` are regular expressions for paths to include (none: all) and to exclude. ``program``: make the files
@@ -98,7 +98,7 @@ class Install(NamedTuple):
 
 
 class Test(NamedTuple):
-    """A test: a file or folder below the package, and its runner, arguments and working folder."""
+    """A test: a file or folder in the package, and its runner, arguments and working folder."""
 
     path: str
     kind: str
@@ -154,13 +154,13 @@ class Plan(NamedTuple):
 
 
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
-    """Return the plan of the package in ``folder``. ``variables`` are set by ``catkin_make -DNAME=VALUE``.
+    """Return the plan for the package in ``folder``. ``variables`` are those given by ``catkin_make -DNAME=VALUE``.
 
     Raise ManifestError if package.xml is invalid, or BuildError if CMakeLists.txt is invalid.
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # Raise an error: the package's name becomes part of the names of folders and modules.
+        # Reject the name, because it becomes part of the names of folders and modules.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
@@ -195,7 +195,7 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
 
 
 class _Collector:
-    """Builds a plan, command by command."""
+    """Builds a plan from commands, one after the other."""
 
     def __init__(self, folder: Path, manifest: Manifest, build_folder: str) -> None:
         self._folder = folder
@@ -238,7 +238,7 @@ class _Collector:
         return self._readers.keys()
 
     def read(self, command: Command) -> None:
-        """Record a command's effect on the plan. Raise BuildError if the command is invalid."""
+        """Add a command's effect to the plan. Raise BuildError if the command is invalid."""
         reader = self._readers.get(command.name)
         if reader is None:
             return
@@ -249,7 +249,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn about an error that real catkin reports and this build ignores."""
+        """Warn about an error that real catkin would report, but which does not affect this build."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
@@ -257,7 +257,7 @@ class _Collector:
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
-        """Warn about definitions that no macro names, and about a missing generate_messages()."""
+        """Warn about definitions that are not in any macro, and about a missing generate_messages()."""
         for macro, kind in _FOLDERS.items():
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
@@ -274,11 +274,11 @@ class _Collector:
                 "generate_messages() is missing: messages, services and actions are added, but not generated"
             )
             self.warn(first.file, first.line, text)
-            # Continue without the definitions, as catkin does.
+            # As in catkin, continue without the definitions.
             self._definitions.clear()
 
     def plan(self) -> Plan:
-        """Return the plan that results from all commands."""
+        """Return the plan that all commands together define."""
         return Plan(
             name=self._manifest.name,
             folder=self._folder,
@@ -298,14 +298,14 @@ class _Collector:
         )
 
     def _path(self, command: Command, name: str) -> str:
-        """Return a path from a command's arguments, relative to the package."""
+        """Return the path in a command's argument, relative to the package's folder."""
         if command.folder == self._folder:
             return name
         path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
         return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        # Skip the commands in a subfolder, which may belong to another project.
+        # Skip the commands of subfolders, which may belong to other projects.
         if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
             raise _error(
                 command,
@@ -365,7 +365,7 @@ class _Collector:
         if self._message_depends is not None:
             self._refused(command, "generate_messages() must be called once")
         given = keyword_arguments(command.arguments, frozenset(["DEPENDENCIES", "LANGS"]))
-        # genmsg accepts the package's own name, which adds nothing.
+        # genmsg accepts the package's own name, which has no effect.
         names = given.get("DEPENDENCIES", [])
         self._message_depends = [name for name in names if name != self._manifest.name]
         if not self._definitions:
@@ -384,7 +384,7 @@ class _Collector:
             self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
-        """Check that package.xml declares the packages in CATKIN_DEPENDS as both build and run dependencies."""
+        """Check that package.xml declares each package in CATKIN_DEPENDS as a build and a run dependency."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
 
@@ -422,7 +422,7 @@ class _Collector:
             self._properties.setdefault(target, {}).update(zip(words[::2], words[1::2], strict=False))
 
     def _file_name(self, target: str) -> str:
-        """Return the name of a compiled target's output file, without the default prefix ``lib`` and without extensions."""
+        """Return the file name of a compiled target, without extensions and the default prefix ``lib``."""
         properties = self._properties.get(target, {})
         return properties.get("PREFIX", "") + properties.get("OUTPUT_NAME", target)
 
@@ -468,7 +468,7 @@ class _Collector:
         place = given.get("DESTINATION", [])
         kind = next((kind for kind in ("PROGRAMS", "FILES", "DIRECTORY") if kind in command.arguments), None)
         if kind is None or not place:
-            # TARGETS, CODE, SCRIPT and EXPORT are for compiled targets.
+            # TARGETS, CODE, SCRIPT and EXPORT only concern compiled targets.
             return
         chosen, excluded = _patterns(command.arguments)
         self._installs.append(
@@ -490,7 +490,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return two tuples of patterns (``PATTERN x``, ``REGEX x``): those to include, and those marked with ``EXCLUDE``."""
+    """Return the patterns (``PATTERN x``, ``REGEX x``) of files to include, and those marked with ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):
@@ -502,7 +502,7 @@ def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def _variables(folder: Path, name: str) -> dict[str, str]:
-    """Return the variables that catkin and CMake predefine. Destinations are relative to the install folder."""
+    """Return the variables predefined by catkin and CMake. Destinations are relative to the install folder."""
     source = folder.as_posix()
 
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}

@@ -54,17 +54,17 @@ _OTHERS = """if ($args[0] -ne '--extend') {
 
 
 def quoted(path: object) -> str:
-    """Quote a path as one PowerShell word, in single quotes; double any quote inside."""
+    """Return a path as a single PowerShell word in single quotes, doubling any quote in the path."""
     return "'" + str(path).replace("'", "''") + "'"
 
 
 def assignment(name: str, value: str) -> str:
-    """Return the statement that sets an environment variable."""
+    """Return a statement that sets an environment variable."""
     return f"$env:{name} = {quoted(value)}"
 
 
 def powershell_base(base: Mapping[str, str], programs: Path) -> str:
-    """Return code that sets ROS's variables if they are unset, and adds minirospy's commands to the path."""
+    """Return code that sets ROS's variables unless they are set, and adds minirospy's commands to PATH."""
     variables = "".join(
         f"if (-not $env:{name}) {{ $env:{name} = {quoted(value)} }}\n" for name, value in base.items()
     )
@@ -83,7 +83,7 @@ def powershell_setup(
     *,
     extends: bool,
 ) -> str:
-    """Return the text of setup.ps1 or, with ``extends``, of local_setup.ps1, which leaves the sourced workspaces active."""
+    """Return setup.ps1 or, with ``extends``, local_setup.ps1, which keeps the sourced workspaces."""
     chain = "".join(f"    _minirospy_workspace {quoted(parent)} put\n" for parent in reversed(parents))
     others = "" if extends else _OTHERS.replace("@CHAIN@", chain)
     last = "".join(f"_minirospy_last ROS_PACKAGE_PATH {quoted(folder)}\n" for folder in share)

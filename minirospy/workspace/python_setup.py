@@ -29,7 +29,7 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """The contents of a setup.py: dicts from name to folder or file for top-level packages and modules, and script files.
+    """The contents of a setup.py: top-level packages and modules, as dicts from name to path, and scripts.
 
     ``warnings`` has a line for each package whose folder is missing, which catkin ignores.
     """
@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError, with the line, if the file fails."""
+    """Return the packages and scripts in ``folder``/setup.py. Raise BuildError, with the line, if running the file fails."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
@@ -70,7 +70,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
-    """Return the ``setup()`` argument ``name``, or an empty ``kind`` if it is missing or None.
+    """Return the argument ``name`` of ``setup()``; if it is missing or None, return an empty ``kind``.
 
     Raise BuildError if its type is wrong.
     """
@@ -88,7 +88,7 @@ def _names(file: Path, given: Mapping[str, object], name: str) -> list[str]:
 
 
 def _run(file: Path) -> Mapping[str, object]:
-    """Run a setup.py and return the arguments passed to ``setup()``. Raise BuildError if it fails."""
+    """Run a setup.py; return the arguments that it passes to ``setup()``. Raise BuildError if it fails."""
     given: dict[str, object] = {}
     why = ""
 
@@ -116,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute. An attribute that was not set is an empty class."""
+    """A module that has every attribute. Attributes that were not set are empty classes."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
@@ -125,7 +125,7 @@ class _StandIn(types.ModuleType):
 
 
 class _Finder(MetaPathFinder, Loader):
-    """Finds stand-ins for the build tools that a setup.py imports."""
+    """Provides stand-ins for the build tools that a setup.py may import."""
 
     def __init__(self, contents: Mapping[str, Mapping[str, object]]) -> None:
         self._contents = contents
@@ -150,7 +150,7 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
-    """Replace the modules that a setup.py imports, so that ``setup`` records its arguments. Change to the file's folder.
+    """Replace modules that a setup.py imports, so that ``setup`` records its arguments. Change to the file's folder.
 
     As in a script, modules in the file's folder can be imported; they are unloaded afterwards.
     """
@@ -191,7 +191,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # Set the variables that catkin's build sets: without a sourced setup.bash, none of them is set.
+    # Set variables that catkin's build sets, because they are unset if no setup.bash has been sourced.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield
@@ -209,7 +209,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
 
 
 def _metadata(folder: Path) -> dict[str, str]:
-    """Return a package's metadata from package.xml, with the names of ``setup()``'s arguments as keys."""
+    """Return the metadata in a package's package.xml, keyed by the names of ``setup()``'s arguments."""
     manifest = read_manifest(folder)
     return {
         "name": manifest.name,

@@ -21,7 +21,7 @@ SHELLS = ("bash", "zsh", "sh", "fish", "powershell", "bat")
 
 
 class SetUp(NamedTuple):
-    """The data for the setup files.
+    """The data that the setup files contain.
 
     ``prefix``: the devel or install folder; ``sources``: the workspace's package folders; ``parents``: the prefixes of
     the parent workspaces, nearest first; ``programs``: the folder of minirospy's commands; ``share``: minirospy's own
@@ -37,11 +37,11 @@ class SetUp(NamedTuple):
 
 
 def setup_files(setup: SetUp) -> dict[str, str]:
-    """Return all setup files for a prefix, as a dict from file name to text."""
+    """Return the texts of all setup files for a prefix, keyed by file name."""
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
         "setup.sh": _posix(setup, _others_make_way(setup)),
-        # These files work like `setup.sh --extend`, which leaves the sourced workspaces active.
+        # The local_setup files work like `setup.sh --extend`, which keeps the sourced workspaces.
         "local_setup.sh": _posix(setup, ""),
         "env.sh": _ENV,
         "setup.fish": _fish(setup),
@@ -60,7 +60,7 @@ def setup_files(setup: SetUp) -> dict[str, str]:
 
 
 def shell_text(shell: str, setup: SetUp) -> str:
-    """Return the code for ``eval "$(minirospy shell)"``: the environment without a workspace, and the functions."""
+    """Return code for ``eval "$(minirospy shell)"``: the variables without a workspace, and the functions."""
     if shell == "fish":
         return _fish_base(setup) + f"source {_fish_quoted(setup.functions / 'ros.fish')}\n"
     if shell == "powershell":
@@ -73,7 +73,7 @@ def shell_text(shell: str, setup: SetUp) -> str:
 
 
 def assignments(shell: str, variables: Mapping[str, str]) -> str:
-    """Return the lines that set environment variables in a shell of ``SHELLS``, for the programs started from it."""
+    """Return lines that set and export environment variables in a shell of ``SHELLS``."""
     line = {"fish": _fish_assignment, "powershell": powershell.assignment, "bat": _bat_assignment}.get(
         shell, _posix_assignment
     )
@@ -86,7 +86,7 @@ _HEAD = "# Made by minirospy: `source` it to work with the packages of this work
 
 _BASH = (
     _HEAD
-    # Outside a function, `return` succeeds only in a sourced file; $0 may have any value.
+    # Outside a function, `return` succeeds only in a sourced file; $0 would not be reliable.
     + """if ! (return 0 2>/dev/null); then
   echo "a program sets nothing in your terminal; type: source '$0'" >&2
 fi
@@ -166,7 +166,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return code that removes the workspaces sourced earlier from the environment and adds this workspace's parents."""
+    """Return code that removes previously sourced workspaces from the environment, and adds this one's parents."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.
@@ -233,7 +233,7 @@ def _posix_assignment(name: str, value: str) -> str:
 
 
 def _quoted(path: Path) -> str:
-    """Quote a path as one word for a POSIX shell."""
+    """Return a path as a single word for a POSIX shell."""
     return "'" + str(path).replace("'", "'\\''") + "'"
 
 
@@ -314,7 +314,7 @@ def _fish_assignment(name: str, value: str) -> str:
 
 
 def _fish_quoted(path: Path | str) -> str:
-    """Quote a path as one word for fish, in whose single quotes, unlike other shells', two escapes work."""
+    """Return a path as a single word for fish, whose single quotes, unlike those of other shells, support two escapes."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
@@ -332,7 +332,7 @@ def _ps1(setup: SetUp, *, extends: bool) -> str:
 
 
 def _bat_assignment(name: str, value: str) -> str:
-    # In a batch file a single % starts a variable's name. The quotes keep & and | from ending the command.
+    # In a batch file, a single % would start a variable. Because of the quotes, & and | do not end the command.
     return '@set "{}={}"'.format(name, value.replace("%", "%%"))
 
 
@@ -352,7 +352,7 @@ def _bat(setup: SetUp, others: str) -> str:
     text = _BAT.format(
         base=_bat_base(setup), others=others, share=share, functions=setup.functions / "ros.bat"
     )
-    # cmd.exe does not find the labels of a file with LF line endings, so use CRLF.
+    # cmd.exe does not find labels in a file with LF line endings, so use CRLF.
     return text.replace("@DIST_PACKAGES@", DIST_PACKAGES.replace("/", "\\")).replace("\n", "\r\n")
 
 

@@ -9,11 +9,11 @@ from minirospy.workspace.packages import DIST_PACKAGES
 
 __all__ = ["stale_definitions", "warning_of_stale_definitions", "workspace_of"]
 
-_SEPARATOR = "=" * 80  # precedes each definition of a field's type
+_SEPARATOR = "=" * 80  # precedes each nested type's definition in a full definition
 
 
 def workspace_of(package: Path) -> Path | None:
-    """Return the workspace that has a package's folder in ``src`` and a ``devel`` folder, or None."""
+    """Return the workspace that has the package in ``src`` and also has a ``devel`` folder, or None."""
     for folder in package.parents:
         if folder.name == "src" and (folder.parent / "devel").is_dir():
             return folder.parent
@@ -21,7 +21,7 @@ def workspace_of(package: Path) -> Path | None:
 
 
 def stale_definitions(package: Path) -> list[Path]:
-    """Return the definitions in a package's folder that are newer than their generated classes and differ from them."""
+    """Return the definitions in a package that are newer than the classes generated from them, and differ from them."""
     workspace = workspace_of(package)
     if workspace is None:
         return []
@@ -39,7 +39,7 @@ def stale_definitions(package: Path) -> list[Path]:
 
 
 def _differs(definition: Path, module: Path) -> bool:
-    """Return whether a definition differs from the text in its generated classes. Raise ValueError if there is no text."""
+    """Return whether a definition differs from the text in its generated class. Raise ValueError if there is no text."""
     tree = ast.parse(module.read_text(encoding="utf-8"))
     texts = [
         ast.literal_eval(node.value)
@@ -57,7 +57,7 @@ def _lines(text: str) -> list[str]:
 
 
 def warning_of_stale_definitions(package: Path) -> str:
-    """Return a warning that names the changed definitions in a package's workspace, or an empty string."""
+    """Return a warning with the changed definitions in a package's workspace, or "" if there are none."""
     workspace = workspace_of(package)
     if workspace is None:
         return ""

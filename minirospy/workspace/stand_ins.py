@@ -19,7 +19,7 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 
 
 class StandIns(NamedTuple):
-    """minirospy's files that replace a package's compiled programs and modules.
+    """minirospy's programs and modules that replace a package's compiled ones.
 
     ``programs`` is keyed by program name; ``modules`` is keyed by dotted name, and includes the enclosing packages.
     """
@@ -28,13 +28,13 @@ class StandIns(NamedTuple):
     modules: dict[str, Path]
 
     def names(self) -> str:
-        """Return the names to show to the user, or "" if there are none. Omit packages that only enclose a module."""
+        """Return the names for display, or "" if there are none. Omit packages that only contain a replaced module."""
         inner = [name for name, path in self.modules.items() if path.name != "__init__.py"]
         return ", ".join([*self.programs, *inner])
 
 
 def find_stand_ins(plan: Plan) -> StandIns:
-    """Return the programs and modules that replace a package's skipped targets."""
+    """Return the programs and modules that replace the skipped targets of a package."""
     if not plan.compiled:
         return StandIns({}, {})
     return StandIns(dict(_programs(plan)), dict(_modules(plan)))
@@ -49,13 +49,13 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
     for name in plan.compiled:
         if name in there:
             *_, program = packages.find_executable(plan.name, name)
-            # Use only files in minirospy's folder: a sourced workspace contains the stub from the previous build.
+            # Use only files in minirospy's folder, because a sourced workspace contains the stub from the previous build.
             if Path(program).is_relative_to(folder):
                 yield name, Path(program)
 
 
 def _modules(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the modules that replace extension modules, each after its parent packages. Omit the outermost package."""
+    """Yield the modules that replace extension modules, after the packages that contain them, except the outermost."""
     top = _OVERLAY / plan.name
     for path in sorted(top.rglob("*.py")):
         if path.stem in plan.compiled and path.parent.name != "__pycache__":

@@ -23,11 +23,11 @@ _FIELD = re.compile(
 
 
 def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
-    """Return the plans with used but unlisted messages added to their definitions.
+    """Return the plans; add messages to their definitions that are used but not listed in CMakeLists.txt.
 
     Raise DefinitionError if a definition is invalid.
     """
-    # First check whether there are unlisted messages: most workspaces have none, so no definition has to be read.
+    # Find the unlisted messages first: most workspaces have none, so that no definition need be read.
     unlisted = {
         f"{plan.name}/{path.stem}": path
         for plan in plans.values()

@@ -31,14 +31,13 @@ MAX_PORT = 65_535
 _MAX_PORT_DIGITS = 5
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
-"""Zenoh's link protocols. If a build of Zenoh lacks one, Zenoh reports an error."""
+"""Link protocols of Zenoh. Zenoh itself reports an error if it was built without one."""
 _HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
 _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
 _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in _POOLS.items())})"
-"""Zenoh sets SO_LINGER to 10 s, so that closing a dead link blocks a thread, usually one in the rx pool, for 10 s. More
-threads shorten the delay.
+"""Value of ZENOH_RUNTIME. Many threads, because Zenoh's SO_LINGER of 10 s makes each closing of a dead link block one.
 
 Measured: the simultaneous loss of 100 robots is noticed after 30 s with 32 threads in each pool, and after 11 s with 128
 threads in rx. The lease is 10 s.
@@ -47,17 +46,17 @@ CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
-    """Raised for an endpoint in the arguments that can never work."""
+    """Raised for an endpoint argument that can never work."""
 
     def __init__(self, endpoint: str, reason: str) -> None:
         super().__init__(f"[{escaped(endpoint)}] {reason}")
 
 
-# --- the parts of zenoh used here (untyped, because zenoh may not be installed)
+# --- interfaces of the parts of zenoh that are used (untyped, because zenoh may not be installed)
 
 
 class Bytes(Protocol):
-    """A payload or an attachment."""
+    """The bytes of a payload or an attachment."""
 
     def to_bytes(self) -> bytes: ...
 
@@ -65,7 +64,7 @@ class Bytes(Protocol):
 
 
 class Sample(Protocol):
-    """A message, a reply, or a change of a liveliness token."""
+    """A message, a reply, or the appearance or disappearance of a liveliness token."""
 
     key_expr: object
     payload: Bytes
@@ -85,7 +84,7 @@ class Reply(Protocol):
 
 
 class Query(Protocol):
-    """A query from a peer."""
+    """A query received from a peer."""
 
     key_expr: object
     payload: Bytes | None
@@ -99,13 +98,13 @@ class Query(Protocol):
 
 
 class Declared(Protocol):
-    """A declaration, such as a subscriber, that can be undeclared."""
+    """A declaration that can be undeclared, such as a subscriber."""
 
     def undeclare(self) -> None: ...
 
 
 class Matching(Protocol):
-    """A publisher's matching status: whether it has subscribers."""
+    """The matching status of a publisher: whether it has subscribers."""
 
     matching: bool
 
@@ -159,7 +158,7 @@ class Session(Protocol):
 
 
 class Config(Protocol):
-    """A Zenoh configuration."""
+    """A configuration of Zenoh."""
 
     def get_json(self, key: str) -> str: ...
 
@@ -182,7 +181,7 @@ class NetworkOptions:
 
 
 def to_endpoint(text: str, *, listens: bool = False) -> str:
-    """Convert text to a Zenoh endpoint; HOST and HOST:PORT mean TCP. Raise EndpointError if the endpoint can never work.
+    """Convert text to a Zenoh endpoint; HOST or HOST:PORT means TCP. Raise EndpointError for one that can never work.
 
     ``listens``: the port may be 0, which selects any free port.
     """
@@ -214,7 +213,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the endpoints' hosts that currently do not resolve.
+    """Return the hosts in endpoints that do not resolve now.
 
     The hosts may resolve later, for example once mDNS runs. Blocks.
     """
@@ -242,13 +241,13 @@ def is_loopback_endpoint(endpoint: str) -> bool:
 
 
 def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs_hash: bool = False) -> None:
-    """Raise BridgeError, with installation advice, if the Zenoh library is missing or uses another protocol version.
+    """Raise BridgeError, with instructions, if the Zenoh library is missing or its protocol version differs.
 
     ``who``: the feature that needs Zenoh, named in the message. ``has_many_links``: many peers will connect.
     ``needs_hash``: the feature also needs the library xxhash.
     """
     if has_many_links:
-        # Set the variable before the import: Zenoh reads it only once.
+        # Set this before the import, because Zenoh reads it only once.
         os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
     line = install_command("minirospy[fleet]", upgrade=True)
     libraries = {"eclipse-zenoh": "zenoh.ext"} | ({"xxhash": "xxhash"} if needs_hash else {})
@@ -264,7 +263,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs
 
 
 def configured(options: NetworkOptions) -> Config:
-    """Build Zenoh's configuration from the file and the options.
+    """Return Zenoh's configuration, built from the file and the options.
 
     The session listens only if the file or an option requests that.
     """
@@ -300,24 +299,22 @@ def configured(options: NetworkOptions) -> Config:
     elif not (connects or listens or options.scouts):
         put("connect/endpoints", [DEFAULT_ENDPOINT])
     if not is_set("mode"):
-        # A router forwards between all connected peers; a client has one connection.
+        # A router forwards between all peers connected to it; a client has a single connection.
         put("mode", "router" if listens else "peer" if options.scouts else "client")
     mode = json.loads(config.get_json("mode"))
     put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router keeps retrying.
-    # A client that has no router fails to open, and its caller tries again.
+    # A gateway reconnects to its router forever. A client without a router fails to open, and its caller tries again.
     for key, value in (
         ("connect/timeout_ms", CONNECT_MS if mode == "client" else -1),
         ("connect/exit_on_failure", mode == "client"),
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
-        # Keep-alive messages per lease of 10 s. One fewer than Zenoh's default is enough, because TCP retransmits lost data.
+        # Keep-alive messages per lease of 10 s, one fewer than Zenoh's default, because TCP retransmits lost data.
         ("transport/link/tx/keep_alive", 3),
-        # Data in the kernel's buffer is sent before any data of higher priority.
-        # With this size, it takes some 0.3 s at 4 Mbit/s instead of 1.3 s.
+        # A small send buffer delays high-priority data less: about 0.3 s at 4 Mbit/s instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
-        # Shared memory would pass large messages between local gateways through /dev/shm, which is small in containers.
+        # Do not send large messages to local gateways through /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),
     ):
         if not is_set(key):
@@ -326,5 +323,5 @@ def configured(options: NetworkOptions) -> Config:
 
 
 def one_line(error: Exception) -> str:
-    # Remove the location in Zenoh's source code, which is of no use to the user.
+    # Omit the location in Zenoh's source code, which does not help the user.
     return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]

@@ -23,25 +23,25 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 LOOKS = 10
-"""Number of polls in which to examine a new file descriptor: Zenoh sets SO_LINGER only after connecting the socket."""
+"""Number of polls that examine a new file descriptor, because Zenoh sets SO_LINGER some time after the connection."""
 
 
 class LingerRemover:
-    """Removes SO_LINGER from the links that Zenoh has opened in this process."""
+    """Removes SO_LINGER from the links that Zenoh opens in this process."""
 
     def __init__(self) -> None:
         self._looks: dict[tuple[int, int], int] = {}
         """Number of polls that have examined each open file."""
 
     def look(self) -> int:
-        """Remove SO_LINGER from new links; return the number of links changed. Does nothing on Windows."""
+        """Remove SO_LINGER from new links; return how many were changed. Does nothing on Windows."""
         if sys.platform == "win32":
             return 0
         looks: dict[tuple[int, int], int] = {}
         count = 0
         with contextlib.suppress(OSError):
             for name in os.listdir(_OPEN_FILES):
-                # Ignore errors: other threads open and close files at the same time.
+                # Ignore errors, because other threads open and close files at the same time.
                 with contextlib.suppress(OSError):
                     file = os.fstat(int(name))
                     identity = file.st_dev, file.st_ino
@@ -53,7 +53,7 @@ class LingerRemover:
 
 
 def _removes(number: int, file: os.stat_result) -> bool:
-    """Remove SO_LINGER from a socket if Zenoh has set it. Return whether it was set."""
+    """Remove SO_LINGER from a socket if Zenoh has set it; return whether it was removed."""
     if not stat.S_ISSOCK(file.st_mode):
         return False
     with socket.socket(fileno=os.dup(number)) as sock:

@@ -46,9 +46,9 @@ _OPTIONS = ["-h", "--help", "-V", "--version"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print the candidates; always return 0."""
+    """Print the completion candidates; always return 0."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # Completion runs while the user types: print nothing rather than an error.
+    # Completion runs while the user types, so print nothing instead of an error.
     with contextlib.suppress(Exception):
         shell = POWERSHELL if words[0] == _POWERSHELL else POSIX
         one_line = words[0] in (_ONE_LINE, _POWERSHELL)
@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def candidates(
     index: int, words: Sequence[str], *, one_line: bool = False, shell: Shell = POSIX
 ) -> list[str]:
-    """Return the candidates for ``words[index]`` in the form that the shell inserts. With ``one_line``, without line feeds."""
+    """Return the candidates for ``words[index]``, as the shell inserts them. With ``one_line``, omit line feeds."""
     if not 0 < index <= len(words):
         return []
     word = shell.read(words[index] if index < len(words) else "")
@@ -75,11 +75,11 @@ def candidates(
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # The package or type is unknown; the command itself will report it.
+        # The package or type is unknown, which the command itself will report.
         return []
 
 
-# --- finding the command and the word
+# --- the command and word to complete
 
 
 def _of_command(command: str, before: list[str], word: str) -> Iterable[str]:
@@ -100,7 +100,7 @@ def _of_minirospy(before: list[str], word: str) -> Iterable[str]:
 
 
 def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
-    """Return the candidates for a command's next word, using the command's parser."""
+    """Return the candidates for the next word of a registered command."""
     if entry.completer:
         return _completer(entry.completer)(Cursor("", tuple(before), word))
     grammar: Command | Family | Verb | None = entry.load_grammar()
@@ -115,13 +115,13 @@ def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
 
 
 def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Iterable[str]:
-    """Return the candidates for the next word of a command line, using the command's parser."""
+    """Return the candidates for the next word of a command line that ``parser`` would parse."""
     options = {name: action for action in parser._actions for name in action.option_strings}
     given: list[str] = []
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            # Options with an optional value expect a number, so offer no completions.
+            # An optional value is always a number, so offer no completions for it.
             pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None

@@ -34,13 +34,13 @@ __all__ = [
 
 LIVE_SECONDS = 0.8  # timeout in seconds for the master and for nodes
 
-_MAX_LETTERS = 1000  # maximum characters of a parameter's value on a command line
+_MAX_LETTERS = 1000  # maximum length of a parameter value that is offered, in characters
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Cursor(NamedTuple):
-    """The cursor: in an argument of ``verb``, after the arguments ``given``; ``word`` is the incomplete word before it."""
+    """The cursor's context: in an argument of ``verb``, after the arguments ``given``, at the end of the partial ``word``."""
 
     verb: str
     given: tuple[str, ...]
@@ -48,7 +48,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit. The shell code quotes it, instead of escaping each space with a backslash."""
+    """A candidate that the user will edit. Shells put it in quotes, instead of escaping each space with a backslash."""
 
     __slots__ = ()
 
@@ -57,7 +57,7 @@ Completer = Callable[[Cursor], Iterable[str]]
 
 
 def nothing(_: Cursor) -> Iterable[str]:
-    """Return no candidates. For arguments that are numbers, expressions or new names."""
+    """Return no candidates: the completer for numbers, expressions and new names."""
     return ()
 
 
@@ -76,14 +76,14 @@ def package_names(_: Cursor) -> Iterable[str]:
 
 
 def build_targets(cursor: Cursor) -> Iterable[str]:
-    """Return catkin_make's targets."""
+    """Return the targets of catkin_make."""
     names = _packages().names()
     tests = [f"run_tests_{name}" for name in names] if cursor.word.startswith("run_tests_") else []
     return ("install", "run_tests", "test", "clean", *tests, *names)
 
 
 def package_folders(cursor: Cursor) -> Iterable[str]:
-    """Return ``pkg/`` first, then ``pkg/folder/``. For roscd, also return the folders of logs and test results."""
+    """Return ``pkg/`` first, then ``pkg/folder/``. For roscd, include the folders of logs and test results."""
     if any(not word.startswith("-") for word in cursor.given):
         return []
     package, slash, _ = cursor.word.partition("/")
@@ -138,7 +138,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return the paths that may complete ``word``: its folder's contents, with ``shown`` in place of ``root``."""
+    """Return the paths that complete ``word``: the contents of its folder, with ``shown`` in place of ``root``."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -158,14 +158,14 @@ def bag_files(cursor: Cursor) -> Iterable[str]:
 
 
 def exercises(cursor: Cursor) -> Iterable[str]:
-    """Return the exercises of the course, and local YAML files."""
+    """Return the names of the course's exercises, and local YAML files."""
     from minirospy.course.exercise import built_in_names
 
     return [*built_in_names(), *(name for name in files(cursor) if name.endswith(("/", ".yaml", ".yml")))]
 
 
 def exercise_work(cursor: Cursor) -> Iterable[str]:
-    """Return local files and folders; after a package's name and a slash, the package's programs and launch files."""
+    """Return local files and folders; after a package's name and a slash, that package's programs and launch files."""
     package, slash, _ = cursor.word.partition("/")
     found = list(files(cursor))
     if slash and not found and package:
@@ -292,7 +292,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     if not cursor.given:
         return []
     file = _launch_file(cursor)
-    # Set missing arguments to an empty value and collect errors in a list, because otherwise either would hide nodes.
+    # Give missing arguments an empty value and collect errors in a list, because either would otherwise hide nodes.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.named_runnables()), cursor.word)
@@ -302,7 +302,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """Return the result of ``ask``, which queries the master and nodes, or [] after LIVE_SECONDS."""
+    """Return the names from ``ask``, which queries the master and nodes, or [] if that takes longer than LIVE_SECONDS."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -321,12 +321,12 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
 
 
 def _as_typed(names: Iterable[str], word: str) -> list[str]:
-    """Return global names, with the leading slash only if ``word`` has one."""
+    """Return global names; keep their leading slash only if ``word`` starts with one."""
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics and, for `echo` and `type`, the fields of their messages."""
+    """Return the topics; for `echo` and `type`, also the fields of their messages."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -351,7 +351,7 @@ def nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def machines(_: Cursor) -> Iterable[str]:
-    """Return the hosts on which nodes run."""
+    """Return the names of the hosts that nodes run on."""
     from minirospy.introspect.graph import node_host
     from minirospy.introspect.nodes import list_nodes
 
@@ -375,7 +375,7 @@ def parameters(cursor: Cursor) -> Iterable[str]:
 
 
 def parameter_value(cursor: Cursor) -> Iterable[str]:
-    """Return a parameter's value for editing, for `rosparam set PARAMETER`."""
+    """Return a parameter's current value for editing, for `rosparam set PARAMETER`."""
     from minirospy.introspect.parameters import get_parameter
     from minirospy.introspect.values import format_value
 
@@ -383,8 +383,8 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # A list or dictionary can be written on one line.
-    # Skip long values: nobody edits a whole robot description on a command line.
+    # A list or dictionary is written on one line.
+    # Omit long values: nobody edits a whole robot description on a command line.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 
@@ -414,7 +414,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Complete in two steps, ``pkg/`` and then ``pkg/Type``, because a list of all types would be too long.
+    """Complete a type in two steps, ``pkg/`` and then ``pkg/Type``, because a list of all types would be too long.
 
     For `rosmsg show`, also return type names without the package.
     """
@@ -445,12 +445,12 @@ def service_types(cursor: Cursor) -> Iterable[str]:
 
 
 def prototype_types(cursor: Cursor) -> Iterable[str]:
-    """Return the types of the chosen kind, for `rosmsg-proto msg|srv`."""
+    """Return message or service types, as chosen by the previous word, for `rosmsg-proto msg|srv`."""
     return service_types(cursor) if cursor.given[:1] == ("srv",) else message_types(cursor)
 
 
 def topic_type(cursor: Cursor) -> Iterable[str]:
-    """Return the topic's type, or all types if the topic has none, for `rostopic pub TOPIC`."""
+    """Return the topic's type, or all types if it is unknown, for `rostopic pub TOPIC`."""
     if not cursor.given:
         return message_types(cursor)
 
@@ -462,7 +462,7 @@ def topic_type(cursor: Cursor) -> Iterable[str]:
 
 
 def message_text(cursor: Cursor) -> Iterable[str]:
-    """Return a whole message for editing, for `rostopic pub TOPIC TYPE`."""
+    """Return a complete message for editing, for `rostopic pub TOPIC TYPE`."""
     if len(cursor.given) != 2:
         return []
     catalogue = _catalogue()
@@ -470,7 +470,7 @@ def message_text(cursor: Cursor) -> Iterable[str]:
 
 
 def request_text(cursor: Cursor) -> Iterable[str]:
-    """Return a whole request for editing, for `rosservice call SERVICE`."""
+    """Return a complete request for editing, for `rosservice call SERVICE`."""
     from minirospy.introspect.services import service_type
 
     if len(cursor.given) != 1:
@@ -507,7 +507,7 @@ def _fields(type_: str, path: str) -> list[str]:
 
 
 def on_one_line(text: str) -> str:
-    """Return a message's YAML on one line."""
+    """Rewrite a message's YAML on one line."""
     if not isinstance(text, Text) or "\n" not in text:
         return text
     import yaml
@@ -521,7 +521,7 @@ def on_one_line(text: str) -> str:
         elif isinstance(node, yaml.ScalarNode) and "\n" in node.value:
             node.style = '"'
 
-    # Compose YAML nodes: loading and dumping the values would change them, for example a field called `on` to `true`.
+    # Compose YAML nodes: loading and dumping the values could change them, for example a field named `on` to `true`.
     root = yaml.compose(text, yaml.SafeLoader)
     flow(root)
     return Text(
@@ -533,21 +533,21 @@ def on_one_line(text: str) -> str:
 
 
 def pins(cursor: Cursor) -> Iterable[str]:
-    """Return the virtual board's wired pins. For `press`, return the pins with buttons."""
+    """Return the wired pins of the virtual board; for `press`, only those with buttons."""
     from minirospy.board.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
-    """Return the dashboard's views, and those of its layouts that do not have a view's name."""
+    """Return the dashboard's views, and the layouts that are not named like a view."""
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))
 
 
 def dashboard_layouts(_: Cursor) -> Iterable[str]:
-    """Return the layouts that the dashboard's page includes."""
+    """Return the layouts built into the dashboard's page."""
     from minirospy.web.dashboard.views import LAYOUTS
 
     return LAYOUTS

@@ -36,13 +36,13 @@ def _parser() -> Parser:
 
 
 def shell_name(word: str) -> str:
-    """Return a shell's name in ``SHELLS``: that of ``word`` or, if it is empty, that of the variable SHELL.
+    """Return the name in ``SHELLS`` of the shell ``word`` or, if that is empty, of the shell in the variable SHELL.
 
     Raise UsageError if there is nothing for the shell.
     """
     user_shell = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
     name = word or Path(user_shell).stem
-    # pwsh is the name of PowerShell's program on Linux and macOS and, from version 6 on, on Windows.
+    # PowerShell's program is named pwsh on Linux and macOS and, since version 6, on Windows, too.
     name = "powershell" if name == "pwsh" else name
     if name in SHELLS:
         return name

@@ -14,16 +14,16 @@ __all__ = ["POSIX", "POWERSHELL", "Shell", "Word"]
 _VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
 _LINE_FEED = "\v"
 _PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
-"""Strings that need no quotes in any POSIX shell."""
+"""Matches strings that need no quotes in any POSIX shell."""
 _PLAIN_IN_POWERSHELL = re.compile(r"[\w+=:./\\~-]*\Z")
-"""Strings that need no quotes in PowerShell.
+"""Matches strings that need no quotes in PowerShell.
 
 Commas are excluded because they make an array, and @ and % because they have other meanings.
 """
 
 
 class Word(NamedTuple):
-    """A word without its quotes. If a ``quote`` is still open, ``text[at:]`` is the part after it."""
+    """A word without its quotes. If ``quote`` is still open, ``text[at:]`` is the quoted part."""
 
     text: str
     quote: str
@@ -31,7 +31,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """A shell's syntax: a function that parses a word, and one that formats the candidate that replaces it."""
+    """The syntax of a shell: a function that parses a word, and one that formats the candidate replacing it."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -41,7 +41,7 @@ class Shell(NamedTuple):
 
 
 def _read_posix(word: str) -> Word:
-    """Remove a word's quotes. $NAME is replaced by its value, except within single quotes."""
+    """Remove the quotes from a word. Expand $NAME, except within single quotes."""
     text = ""
     quote = ""
     at = read = 0
@@ -68,9 +68,9 @@ def _read_posix(word: str) -> Word:
 
 
 def _write_posix(text: str, word: Word) -> str:
-    """Return ``text`` in the shell's syntax: inside the quote that the user opened, or in double quotes for a :class:`Text`."""
+    """Return ``text`` in the shell's syntax: within the user's open quote, or in double quotes for a :class:`Text`."""
     if word.quote:
-        # Leave the quote around a folder open, because the user may continue the path.
+        # Leave the quote open after a folder, because the user may continue the path.
         end = "" if text.endswith("/") else word.quote
         return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
     if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):
@@ -82,7 +82,7 @@ def _inside(text: str, quote: str) -> str:
     text = text.replace("\n", _LINE_FEED)
     if quote == "'":
         return text.replace("'", r"'\''")
-    # An interactive shell expands an exclamation mark from its history, even in double quotes.
+    # An interactive shell expands ! from its history, even in double quotes.
     return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
 
 
@@ -94,7 +94,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Remove a word's quotes. ``quote`` is the quote at the start of the word, even if it is closed."""
+    """Remove the quotes from a word. ``quote`` is the one at the start of the word, even if it has been closed."""
     text = ""
     quote = ""
     read = 0
@@ -117,7 +117,7 @@ def _read_powershell(word: str) -> Word:
 
 
 def _write_powershell(text: str, word: Word) -> str:
-    """Return ``text`` inside the quote that the user has opened, otherwise in single quotes if ``text`` needs quotes."""
+    """Return ``text`` within the user's open quote; otherwise in single quotes if ``text`` needs quotes."""
     if word.quote == '"':
         return '"' + re.sub(r'([`$"])', r"`\1", text) + '"'
     if word.quote or not _PLAIN_IN_POWERSHELL.match(text):

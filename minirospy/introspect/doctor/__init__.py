@@ -24,7 +24,7 @@ __all__ = ["Examination", "Finding", "Status", "ok", "problem", "warning"]
 
 
 class Examination:
-    """Context manager that runs all checks in order. ``findings`` yields each result when it is available.
+    """Context manager that runs all checks in order; ``findings`` yields each result as soon as it is known.
 
     ``machines``: names or addresses of other machines to check; ``offline`` skips the network checks.
     """
@@ -57,7 +57,7 @@ class Examination:
             yield problem("variables", str(error), "correct it, or unset it")
             return
         host, port = environment.master_address
-        # Look up all names in parallel, so that an unreachable name server costs one timeout, not several.
+        # Look up all host names in parallel, so that an unreachable name server costs only one timeout.
         known = addresses_of((host, environment.host, self._environ.get("ROS_HOSTNAME") or environment.host))
         place = MasterLocation(host, port, known[host])
         yield from check_variables(self._environ, environment, place, known)
@@ -67,7 +67,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Respond to doctors on other machines until the context exits. Return False if there is no master."""
+        """Serve doctors on other machines until the context exits. Return False if there is no master."""
         if self._listen is None:
             return False
         self._listen(report)

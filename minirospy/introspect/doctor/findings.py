@@ -9,7 +9,7 @@ __all__ = ["Finding", "Status", "ok", "problem", "warning"]
 
 
 class Status(str, Enum):
-    """The result of a check. A warning may be harmless; a problem is not."""
+    """The result of a check. A warning may be harmless; a problem is a definite failure."""
 
     OK = "ok"
     WARNING = "warning"

@@ -22,10 +22,10 @@ from minirospy.runtime.rpc.master_proxy import SystemState
 __all__ = ["Observation", "check_frames", "frame_findings"]
 
 _TOPICS = {"/tf": False, "/tf_static": True}
-_SECONDS = 1.5  # seconds to listen, long enough to receive transforms published at 1 Hz
+_SECONDS = 1.5  # seconds to listen: long enough to receive transforms published at 1 Hz
 _OLD_SECONDS = 1.0
 _AHEAD_SECONDS = 1.1
-"""Tolerance for future stamps, in seconds.
+"""Seconds that a stamp may be in the future.
 
 static_transform_publisher stamps each transform one period ahead, in practice at most a second.
 """
@@ -35,7 +35,7 @@ _SHOWN = 5
 
 @dataclass
 class Observation:
-    """The stamps received for one child frame, in nanoseconds; ``offset`` is the newest stamp minus its arrival time."""
+    """The stamps received for a child frame; ``offset`` is the newest stamp minus its arrival time, in nanoseconds."""
 
     child: str
     senders: set[str] = field(default_factory=set)
@@ -45,7 +45,7 @@ class Observation:
 
 
 def check_frames(environment: Environment, state: SystemState) -> Iterator[Finding]:
-    """Listen to /tf for _SECONDS if it is published, and yield the problems found in its frames.
+    """If /tf is published, listen to it for _SECONDS; yield the problems found in its frames.
 
     Raise MasterUnreachableError if no master responds.
     """
@@ -74,8 +74,7 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers have stopped together with the node, so ``seen`` no longer changes.
-    # In simulated time, stamps cannot be compared with arrival times.
+    # The node's workers have stopped, so ``seen`` is final. In simulated time, stamps and arrival times cannot be compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -91,7 +90,7 @@ def _add(seen: dict[str, Observation], body: bytes, sender: str, now: int, *, is
 
 
 def frame_findings(seen: Sequence[Observation], *, is_simulated: bool = False) -> Iterator[Finding]:
-    """Yield the problems found in the frames, or one ok finding if there are none."""
+    """Yield the problems found in the frames, or one ok finding if there are no problems."""
     if not seen:
         yield warning(
             "frames",
@@ -134,7 +133,7 @@ def _loops(seen: Sequence[Observation]) -> Iterator[Finding]:
     parent = {each.child: sorted(each.parents)[0] for each in seen if each.parents}
     walked: set[str] = set()
     for child in sorted(parent):
-        # Visit each frame only once, so that the time is linear in the number of frames.
+        # Visit each frame only once, so that the run time is linear in the number of frames.
         way: dict[str, None] = {}
         at = child
         while at in parent and at not in walked:
@@ -151,7 +150,7 @@ def _loops(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Yield a warning if there are several trees. For a root that may be misspelt, suggest a similar frame name."""
+    """Yield a warning if the frames form several trees. If a root may be misspelt, suggest a similar frame name."""
     children = {each.child for each in seen}
     parent = {each.child: sorted(each.parents)[0] for each in seen if each.parents}
     roots = sorted({above for above in parent.values() if above not in children})
@@ -164,7 +163,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
         while at not in tree and at in parent and at not in way:
             way[at] = None
             at = parent[at]
-        # Assign the frames of a loop to one tree, that of any frame in the loop.
+        # Assign all frames of a loop to the same tree.
         tree.update(dict.fromkeys(way, tree.get(at, at)))
 
     hints: list[str] = []
@@ -185,7 +184,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _similar(name: str, others: Iterable[str]) -> str:
-    """Return the most similar name, or "" if there is none. Ignore names that differ only in digits."""
+    """Return the most similar name, or "" if none is similar. Ignore names that differ only in digits."""
 
     def plain(text: str) -> str:
         return text.strip("/").lower().replace("-", "_")
@@ -195,7 +194,7 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
     by_plain: dict[str, str] = {}
     for other in sorted(others):
-        # Robots with numbered prefixes have similar frame names on purpose.
+        # Robots with numbered prefixes intentionally have similar frame names.
         if letters(other) != letters(name) or plain(other) == plain(name):
             by_plain.setdefault(plain(other), other)
     found = difflib.get_close_matches(plain(name), by_plain, n=1, cutoff=_SIMILAR)
@@ -205,7 +204,7 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
 
 def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """For each node, yield findings for the stamps farthest ahead of and behind their arrival times, if they are too far off."""
+    """For each node, yield findings if a stamp is too far ahead of or behind its arrival time."""
     worst: dict[tuple[str, bool], tuple[float, str]] = {}
     for each in sorted(seen, key=_child):
         if each.offset is None:

@@ -51,7 +51,7 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class NodeAnswer:
-    """A node's responses to queries; ``trouble`` is set if the node did not respond.
+    """A node's responses to the doctor's queries; ``trouble`` is set if the node did not respond.
 
     ``seconds``: duration of the first call; ``stats``: the result of getBusStats, if the caller requested it.
     """
@@ -78,7 +78,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats: bool = False) -> Answers:
-    """Query all registered nodes in parallel, except those in ``besides``; return their responses."""
+    """Query all registered nodes, except ``besides``, in parallel; return their responses."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -99,7 +99,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
 
 
 def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a problem for nodes that do not respond: one finding for all nodes on a machine that fail in the same way."""
+    """Yield problems for nodes that do not respond, with one finding for all nodes of a machine that fail alike."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
         if answer.trouble:
@@ -118,7 +118,7 @@ def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
 
 
 def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[str, str]:
-    """Return (problem, advice) for a node that is registered at ``host`` and does not respond there."""
+    """Return (problem, advice) for a node that is registered on ``host`` but does not respond there."""
     if trouble.fault is Fault.NAME:
         return (
             f"are registered as being at '{host}', a name that this machine does not know",
@@ -152,7 +152,7 @@ def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[st
 
 
 def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield findings for topics whose nodes report different types, and for topics that have no publishers."""
+    """Yield findings for topics whose nodes report different types, and for topics without publishers."""
     differing = differing_types(state, answers)
     for topic, types in differing.items():
         found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
@@ -180,7 +180,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
 
 
 def differing_types(state: SystemState, answers: Answers) -> dict[str, dict[str, list[str]]]:
-    """Return the topics whose nodes report different types, as a dict from topic to a dict from type to nodes."""
+    """Return the topics whose nodes report different types, as {topic: {type: nodes}}."""
     found = {topic: _types(topic, answers) for topic in sorted({*state.publishers, *state.subscribers})}
     return {topic: types for topic, types in found.items() if len(types) > 1}
 
@@ -207,7 +207,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
     ]
     missing = [pair for pair in pairs if not _is_connected(pair, answers)]
     if missing:
-        # Nodes that have just started may connect in the meantime, so check again.
+        # Nodes that have just started may need more time to connect, so check again.
         time.sleep(_AGAIN_SECONDS)
         names = {name for pair in missing for name in pair[1:]}
         again = in_parallel(
@@ -235,7 +235,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
 
 def check_large_messages(answers: Answers) -> Iterator[Finding]:
-    """Yield findings on how topics of large messages are sent: through shared memory, or why not. None if there are none."""
+    """Yield findings that say, for topics with large messages, whether shared memory is used and, if not, why."""
     shared: set[str] = set()
     others: dict[tuple[str, str], list[str]] = {}
     for answer in answers.values():
@@ -255,7 +255,7 @@ def check_large_messages(answers: Answers) -> Iterator[Finding]:
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield a problem for each service that does not respond, unless its node has been reported already."""
+    """Yield a problem for each service that does not respond, except services of nodes already reported."""
     names = [
         name
         for name, nodes in sorted(state.services.items())
@@ -310,7 +310,7 @@ def _ask(tool: str, node: NodeAddress, *, with_stats: bool = False) -> NodeAnswe
 
 
 def _stats(slave: SlaveProxy) -> tuple[object, ...]:
-    """Return a node's connection statistics; () if it provides none."""
+    """Return a node's connection statistics, or () if it does not provide any."""
     try:
         return tuple(slave.get_bus_stats())
     except (RpcFault, RpcRefused, RpcProtocolError):
@@ -318,7 +318,7 @@ def _stats(slave: SlaveProxy) -> tuple[object, ...]:
 
 
 def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
-    """Return a dict from type to the nodes that report it for a topic."""
+    """Return the types that nodes report for a topic, each with the nodes that report it."""
     types: dict[str, set[str]] = {}
     for name, answer in answers.items():
         for table in (answer.publications, answer.subscriptions):
@@ -329,7 +329,7 @@ def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
 
 
 def _is_of_action(topic: str, state: SystemState) -> bool:
-    """Return whether this is an action server's goal or cancel topic; these often have no publisher."""
+    """Return whether this is the goal or cancel topic of an action server, which often has no publisher."""
     name, _, end = topic.rpartition("/")
     return end in ("goal", "cancel") and f"{name}/status" in state.publishers
 
@@ -350,7 +350,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """Return advice if the publisher's definition of the type differs from this machine's, or "" if they are equal."""
+    """Return advice if the publisher's machine has a different definition of the type, or "" if the definitions are equal."""
     from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
@@ -365,7 +365,7 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 
 
 def _probe_service(graph: Graph, name: str) -> str:
-    """Return a problem with a service's type, or "" if there is none.
+    """Return a description of a problem with a service's type, or "" if there is no problem.
 
     Raise OSError or WireError if the connection fails, RpcRefused if the service was unregistered.
     """
@@ -387,7 +387,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Join the first few names and append the number of the others."""
+    """Join the first few names, and append the number of omitted ones."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

@@ -44,7 +44,7 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Start serving doctors that request a check: connect back, and call ``report`` with the result in a separate thread.
+    """Serve doctors on other machines: connect back to each, and call ``report`` with the result in a separate thread.
 
     Raise MasterUnreachableError if no master responds, or RpcError if a call fails.
     """
@@ -88,14 +88,14 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
 
 
 def listeners(state: SystemState, answers: Answers) -> Answers:
-    """Return the responses of the doctors that listen."""
+    """Return the responses of the doctors that serve others (`minirospy doctor --listen`)."""
     return {node: answer for node, answer in answers.items() if node + _SERVICE in state.services}
 
 
 def check_listeners(
     own: DoctorNode, graph: Graph, answers: Answers, place: MasterLocation
 ) -> Iterator[Finding]:
-    """Call the listeners and yield one or two findings for each listener."""
+    """Call the listening doctors; yield one or two findings for each."""
     services = [
         node + _SERVICE for node, answer in answers.items() if node.startswith(PREFIX) and not answer.trouble
     ]
@@ -108,7 +108,7 @@ def check_listeners(
 
     for service, result in zip(services, in_parallel(ask, services, _ANSWER_SECONDS), strict=True):
         if isinstance(result, RpcRefused):
-            continue  # the doctor that offers this service does not listen
+            continue  # the doctor with this service is not listening
         if isinstance(result, Exception):
             here = trouble_of(result)
             host = host_port(graph.node_uri(service.removesuffix(_SERVICE)) or "")[0]
@@ -137,7 +137,7 @@ def check_listeners(
 
 
 def _call(uri: str, service: str, caller_id: str) -> str:
-    """Return the message in a listener's response.
+    """Call a listening doctor's service; return the message in the response.
 
     Raise OSError if the connection fails, WireError if the response is invalid.
     """

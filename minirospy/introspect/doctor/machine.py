@@ -45,7 +45,7 @@ _MEANT = (
 
 
 def check_python() -> Iterator[Finding]:
-    """Yield findings about the Python version, the rospy that programs import, and the required libraries."""
+    """Yield findings about the Python version, the rospy that programs would import, and the required libraries."""
     import importlib.util
 
     what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
@@ -82,7 +82,7 @@ def check_variables(
     master: MasterLocation,
     known: Mapping[str, list[str]],
 ) -> Iterator[Finding]:
-    """Yield findings about the variables that set the master's and this machine's address, separately and in combination.
+    """Yield findings about each variable that sets the master's or this machine's address, and about their combination.
 
     ``known``: the addresses of the host names in the variables.
     """
@@ -122,7 +122,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # Strings such as `192.168.1` resolve, too: this one to 192.168.0.1.
+        # Strings such as `192.168.1` also resolve, in this case to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",
@@ -188,7 +188,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     if config and not Path(config).is_file():
         yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is not a file", "unset it")
 
-    # If a folder does not exist yet, check its nearest parent that does.
+    # If a folder does not exist yet, check its nearest existing parent.
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
         if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
@@ -197,14 +197,14 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
                 "variables",
                 f"logs cannot be written to {folder}: {there} {why}",
                 f"export {variable}=<a folder of your own>"
-                # A root-owned folder usually results from `sudo roscore`.
+                # A folder owned by root usually results from `sudo roscore`.
                 + (f", or `sudo chown -R $USER {there}`" if there == folder and there.is_dir() else ""),
             )
             break
 
 
 def check_shared_memory(environment: Environment) -> Iterator[Finding]:
-    """Yield one finding: whether messages of 1 to 32 MB between this user's processes can go through shared memory."""
+    """Yield a finding on whether processes of this user can send messages of 1 to 32 MB through shared memory."""
     if not environment.shares_memory:
         yield ok(
             "shared memory", f"off, by MINIROSPY_TRANSPORT={environment.transport}: messages use sockets"
@@ -222,7 +222,7 @@ def check_shared_memory(environment: Environment) -> Iterator[Finding]:
 
 
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
-    """Yield findings about ROS_PACKAGE_PATH: duplicates, unreadable packages, missing dependencies.
+    """Yield findings about ROS_PACKAGE_PATH: duplicate or unreadable packages, and missing dependencies.
 
     ``here``: the current workspace.
     """
@@ -238,7 +238,7 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                 f"source {workspace / 'devel' / 'setup.bash'}",
             )
         )
-    # A sourced workspace adds minirospy's packages to the path. Skip those: the user's packages may replace them.
+    # Skip minirospy's packages, which a sourced workspace adds to the path: the user's packages may replace them.
     mine = Packages.below(*(path for path in environment.package_path if path not in built_in_roots()))
     copies = mine.copies()
     for name, folders in sorted(copies.items()):
@@ -250,7 +250,7 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                     "remove or rename one of them",
                 )
             )
-    # One warning for each workspace.
+    # Yield only one warning for each workspace.
     firsts = {workspace_of(folders[0]): folders[0] for folders in copies.values()}
     stale = filter(None, map(warning_of_stale_definitions, firsts.values()))
     found += (warning("packages", text, "catkin_make") for text in stale)
@@ -281,7 +281,7 @@ def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[
             for each in manifest.dependencies
             if each.tag in ("run_depend", "exec_depend", "depend") and each.name not in known
         ]
-        # Ignore rosdep keys of system packages.
+        # Ignore rosdep keys of system packages, which are not ROS packages.
         missing = [each for each in dict.fromkeys(missing) if not _is_system_key(each)]
         if missing:
             yield warning(

@@ -23,13 +23,13 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["check_clock", "check_master", "clock_finding"]
 
-_FEEL_SECONDS = 0.1  # clock difference in seconds above which tf is affected
+_FEEL_SECONDS = 0.1  # clock difference in seconds that starts to affect tf
 
 _WRONG_SECONDS = 1.0
 
 
 def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a finding that the master responds or a problem if it does not."""
+    """Yield a finding that the master responds, or a problem if it does not."""
     if not place.addresses:
         yield problem(
             "master",
@@ -41,7 +41,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
-        pid = ""  # this master is another implementation, without getPid
+        pid = ""  # this master is another implementation, which has no getPid
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return
@@ -54,7 +54,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
 
 
 def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a finding on the difference between the master's clock and the local one. Yield nothing if the master is local."""
+    """Yield a finding on how far the master's clock is from the local one, or nothing for a master on this machine."""
     if place.is_local:
         return
     before = time.time()
@@ -67,12 +67,12 @@ def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]
     if seconds is None:
         yield ok("clock", f"{place.host} does not report its time: compare `date` on both machines")
         return
-    # The header's time is rounded down to a whole second.
+    # The header's time is rounded down to a full second.
     yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
 
 
 def clock_finding(who: str, theirs: float, before: float, after: float) -> Finding:
-    """Compare ``theirs``, a remote time read between ``before`` and ``after``, with the local clock."""
+    """Compare the local clock with ``theirs``, a remote time read between the local times ``before`` and ``after``."""
     difference = theirs - after if theirs > after else min(0.0, theirs - before)
     if abs(difference) < _FEEL_SECONDS:
         return ok("clock", f"that of {who} is the same")
@@ -127,7 +127,7 @@ def _unreachable(uri: str, place: MasterLocation, trouble: Trouble) -> Finding:
 
 
 def _status(master: MasterProxy) -> dict[str, object]:
-    """Return the status that minirospy's master provides; other masters have none."""
+    """Return the status provided by minirospy's master, or {} for any other master."""
     try:
         found = master.call("minirospy.status")
     except (RpcFault, RpcError):
@@ -136,7 +136,7 @@ def _status(master: MasterProxy) -> dict[str, object]:
 
 
 def _http_date(place: MasterLocation) -> float | None:
-    """Return the time from the HTTP Date header, which Python's HTTP server sends."""
+    """Return the time in the HTTP Date header, which Python's HTTP servers send, or None without this header."""
     from email.utils import parsedate_to_datetime
 
     request = serialize_request(place.host, "/RPC2", serialize_call("getPid", ("/doctor",)))

@@ -22,7 +22,7 @@ __all__ = ["check_listens", "check_machine"]
 
 
 def check_machine(host: str, port: int) -> Iterator[Finding]:
-    """Yield a finding on whether this machine can connect to ``host`` at ``port``, the master's port."""
+    """Yield a finding on whether this machine can connect to ``port``, the master's port, on ``host``."""
     known = addresses(host)
     if not known:
         yield problem(
@@ -61,7 +61,7 @@ def check_machine(host: str, port: int) -> Iterator[Finding]:
 
 
 def check_listens(host: str, listeners: Answers, master_uri: str) -> Iterator[Finding]:
-    """Yield a warning if none of the ``listeners``, the doctors that connect back, runs on ``host``."""
+    """Yield a warning if none of the ``listeners`` (listening doctors) runs on ``host``."""
     theirs = [host_port(answer.node.uri or "")[0] for answer in listeners.values()]
     known = addresses_of([host, *theirs])
     here = {host, *known[host]}

@@ -35,16 +35,16 @@ from minirospy.runtime.transport.loop import LoopThread
 
 __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unreached_finding"]
 
-PREFIX = "/minirospy_doctor"  # prefix of the doctors' node names
+PREFIX = "/minirospy_doctor"  # prefix of the names of the doctors' nodes
 
 _LETTER_BYTES = 16 * 1024
-"""Message size in bytes; larger than a packet, because some tunnels drop all packets above their size limit."""
+"""Message size in bytes, larger than a packet: some tunnels drop every packet that exceeds their size limit."""
 
 _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """Context manager: a node that publishes a latched message to any peer. It is registered while the context is active.
+    """Context manager that registers a node; the node publishes a latched message.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """
@@ -64,7 +64,7 @@ class DoctorNode:
         try:
             self._loop.run(self.node.start())
         except BaseException:
-            # Ctrl-C may interrupt the start after the node's servers were opened, so close them.
+            # Ctrl-C may have interrupted the start after the node's servers were opened.
             self._loop.run(self.node.close())
             self._loop.close()
             raise
@@ -80,7 +80,7 @@ class DoctorNode:
         self._loop.close()
 
     def register(self) -> None:
-        """Register the node's topics: the one for its own message, and /rosout, which every node publishes.
+        """Register the node's topics: its own message, and /rosout, which every node publishes.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -102,18 +102,18 @@ class DoctorNode:
         self._loop.run(self.node.serve(server))
 
     def wait_for_log_listeners(self, wanted: Collection[str], timeout: float) -> set[str]:
-        """Return the nodes in ``wanted`` that have not connected to this node's /rosout within ``timeout`` seconds."""
+        """Wait up to ``timeout`` seconds; return the nodes in ``wanted`` that have not connected to this node's /rosout."""
         with self._log_links:
             self._log_links.wait_for(lambda: self._listeners.issuperset(wanted), timeout)
             return set(wanted) - self._listeners
 
     async def _register(self) -> None:
-        # Subscribe before advertising: the master then has to send this node a publisherUpdate about itself.
+        # Subscribe before advertising, so that the master must send this node a publisherUpdate about itself.
         await self.node.master("registerSubscriber", self.letter, "std_msgs/String", self.node.uri)
         text = message_class("std_msgs/String")
         letter = Publication(self.letter, InterfaceType.of(text), latch=True)
         body = b"x" * _LETTER_BYTES
-        # A serialized std_msgs/String has the layout of a frame: a length, then the bytes.
+        # A serialized std_msgs/String is a length followed by bytes, like a frame.
         letter.publish(serialize_frame(serialize_frame(body)))
         log = message_class("rosgraph_msgs/Log")
         type_ = InterfaceType.of(log)
@@ -137,7 +137,7 @@ class DoctorNode:
 
 
 class _NotifiedNode(Node):
-    """A node that records that the master has called its Slave API."""
+    """A node that records whether the master has called its Slave API."""
 
     def __init__(self, name: str, environment: Environment, notified: threading.Event) -> None:
         super().__init__(name, environment)
@@ -148,7 +148,7 @@ class _NotifiedNode(Node):
 
 
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
-    """Yield a finding on whether this machine can reach its own nodes at the address that they advertise."""
+    """Yield a finding on whether this machine can reach its own nodes at their advertised address."""
     host, ports = own.environment.host, own.environment.ports
     slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, same_host=False)
     try:
@@ -169,7 +169,7 @@ def check_own_address(own: DoctorNode) -> Iterator[Finding]:
 
 
 def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
-    """Yield findings on whether the master calls this node, and whether /rosout's subscribers (``log_listeners``) connect."""
+    """Yield findings on whether the master calls this node, and whether the subscribers of /rosout connect to it."""
     if not own.told_by_master.wait(CONNECT_SECONDS):
         yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
         return

@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 CONNECT_SECONDS = 1.5
-"""Connect timeout in seconds. A reachable peer responds within this time even over a poor radio link."""
+"""Connect timeout in seconds. A reachable peer responds within this time, even over a poor radio link."""
 
 RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 """Advice for :attr:`Fault.LATE`."""
@@ -62,12 +62,12 @@ _R = TypeVar("_R")
 
 
 class Fault(str, Enum):
-    """The reason why an address does not respond, as far as this machine can determine it."""
+    """Why an address does not respond, as far as this machine can tell."""
 
     NAME = "name"  # the host name does not resolve
-    REFUSED = "refused"  # the machine is up, but no process listens on the port
+    REFUSED = "refused"  # the machine runs, but no process listens on the port
     SILENT = "silent"
-    """No response: the machine is off, another machine has the address, or a firewall drops the packets."""
+    """No response: the machine is off, another machine has its address, or a firewall drops the packets."""
     LATE = "late"  # connected, but no response: the process is busy or suspended
     NO_ROUTE = "no route"  # no network, or a firewall rejects the packets
     STRANGER = "stranger"  # the peer responds, but not with a ROS protocol
@@ -75,14 +75,14 @@ class Fault(str, Enum):
 
 
 class Trouble(NamedTuple):
-    """A fault and its description."""
+    """The reason why a peer does not respond, and its description."""
 
     fault: Fault
     text: str
 
 
 class MasterLocation(NamedTuple):
-    """The master's host and port from ROS_MASTER_URI, and the addresses of that host ([] if it does not resolve)."""
+    """The master's host and port in ROS_MASTER_URI, and the host's addresses ([] if it does not resolve)."""
 
     host: str
     port: int
@@ -95,12 +95,12 @@ class MasterLocation(NamedTuple):
 
     @property
     def own_address(self) -> str:
-        """Return this machine's address as seen from the master's machine, or "" if there is no route."""
+        """Return the address at which the master's machine sees this one, or "" if there is no route."""
         return own_address_towards(self.addresses[0]) if self.addresses else ""
 
 
 def trouble_of(error: Exception) -> Trouble:
-    """Classify an error from a call, a connection or a name lookup."""
+    """Classify an error raised by a call, a connection or a name lookup."""
     text = str(error)
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
@@ -151,7 +151,7 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 
 
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """Like :func:`addresses`, but raise OSError on failure.
+    """Return a host's addresses like :func:`addresses`, but raise OSError on failure.
 
     The function exists because the system's own timeout is half a minute.
     """
@@ -173,7 +173,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether an address belongs to this machine, that is, whether a socket can bind to it."""
+    """Return whether an address belongs to this machine: a socket can be bound to it."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -184,7 +184,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """Return this machine's address on the route to another address, or "" if there is no route. Sends no packets."""
+    """Return this machine's address on the route to ``address``, or "" if there is no route. Sends no packets."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -195,7 +195,7 @@ def own_address_towards(address: str) -> str:
 
 
 def host_port(uri: str) -> tuple[str, int]:
-    """Return (host, port) from ``http://host:port/`` or ``rosrpc://host:port``; ("", 0) for any other string."""
+    """Return (host, port) of ``http://host:port/`` or ``rosrpc://host:port``, and ("", 0) for any other string."""
     try:
         parts = urlsplit(uri)
         return parts.hostname or "", parts.port or 0
@@ -206,7 +206,7 @@ def host_port(uri: str) -> tuple[str, int]:
 def read_topic(
     uri: str, topic: str, caller_id: str, timeout: float = CONNECT_SECONDS, *, wait: bool = False
 ) -> tuple[Header, bytes]:
-    """Return the connection header of the publisher at ``uri`` (its Slave API) and, with ``wait``, its first message.
+    """Return the connection header of the publisher with Slave API ``uri`` and, with ``wait``, its first message.
 
     Each step may take ``timeout`` seconds. Raise RpcError if the call fails, WireError if its data is invalid, or
     OSError if the connection fails.
@@ -230,7 +230,7 @@ def read_topic(
 
 
 def _receive(sock: socket.socket, most: int) -> bytes:
-    """Read a length-prefixed block of bytes. Raise WireError if it is longer than ``most``, OSError if the connection fails."""
+    """Receive a length-prefixed block. Raise WireError if it is longer than ``most``, OSError if the connection fails."""
 
     def exactly(count: int) -> bytes:
         data = b""
@@ -250,7 +250,7 @@ def _receive(sock: socket.socket, most: int) -> bytes:
 def in_parallel(
     function: Callable[[_A], _R], arguments: Iterable[_A], timeout: float
 ) -> list[_R | Exception]:
-    """Call ``function`` for each argument in parallel; return the results or exceptions.
+    """Call ``function`` for all arguments in parallel; return each call's result or exception.
 
     For a call that takes too long, the exception is TimeoutError. Runs in daemon threads: a name lookup cannot be
     cancelled, and must not prevent the program from exiting.

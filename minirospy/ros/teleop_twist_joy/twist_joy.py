@@ -20,7 +20,7 @@ __all__ = ["Direction", "JoyTeleop", "TeleopOptions", "Velocity", "main", "read_
 
 
 class Velocity(NamedTuple):
-    """Linear velocities in m/s, angular velocities in rad/s."""
+    """A velocity: linear in m/s, angular in rad/s."""
 
     x: float = 0.0
     y: float = 0.0
@@ -31,7 +31,7 @@ class Velocity(NamedTuple):
 
 
 class Direction(NamedTuple):
-    """The joystick axis for one component of the velocity, and its scales."""
+    """The joystick axis for one velocity component, and the scales applied to it."""
 
     axis: int
     normal: float
@@ -40,7 +40,7 @@ class Direction(NamedTuple):
 
 @dataclass(frozen=True)
 class TeleopOptions:
-    """The buttons, and a Direction for each component of the velocity: linear (x, y, z) and angular (yaw, pitch, roll)."""
+    """The buttons, and a Direction for each velocity component: linear (x, y, z) and angular (yaw, pitch, roll)."""
 
     enable_button: int = 0
     enable_turbo_button: int = -1
@@ -49,7 +49,7 @@ class TeleopOptions:
 
 
 def read_options(parameters: Mapping[str, object]) -> TeleopOptions:
-    """Return the options from the private parameters. As in roscpp, a parameter with the wrong type gets its default."""
+    """Return the options from the private parameters. As in roscpp, ignore a parameter of the wrong type and use its default."""
     linear = _directions(parameters, "linear", "x", 1, 1.0)
     angular = _directions(parameters, "angular", "yaw", 0, None)
     return TeleopOptions(
@@ -84,14 +84,14 @@ def _integer(value: object, default: int) -> int:
 
 
 class JoyTeleop:
-    """Converts joystick states to velocities. Pure."""
+    """Converts joystick states to velocities. Performs no I/O."""
 
     def __init__(self, options: TeleopOptions) -> None:
         self._options = options
         self._has_stopped = False
 
     def velocity(self, axes: Sequence[float], buttons: Sequence[int]) -> Velocity | None:
-        """Return the velocity to publish. After the buttons are released, return zero velocity once and then None."""
+        """Return the velocity to publish. When the buttons are released, return zero velocity once, then None."""
         if self._is_held(buttons, self._options.enable_turbo_button):
             return self._moving(axes, is_fast=True)
         if self._is_held(buttons, self._options.enable_button):

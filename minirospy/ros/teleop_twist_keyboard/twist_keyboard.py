@@ -46,13 +46,13 @@ e/c : increase/decrease only angular speed by 10%
 CTRL-C to quit
 """
 
-_HELP_EVERY = 15  # number of speed changes between repetitions of the help text
+_HELP_EVERY = 15  # the help text is printed again after this many speed changes
 
 _QUIT = "\x03"
 
 
 class Direction(NamedTuple):
-    """A direction of motion: the sign (-1, 0 or 1) of x (forward), y (left), z (up) and yaw (left turn)."""
+    """A direction of motion: signs (-1, 0 or 1) for x (forward), y (left), z (up) and yaw (left turn)."""
 
     x: int = 0
     y: int = 0
@@ -84,7 +84,7 @@ _SPEEDS = {"q": (1.1, 1.1), "z": (0.9, 0.9), "w": (1.1, 1), "x": (0.9, 1), "e": 
 
 
 class Motion(NamedTuple):
-    """The published motion: m/s along x, y, z, and rad/s about z."""
+    """The published motion: m/s along x, y and z, and rad/s about z."""
 
     x: float
     y: float
@@ -93,7 +93,7 @@ class Motion(NamedTuple):
 
 
 class KeyTeleop:
-    """Converts keys to motions, and to the lines to print. Pure."""
+    """Converts keys to motions and to lines to print. Performs no I/O."""
 
     def __init__(
         self, speed: float, turn: float, speed_limit: float = 1000, turn_limit: float = 1000
@@ -105,7 +105,7 @@ class KeyTeleop:
 
     @property
     def motion(self) -> Motion:
-        """Return the motion that results from all keys so far."""
+        """Return the motion that results from all keys pressed so far."""
         x, y, z, turn = self._direction
         return Motion(x * self._speed, y * self._speed, z * self._speed, turn * self._turn)
 
@@ -115,7 +115,7 @@ class KeyTeleop:
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:
-        """Process a key, or "" after the timeout; return the lines to print, or None if there is nothing to publish."""
+        """Process a key, or "" after the timeout. Return the lines to print, or None if nothing must be published."""
         if key in _MOVES:
             self._direction = _MOVES[key]
             return []
@@ -147,7 +147,7 @@ class _ParameterError(MinirospyError):
 
 
 class _Output:
-    """Publishes each motion, and repeats the last motion at ``rate`` Hz (0: never)."""
+    """Publishes each new motion, and repeats the last one at ``rate`` Hz (0: never)."""
 
     def __init__(self, rate: float) -> None:
         self._is_stamped = bool(rospy.get_param("~stamped", False))
@@ -164,7 +164,7 @@ class _Output:
             threading.Thread(target=self._repeat, daemon=True).start()
 
     def wait_for_subscribers(self) -> None:
-        """Wait until a node subscribes; print a line every 2.5 seconds."""
+        """Wait for a subscriber; print a line every 2.5 seconds."""
         waited = 0
         while not self._publisher.get_num_connections() and not rospy.is_shutdown():
             if waited % 50 == 40:
@@ -210,7 +210,7 @@ class _Output:
 
 
 def main() -> int:
-    """Run the node until Ctrl-C; return the exit status, 1 without a terminal or for an invalid parameter."""
+    """Run the node until Ctrl-C. Return the exit status: 1 if there is no terminal or a parameter is invalid."""
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "teleop_twist_keyboard: ERROR: keys come from a terminal, which standard input is not: "
@@ -251,7 +251,7 @@ def _run() -> None:
     rospy.on_shutdown(output.close)
     output.set(teleop.motion)
 
-    # Set up the terminal before printing the help, because the setup discards earlier input.
+    # Set up the terminal before printing the help, because the setup discards pending input.
     with Keys(end=_QUIT) as keys:
         print(HELP)
         print(teleop.speeds, flush=True)

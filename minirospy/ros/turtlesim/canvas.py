@@ -22,7 +22,7 @@ class Color(NamedTuple):
 
 
 class Canvas:
-    """The pixels; (x, y) is a pixel's centre, and y increases downwards."""
+    """The turtles' canvas. The point (x, y) is the centre of a pixel; y increases downwards."""
 
     def __init__(self, background: Color) -> None:
         self.pixels: NDArray[np.uint8] = np.empty((PIXELS, PIXELS, 3), np.uint8)
@@ -48,7 +48,7 @@ class Canvas:
         length = math.hypot(x1 - x0, y1 - y0)
         along_x, along_y = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)
         half = width / 2
-        # A corner of the line is at most sqrt(2) * half away from one of the end points.
+        # A corner of the line is at most sqrt(2) * half away from its end point.
         rows = _range(min(y0, y1) - 2 * half, max(y0, y1) + 2 * half)
         columns = _range(min(x0, x1) - 2 * half, max(x0, x1) + 2 * half)
         if not len(rows) or not len(columns):
@@ -65,14 +65,14 @@ class Canvas:
         self.version += 1
 
     def color_at(self, x: float, y: float) -> Color:
-        """Return the colour of the pixel that is nearest to a point."""
+        """Return the colour of the pixel nearest to a point."""
         column, row = (min(max(math.floor(value + 0.5), 0), PIXELS - 1) for value in (x, y))
         r, g, b = (int(value) for value in self.pixels[row, column])
         return Color(r, g, b)
 
 
 def _range(first: float, last: float) -> range:
-    """Return the pixels from ``first`` to ``last`` that are on the canvas."""
+    """Return the pixel coordinates from ``first`` to ``last`` that are on the canvas."""
     return range(
         max(math.ceil(max(first, -1.0)), 0), min(math.floor(min(last, PIXELS + 1.0)), PIXELS - 1) + 1
     )

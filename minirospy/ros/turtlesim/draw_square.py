@@ -19,7 +19,7 @@ __all__ = ["main"]
 
 
 def main() -> int:
-    """Reset turtlesim if it is running, and draw until the node is shut down; return the exit status."""
+    """Reset turtlesim if it is running, and draw until the node shuts down; return the exit status."""
     rospy.init_node("draw_square")
     drawing = _Drawing()
     with contextlib.suppress(rospy.ServiceException):
@@ -31,7 +31,7 @@ def main() -> int:
 
 
 class _Drawing:
-    """The latest pose, and the next velocity command."""
+    """Drives the turtle: holds its latest pose, and publishes the next velocity command."""
 
     def __init__(self) -> None:
         self._pose: PoseMessage | None = None
@@ -55,5 +55,5 @@ class _Drawing:
             twist = Twist()
             twist.linear.x, twist.angular.z = order
             with contextlib.suppress(rospy.ROSException):
-                # publish() raises an exception if the node is shutting down.
+                # publish() raises an exception while the node shuts down.
                 self._publisher.publish(twist)

@@ -17,7 +17,7 @@ __all__ = ["main"]
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     rospy.init_node("turtle_mimic")
     publisher = rospy.Publisher(join(rospy.resolve_name("output"), "cmd_vel"), Twist, queue_size=1)
 
@@ -25,7 +25,7 @@ def main() -> int:
         twist = Twist()
         twist.linear.x, twist.angular.z = pose.linear_velocity, pose.angular_velocity
         with contextlib.suppress(rospy.ROSException):
-            # publish() raises an exception if the node is shutting down.
+            # publish() raises an exception while the node shuts down.
             publisher.publish(twist)
 
     subscriber = rospy.Subscriber(join(rospy.resolve_name("input"), "pose"), Pose, copy, queue_size=1)

@@ -42,13 +42,13 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2  # seconds; after a longer suspension, the node skips the missed steps
+_LATE_SECONDS = 0.2  # after a suspension longer than this, in seconds, skip the missed steps
 
 _T = TypeVar("_T")
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     try:
         rospy.init_node("turtlesim")
         is_headless = bool(rospy.get_param("~headless", False)) or not _has_terminal()
@@ -66,7 +66,7 @@ def main() -> int:
 
 
 def _has_terminal() -> bool:
-    """Return whether stdin and stdout are a terminal.
+    """Return whether stdin and stdout are terminals.
 
     A node started by roslaunch has no stdin, and shares roslaunch's terminal.
     """
@@ -75,7 +75,7 @@ def _has_terminal() -> bool:
 
 
 def _background() -> Color:
-    """Return the background colour from the parameters. If a value is not an integer, use ROS's default instead."""
+    """Return the background colour set by the parameters. If one is not an integer, return ROS's default."""
     values = [rospy.get_param(f"~background_{part}", usual) for part, usual in BACKGROUND._asdict().items()]
     chosen = [
         value & 255 if isinstance(value, int) and not isinstance(value, bool) else usual
@@ -85,7 +85,7 @@ def _background() -> Color:
 
 
 class Simulator:
-    """The world as a node: the services for all turtles, and each turtle's topics and services."""
+    """Connects the world to ROS: the services for all turtles, and each turtle's topics and services."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()  # guards the world
@@ -93,14 +93,14 @@ class Simulator:
             if not rospy.has_param(f"~background_{part}"):
                 rospy.set_param(f"~background_{part}", usual)
         self.world = World(_background())
-        # Serialises changes to the set of turtles; the world continues to step in the meantime.
+        # Serialises changes to the set of turtles; the world keeps stepping meanwhile.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
         self._services: list[rospy.Service[object]] = []
 
     def start(self) -> None:
         """Advertise the services and add the first turtle."""
-        with self._changing:  # a program that calls /spawn immediately gets the second turtle
+        with self._changing:  # a program that calls /spawn meanwhile gets the second turtle
             self._services = [
                 rospy.Service("clear", Empty, self._clear),
                 rospy.Service("reset", Empty, self._reset),
@@ -111,11 +111,11 @@ class Simulator:
             self._add(self.world.spawn_first)
 
     def run(self) -> None:
-        """Step every 16 ms of real time until the node is shut down."""
+        """Step the world every 16 ms of real time until the node shuts down."""
         due = time.monotonic()
         while not rospy.is_shutdown():
             with contextlib.suppress(rospy.ROSException):
-                # _step() raises an exception while the node is shutting down.
+                # _step() raises an exception while the node shuts down.
                 self._step()
             due += STEP_SECONDS
             late = time.monotonic() - due
@@ -165,7 +165,7 @@ class Simulator:
         with self._changing:
             with self.lock:
                 self.world.remove_all()
-            # Reuse the topics of an earlier turtle with the same name, so that their subscribers receive every message.
+            # Reuse the topics of an earlier turtle with the same name, so that existing subscribers receive every message.
             first = self._add(self.world.spawn_first)
             for name in set(self._ends) - {first}:
                 self._remove(name)
@@ -176,7 +176,7 @@ class Simulator:
         def spawn() -> str:
             spaces = {rospy.resolve_name(name) for name in self.world.names}
             if request.name and rospy.resolve_name(request.name) in spaces:
-                # The new name may be another spelling of an existing one, such as /turtle1.
+                # The name may be another spelling of an existing one, such as /turtle1 for turtle1.
                 raise WorldError(f"A turtled named [{request.name}] already exists")
             return self.world.spawn(request.name, request.x, request.y, request.theta)
 
@@ -192,7 +192,7 @@ class Simulator:
 
 
 def refusing(request: Callable[[], _T]) -> _T:
-    """Pass a request to the world and return the result. If the world rejects it, log the error and raise ServiceException."""
+    """Return the result of a request to the world. If the world rejects it, log the error and raise ServiceException."""
     try:
         return request()
     except WorldError as error:
@@ -206,7 +206,7 @@ class _Ends:
     def __init__(self, name: str, simulator: Simulator) -> None:
         self._name = name
         self._world, self._lock = simulator.world, simulator.lock
-        # Resolve the name as a namespace, so that remappings and ~ apply.
+        # Resolve the name as a namespace, so that remappings apply and ~ is resolved.
         space = rospy.resolve_name(name)
         self._poses = rospy.Publisher(join(space, "pose"), PoseMessage, queue_size=1)
         self._colors = rospy.Publisher(join(space, "color_sensor"), ColorMessage, queue_size=1)
@@ -218,7 +218,7 @@ class _Ends:
         ]
 
     def publish(self, reading: Reading) -> None:
-        """Publish the pose and colour."""
+        """Publish a turtle's pose and colour."""
         x, y, theta = reading.pose
         self._poses.publish(PoseMessage(x, y, theta, reading.linear, reading.angular))
         self._colors.publish(ColorMessage(*reading.color))

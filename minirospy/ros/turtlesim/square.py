@@ -15,11 +15,11 @@ __all__ = ["Order", "Square"]
 
 _SIDE_METRES = 2.0
 _NEAR_METRES, _NEAR_RADIANS = 0.1, 0.01
-_STILL = 0.0001  # metres or radians per second below which the turtle counts as stopped
+_STILL = 0.0001  # a turtle slower than this (m/s or rad/s) counts as stopped
 
 
 class Order(NamedTuple):
-    """Velocities: metres per second forward, radians per second to the left."""
+    """Velocities to command: metres per second forward, radians per second to the left."""
 
     linear: float = 0.0
     angular: float = 0.0
@@ -31,7 +31,7 @@ class _Phase(Enum):
 
 
 class Square:
-    """Moves to one goal after another: each goal is two metres ahead, or a quarter turn to the left."""
+    """Drives a square. Its goals alternate: two metres ahead, or a quarter turn to the left."""
 
     def __init__(self) -> None:
         self._goal: Pose | None = None
@@ -39,7 +39,7 @@ class Square:
         self._is_stopping = False
 
     def step(self, pose: Pose, linear: float, angular: float) -> tuple[Order | None, list[str]]:
-        """Return the velocity to command, or None for no change, and the lines to log.
+        """Return the velocity to command (None: unchanged) and the lines to log.
 
         The turtle is at ``pose``, and moves with the velocities ``linear`` and ``angular``.
         """

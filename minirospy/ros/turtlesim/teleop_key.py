@@ -23,11 +23,11 @@ _QUIT = "q"
 _USUAL_SCALE = 2.0
 
 DIRECTIONS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, 1.0), "right": (0.0, -1.0)}
-"""The signs of (forward motion, turn to the left), keyed by key name."""
+"""For each key: the signs of the forward motion and of the turn to the left."""
 
 
 def main() -> int:
-    """Run the node until q or Ctrl-C; return the exit status, 1 without a terminal."""
+    """Run the node until q or Ctrl-C; return the exit status, which is 1 without a terminal."""
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "turtle_teleop_key: ERROR: keys come from a terminal, which standard input is not: "
@@ -39,7 +39,7 @@ def main() -> int:
         rospy.init_node("teleop_turtle")
         _run()
     except OSError:
-        # The terminal's window was closed, so no more keys can arrive.
+        # The terminal window was closed, so no more keys can arrive.
         rospy.signal_shutdown("the terminal is closed")
     except rospy.ROSException:
         # The node is shutting down.
@@ -50,7 +50,7 @@ def main() -> int:
 def _run() -> None:
     linear, angular = _scale("scale_linear"), _scale("scale_angular")
     publisher = rospy.Publisher("turtle1/cmd_vel", Twist, queue_size=1)
-    # Set up the terminal before showing the help, because the setup discards earlier input.
+    # Set up the terminal before showing the help, because the setup discards pending input.
     with Keys(end=_QUIT) as keys:
         print(_HELP, flush=True)
         while not rospy.is_shutdown():

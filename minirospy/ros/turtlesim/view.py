@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "Screen"]
 
 _PERIOD_SECONDS = 0.1
-_LINES_BESIDE = 4  # number of terminal lines reserved for the log and the picture's frame
+_LINES_BESIDE = 4  # number of terminal lines reserved for the log and the picture's border
 
 _ROWS = range(8, 41)
-"""Allowed numbers of rows: fewer show too little, more take too much CPU time."""
+"""Allowed picture heights in terminal rows: fewer show too little, more take too much CPU time."""
 
 _ARROWS, _ASCII_ARROWS = "→↗↑↖←↙↓↘", ">/^\\</v\\"
 _STYLES = ("bright_green", "bright_yellow", "bright_red", "bright_cyan", "bright_magenta", "bright_white")
 
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
-"""The bits of a Braille character: four rows with two dots each."""
+"""The bits of a Braille character's dots: four rows of two dots each."""
 
 
 class Picture:
@@ -73,7 +73,7 @@ class Picture:
         )
 
     def _turtles(self, rows: int, *, is_ascii: bool) -> dict[tuple[int, int], tuple[str, str]]:
-        """Return turtles' arrows and styles, keyed by row and column. Only a cell's last turtle is shown."""
+        """Return the arrow and style of each turtle, keyed by (row, column). If a cell has several turtles, show the last one."""
         arrows = _ASCII_ARROWS if is_ascii else _ARROWS
         found = {}
         for index, pose in enumerate(self._poses.values()):
@@ -84,9 +84,9 @@ class Picture:
 
 
 def cells(canvas: Canvas, rows: int, *, is_ascii: bool = False) -> tuple[list[str], list[list[Color]]]:
-    """Return the canvas as ``rows`` lines with 2 * ``rows`` characters, and the mean line colour in each character."""
+    """Return the canvas as ``rows`` lines of 2 * ``rows`` characters, and the mean colour of the lines in each character."""
     dots = _blocks(canvas.marks, 4 * rows, 4 * rows) > 0
-    # A Braille character has four rows with two dots each.
+    # A Braille character has four rows of two dots each.
     dots = dots.reshape(rows, 4, 2 * rows, 2)
     codes = (dots * _DOTS[None, :, None, :]).sum(axis=(1, 3))
     marked = "*" if is_ascii else ""
@@ -105,7 +105,7 @@ def cells(canvas: Canvas, rows: int, *, is_ascii: bool = False) -> tuple[list[st
 def _blocks(
     values: np.ndarray[tuple[int, ...], np.dtype[np.generic]], rows: int, columns: int
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Return the sum of ``values`` over each block, with the canvas divided into ``rows`` times ``columns`` blocks."""
+    """Divide the canvas into ``rows`` times ``columns`` blocks; return the sum of ``values`` in each block."""
     starts = [-(-np.arange(count) * PIXELS // count) for count in (rows, columns)]
     sums = np.add.reduceat(values.astype(np.int64), starts[0], axis=0)
     return np.add.reduceat(sums, starts[1], axis=1)
@@ -128,7 +128,7 @@ def _rgb(color: Color) -> str:
 
 
 class Screen:
-    """Draws a world ten times a second while it changes, below the log lines. A context manager.
+    """Draws a world below the log lines, at most ten times per second and only after changes. A context manager.
 
     A separate thread draws, so that a stopped (Ctrl-S) or slow terminal does not stop the turtles.
     """
@@ -144,7 +144,7 @@ class Screen:
 
         console = Console(file=own_output())
         if console.is_dumb_terminal:
-            # Draw nothing: a dumb terminal cannot move the cursor up.
+            # A dumb terminal cannot move the cursor up, so draw nothing.
             self._ended.set()
         self._live = Live(console=console, auto_refresh=False)
         if not self._ended.is_set():
@@ -171,7 +171,7 @@ class Screen:
             self._ended.wait(_PERIOD_SECONDS)
 
     def _state(self) -> object:
-        """Return the state that determines the picture."""
+        """Return the values that the picture depends on."""
         world = self._world
         poses = [(name, world.pose(name)) for name in world.names]
         return world.canvas.version, poses, shutil.get_terminal_size()

@@ -16,22 +16,22 @@ from minirospy.ros.turtlesim.canvas import PIXELS, Canvas, Color
 
 __all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velocity", "World", "WorldError"]
 
-BACKGROUND = Color(69, 86, 255)  # background if the parameters set no other colour
+BACKGROUND = Color(69, 86, 255)  # the background if the parameters set no colour
 
 STEP_SECONDS = 0.016  # seconds between steps
 
-_COMMAND_SECONDS = 1.0  # seconds for which a velocity command stays in effect
+_COMMAND_SECONDS = 1.0  # seconds that a velocity command stays in effect
 
 _PIXELS_PER_METRE = 45.0
 
 
 def _float32(value: float) -> float:
-    """Return a number rounded to float32 precision."""
+    """Round a number to float32 precision."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
 SIZE = _float32((PIXELS - 1) / _PIXELS_PER_METRE)
-"""The world's width and height, in metres: 11.088889."""
+"""Width and height of the world, in metres: 11.088889."""
 
 
 class WorldError(MinirospyError):
@@ -54,7 +54,7 @@ class Pen(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """The distances in metres from the left and lower walls, and the direction in radians: 0 is right, pi / 2 is up."""
+    """A turtle's pose: metres from the left and lower walls, and the direction in radians (0: right, pi / 2: up)."""
 
     x: float
     y: float
@@ -62,13 +62,13 @@ class Pose(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A turtle's data, published after a step."""
+    """A turtle's data, which is published after each step."""
 
     name: str
     pose: Pose
     linear: float  # metres per second
     angular: float  # radians per second
-    color: Color  # canvas colour under the turtle, before the turtle drew on it
+    color: Color  # colour of the canvas under the turtle, before the turtle drew on it
     warning: str  # log line about a wall that the turtle hit, or ""
 
 
@@ -80,7 +80,7 @@ class _Teleport(NamedTuple):
 
 
 class _Turtle:
-    """One turtle. Its ``y`` is the distance from the upper wall, as on the canvas."""
+    """A turtle. Its ``y`` is the distance from the upper wall, as on the canvas."""
 
     def __init__(self, x: float, y: float, theta: float) -> None:
         self.x, self.y, self.theta = x, y, theta
@@ -103,7 +103,7 @@ class _Turtle:
             self.x, self.y, self.theta = target.x, max(0.0, SIZE - target.y), target.theta
 
     def move(self, seconds: float) -> None:
-        """Turn the turtle, then move it."""
+        """Turn the turtle, then move it, for ``seconds``."""
         forward, left, turn = self.velocity
         self.theta += turn * seconds
         # Normalise the angle to [-pi, pi).
@@ -113,7 +113,7 @@ class _Turtle:
         self.y -= (ahead * left + aside * forward) * seconds
 
     def stop_at_walls(self) -> str:
-        """Clamp the position to the world; return the warning about a wall, or ""."""
+        """Clamp the position to the world. Return the warning about the wall, or "" if the turtle hit none."""
         x, y = self.x, self.y
         self.x, self.y = (min(max(value, 0.0), SIZE) for value in (x, y))
         if (x, y) == (self.x, self.y):
@@ -122,7 +122,7 @@ class _Turtle:
 
 
 class World:
-    """The turtles, keyed by name, and their canvas. Initially, there are no turtles."""
+    """The turtles, keyed by name, and their canvas. A new world has no turtles."""
 
     def __init__(self, background: Color = BACKGROUND) -> None:
         self.canvas = Canvas(background)
@@ -143,7 +143,7 @@ class World:
         self.canvas.fill(background)
 
     def remove_all(self) -> None:
-        """Remove all turtles; the next turtle without a name is turtle1 again."""
+        """Remove all turtles, and restart the generated names at turtle1."""
         self._turtles.clear()
         self._last_number = 0
 
@@ -164,7 +164,7 @@ class World:
         return name
 
     def spawn_first(self) -> str:
-        """Add a turtle with a generated name in the middle; return its name."""
+        """Add a turtle with a generated name at the centre; return its name."""
         return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
 
     def kill(self, name: str) -> None:
@@ -181,7 +181,7 @@ class World:
             turtle.pen = Pen(color, width or 1)
 
     def teleport_absolute(self, name: str, x: float, y: float, theta: float) -> None:
-        """Move a turtle at the next step; its pen draws the path."""
+        """Move a turtle to a pose at the next step; its pen draws the path."""
         _check_finite(x=x, y=y, theta=theta)
         self._turtle(name).teleports.append(_Teleport(False, x, y, theta))
 
@@ -197,7 +197,7 @@ class World:
         turtle.velocity, turtle.command_time = velocity, now
 
     def step(self, now: float) -> list[Reading]:
-        """Advance by 16 ms; return each turtle's data, sorted by name.
+        """Advance the world by 16 ms; return each turtle's data, sorted by name.
 
         ``now``: seconds on the clock that :meth:`command` uses.
         """

@@ -4,7 +4,7 @@
 import os
 import sys
 
-# Do not let this folder hide the package xacro.
+# Make sure that this folder does not shadow the package xacro.
 _HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:] = [folder for folder in sys.path if os.path.abspath(folder) != _HERE]
 

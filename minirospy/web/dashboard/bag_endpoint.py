@@ -51,7 +51,7 @@ SUBPROTOCOL = "minirospy.bag.v1"
 
 _PLAYING_SECONDS = 0.05
 _RECORDING_SECONDS = 0.25
-_SAMPLING_SECONDS = 0.25  # between reports of the progress of reading a bag
+_SAMPLING_SECONDS = 0.25  # seconds between progress reports while a bag is being read
 _MAX_BINS = 4000
 _MAX_THUMBNAILS = 60
 _LEAST_RATE, _MAX_RATE = 0.1, 10.0
@@ -61,7 +61,7 @@ _SECOND = 10**9
 
 
 class BagEndpoint(JsonEndpoint["BagSession"]):
-    """Serves the bags in a folder; all clients share the same recording."""
+    """Serves the bags in a folder. All clients share a single recording."""
 
     def __init__(self, folder: BagFolder, master_uri: str, graph: Callable[[], SharedGraph]) -> None:
         super().__init__(SUBPROTOCOL, lambda client: BagSession(self, client))
@@ -72,11 +72,11 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         self._starting: asyncio.Task[None] | None = None
 
     async def record(self, name: str, suffix: str, topics: Sequence[str], compression: str) -> None:
-        """Start a recording. Raise MinirospyError if it cannot be started."""
+        """Start a recording. Raise MinirospyError if that fails."""
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # If the page is closed while the recording starts, the child process must still be stopped.
+        # A separate task, so that the child process is stopped even if the page is closed during the start.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -88,7 +88,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         self.changed()
 
     async def stop(self) -> None:
-        """Complete the recording, if one is running or starting."""
+        """Finish the recording, if one is running or starting."""
         if self._starting:
             await asyncio.wait([self._starting])
         if self.recording:
@@ -96,7 +96,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
             self.changed()
 
     async def close(self) -> None:
-        """End all sessions, whose connections are already closed, and complete the recording."""
+        """End all sessions, whose connections are already closed, and finish the recording."""
         await super().close()
         await self._close_recording()
 
@@ -107,7 +107,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
 
 
 class BagSession(JsonSession):
-    """One client's session. File access blocks, so it runs in the session's thread."""
+    """The session of one client. File access blocks, so it runs in the session's thread."""
 
     subject: ClassVar[str] = "bags"
     owners_only: ClassVar[str] = "record or open bags"
@@ -139,7 +139,7 @@ class BagSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the state of the recording and of the player, the current messages of shown topics, and a pending thumbnail."""
+        """Send the states of the recording and the player, the current messages of the shown topics, and a thumbnail."""
         recording = self._endpoint.recording
         state = recording.state() if recording else None
         self._send_changed("recording", state._asdict() if state else None)
@@ -199,7 +199,7 @@ class BagSession(JsonSession):
         try:
             bag = self._bag = await asyncio.wrap_future(future)
         except asyncio.CancelledError:
-            # The page was closed while the bag was being opened: close the bag in that session's thread.
+            # The page was closed while the bag was being opened, so close it as soon as it is open.
             future.add_done_callback(_close_opened)
             raise
         start, end = bag.span
@@ -226,7 +226,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # If the client disconnects now, cancel only the wait, not the closing of the bag.
+            # If the client disconnects now, cancel only the wait, so that the bag is still closed.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:
@@ -246,8 +246,7 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # A step publishes all messages that have the same time.
-        # After a seek, the messages at that time have been shown but not published.
+        # A step publishes all messages with the same time. After a seek, those at the current time have not been published yet.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:
@@ -266,7 +265,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # Publish the earlier messages of latched topics, because new subscribers would not receive them otherwise.
+        # Publish the last earlier message of each latched topic, which new subscribers would otherwise not receive.
         now = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, now)):
             bag.output.send(topic, body)
@@ -305,7 +304,7 @@ class BagSession(JsonSession):
         name, topics, format_ = self._opened().name, texts_of(fields, "topics"), text_of(fields, "format")
         if not topics:
             raise UsageError("no topic is chosen")
-        # Do not wait for the export, so that the player remains usable.
+        # Do not wait for the export, so that the player remains responsive.
         self._endpoint.spawn(self._write_tables(name, topics, format_))
 
     async def _write_tables(self, name: str, topics: Sequence[str], format_: str) -> None:
@@ -339,7 +338,7 @@ class BagSession(JsonSession):
         last = 0.0
 
         def report(share: float) -> None:
-            """Report the progress to the page, in the session's thread. Raise BagError if the page has disconnected."""
+            """Send the progress to the page; called in the session's thread. Raise BagError if the page has disconnected."""
             nonlocal last
             if self.is_ended:
                 raise BagError("the page has left")
@@ -395,7 +394,7 @@ class BagSession(JsonSession):
 
     @staticmethod
     def _time(bag: OpenBag, seconds: object) -> int:
-        """Convert a client's time in seconds to the bag's time."""
+        """Convert seconds sent by a client to a time in the bag."""
         start, end = bag.span
         return min(max(start + round(number(seconds) * _SECOND), start), end)
 

@@ -24,11 +24,11 @@ _MAX_ENTRIES = 50_000
 _MAX_DEPTH = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-"""Names of Windows devices, which are not allowed as file names."""
+"""Device names on Windows, which cannot be file names."""
 
 
 class FoundBag(NamedTuple):
-    """A bag: its name for the page (with slashes), its size in bytes, and its modification time in seconds."""
+    """A bag: its name for the page (with forward slashes), its size in bytes, and its modification time in seconds."""
 
     name: str
     size: int
@@ -36,7 +36,7 @@ class FoundBag(NamedTuple):
 
 
 class BagFolder:
-    """A folder with bags; ``given`` lists the files on the command line, which may be in any folder."""
+    """A folder with bags. ``given`` lists files from the command line, which may be in any folder."""
 
     def __init__(self, root: Path, given: Sequence[Path] = ()) -> None:
         self.root = root.absolute()
@@ -44,11 +44,11 @@ class BagFolder:
 
     @property
     def given(self) -> list[str]:
-        """Return the names of the files on the command line."""
+        """Return the names of the files from the command line."""
         return list(self._given)
 
     def bags(self) -> list[FoundBag]:
-        """Return the bags, newest first. Links are not followed, and folders whose name starts with a dot are skipped."""
+        """Return the bags, newest first. Do not follow links, and skip folders whose names start with a dot."""
         found: dict[str, FoundBag] = {}
         for name, path in self._given.items():
             try:
@@ -68,7 +68,7 @@ class BagFolder:
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
     def path_of(self, name: str) -> Path:
-        """Return the path of an existing bag, given its name from :meth:`bags`. Raise BagError if it does not exist."""
+        """Return the path of the bag that :meth:`bags` lists as ``name``. Raise BagError if it does not exist."""
         if name in self._given:
             return self._given[name]
         parts = name.split("/")
@@ -90,7 +90,7 @@ class BagFolder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Return the path for a new recording. Raise UsageError if the name is invalid or in use."""
+        """Return the path for a new recording. Raise UsageError if the name is invalid or already exists."""
         stem = name.removesuffix(suffix)
         if not _NAME.fullmatch(stem) or stem.endswith((".", " ")) or _RESERVED.match(stem):
             raise UsageError(

@@ -31,11 +31,11 @@ _log = logging.getLogger(__name__)
 
 _SECOND = 10**9
 _MAX_WAITING = 200
-"""Maximum number of messages queued for the loop. If the queue is full, the player waits."""
+"""Maximum number of messages queued for the loop; the player waits while the queue is full."""
 
 
 class GraphOutput:
-    """Publishes a player's messages to the loop's graph: the messages on enabled topics, and the clock."""
+    """Publishes a player's messages, and optionally the clock, on the loop's graph. Topics are enabled individually."""
 
     def __init__(self, graph: SharedGraph) -> None:
         """Create the output for ``graph``. Must be called on the loop."""
@@ -59,7 +59,7 @@ class GraphOutput:
         return self._clock is not None
 
     def switch(self, timeline: Timeline, topics: Collection[str], *, clock: bool) -> list[str]:
-        """Enable exactly the given topics; return one line for each topic that cannot be published."""
+        """Enable these topics, and no others; return one line for each topic that cannot be published."""
         refused = []
         for topic in [each for each in self._publications if each not in topics]:
             self._publications.pop(topic).close()
@@ -109,7 +109,7 @@ class GraphOutput:
         """See :meth:`Output.open`. Does nothing, because the session stops the player."""
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """See :meth:`Output.advertise`. Does nothing, because a topic is advertised when it is enabled."""
+        """See :meth:`Output.advertise`. Does nothing, because topics are advertised when they are enabled."""
 
     def offer(self, player: Controls) -> None:
         """See :meth:`Output.offer`. Does nothing, because the page controls the player."""
@@ -145,7 +145,7 @@ class GraphOutput:
             self._clock.publish(CLOCK.pack(*divmod(time, _SECOND)))
 
     def _post(self, send: Callable[[], None]) -> None:
-        """Call ``send`` on the loop; wait while too many messages are queued."""
+        """Call ``send`` on the loop. Block while too many messages are queued."""
 
         def run() -> None:
             self._free.release()
@@ -162,7 +162,7 @@ class GraphOutput:
 
 
 class OpenBag:
-    """An open bag: a timeline, and a player that is paused at the start. Methods block, so do not call them on the loop.
+    """An open bag with its timeline and a player, which is paused at the start. Methods block, so do not call them on the loop.
 
     ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError if the bag is
     invalid, OSError if it cannot be read.
@@ -173,7 +173,7 @@ class OpenBag:
     ) -> None:
         self.name = name
         self.output = output
-        self.failure = ""  # the error that stopped the player, or "" if there was none
+        self.failure = ""  # the error that stopped the player, or ""
         self._files = ExitStack()
         with ExitStack() as opened:
             try:
@@ -193,17 +193,17 @@ class OpenBag:
         self._thread = threading.Thread(target=self._play, name="bag-player", daemon=True)
         if self.timeline.topics:
             self._thread.start()
-            # The player cannot be controlled before it is ready.
+            # Wait until the player is ready, because it cannot be controlled earlier.
             self._is_ready.wait()
 
     @property
     def state(self) -> PlayerState:
-        """Return the player's state, with its time limited to the bag's time range. May be called from any thread."""
+        """Return the player's state; its time is within the bag. May be called from any thread."""
         found = self.player.state()
         return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
 
     def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
-        """Return the last message up to ``time`` of each latched topic in ``topics``, for late subscribers."""
+        """Return (topic, last message up to ``time``) of each latched topic in ``topics``, for new subscribers."""
         return [
             (topic, message.body)
             for topic in topics

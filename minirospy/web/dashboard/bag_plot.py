@@ -16,21 +16,21 @@ from minirospy.web.dashboard.json_session import Fields, number, text_of
 
 __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
-_MAX_COLUMNS = 5_000  # with MAX_SERIES series, 2,000,000 points
-_MAX_SERIES = 100  # paths per request
-_MARGIN_SECONDS = 10.0  # read before a range, so that the subtrahend has a point before the minuend's
-_WIDER = 4  # factor by which the margin grows if the subtrahend has no point in it
+_MAX_COLUMNS = 5_000  # maximum number of columns: with MAX_SERIES series, 2,000,000 points
+_MAX_SERIES = 100  # maximum number of paths per request
+_MARGIN_SECONDS = 10.0  # seconds read before a range, to find a point of the subtrahend before the minuend's
+_WIDER = 4  # factor by which the margin grows while the subtrahend has no point in it
 
 
 class Operand(NamedTuple):
-    """A path in a bag; the bag has the name that the page shows."""
+    """A path in a bag, which is named as on the page."""
 
     bag: str
     path: str
 
 
 class BagPath(NamedTuple):
-    """A series, under the page's key for it: a path in a bag, or the difference of two paths."""
+    """A series that the page identifies by ``key``: a path in a bag, or the difference of two paths."""
 
     key: str
     operand: Operand
@@ -38,7 +38,7 @@ class BagPath(NamedTuple):
 
 
 class SeriesRequest(NamedTuple):
-    """A page's request: the series, and the time range in seconds since each bag's start (None: the whole bag)."""
+    """A page's request for series in a time range, in seconds since each bag's start (None: the whole bag)."""
 
     id: object
     start: float | None
@@ -48,7 +48,7 @@ class SeriesRequest(NamedTuple):
 
     @classmethod
     def parse(cls, fields: Fields) -> SeriesRequest:
-        """Parse a request. Raise LookupError, TypeError or UsageError if it is invalid."""
+        """Parse a page's request. Raise LookupError, TypeError or UsageError if it is invalid."""
         columns = min(max(int(number(fields["columns"])), 1), _MAX_COLUMNS)
         start, end = (None if fields.get(name) is None else number(fields[name]) for name in ("start", "end"))
         wanted = fields["series"]
@@ -74,7 +74,7 @@ def _operand(fields: object) -> Operand:
 
 
 def fields_of(folder: BagFolder, name: str) -> Fields:
-    """Return a bag's topics with their definitions. Raise BagError if the bag cannot be opened."""
+    """Return the topics in a bag with their definitions. Raise BagError if the bag cannot be opened."""
     with ExitStack() as opened:
         reader = _open(folder, name, opened)
         start, end = bag_series.bag_span(reader)
@@ -83,7 +83,7 @@ def fields_of(folder: BagFolder, name: str) -> Fields:
 
 
 def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[float], object]) -> Fields:
-    """Return the requested series, and an error text for each one that cannot be read.
+    """Return the requested series, and an error message for each one that cannot be read.
 
     ``on_share`` is called with the fraction read so far (0 to 1). An exception from it ends the reading.
     """
@@ -92,7 +92,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
     budget = Budget()
     by_bag: dict[str, list[BagPath]] = {}
     for each in request.paths:
-        # Read all paths in the same bag together. A difference needs two readers, because they may be at different positions.
+        # Read all paths in a bag together. A difference needs two readers of the same bag, which may be at different positions.
         place = each.operand.bag if each.minus is None else f"{each.key}\0"
         by_bag.setdefault(place, []).append(each)
     for done, group in enumerate(by_bag.values()):
@@ -103,7 +103,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
         try:
             found += _read(folder, group, request, report, errors, budget)
         except (MinirospyError, OSError, RecursionError, ValueError) as error:
-            report(1.0)  # raises if the page has disconnected
+            report(1.0)  # raises an exception if the page has disconnected
             name = group[0].operand.bag
             text = str(error) if name in str(error) else f"{name}: {error}"
             errors.update((each.key, text) for each in group)
@@ -142,7 +142,7 @@ def _read(
             subtrahend = bag_series.field_path(
                 minus.path, {each.topic for each in other.connections.values()}
             )
-            # Read beyond the end as far as the difference needs it.
+            # Read the subtrahend beyond both ends of the range, as needed for the difference.
             before = None if start is None else _start_before(other, subtrahend, start, on_time)
             around = bag_series.points(other, [subtrahend], before, None, on_time)
             difference = bag_series.differences((point for _, point in found), (point for _, point in around))
@@ -161,7 +161,7 @@ def _read(
 def _start_before(
     reader: BagReader, path: FieldPath, start: float, on_time: Callable[[float], object]
 ) -> float | None:
-    """Return a time, at or before which a series has a point before ``start``; None (the bag's start) if there is none."""
+    """Return a time from which reading finds a point before ``start``, or None (the bag's start) if there is no such point."""
     margin = _MARGIN_SECONDS
     while margin < start:
         for _ in bag_series.points(reader, [path], start - margin, start, on_time):

@@ -35,14 +35,14 @@ _LOOK_SECONDS = 0.02
 
 
 class BoardEndpoint(JsonEndpoint["BoardSession"]):
-    """Serves this machine's boards. Each client selects its board with ``?board=NAME``."""
+    """Serves the boards on this machine. A client selects its board with ``?board=NAME``."""
 
     def __init__(self) -> None:
         super().__init__(SUBPROTOCOL, BoardSession)
 
 
 class BoardSession(JsonSession):
-    """One client's session. The board's calls block, so they run in the session's thread."""
+    """The session of one client. The board's calls block, so they run in the session's thread."""
 
     subject: ClassVar[str] = "the board"
     longest: ClassVar[int] = 1000
@@ -66,17 +66,17 @@ class BoardSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`. Each operation has a single field, whose name is the operation."""
+        """See :meth:`JsonSession.parse`. An operation has a single field, named like the operation."""
         (name,) = fields
         return name, fields
 
     async def started(self) -> None:
-        """Open the board."""
+        """Open the client's board."""
         name = self.client.request.query.get("board") or None
         try:
             directory = BoardDirectory.find(name)
             self._boards = await self.in_thread(directory.names)
-            # Only the owner may open a board that is not running, because opening it starts a process.
+            # Only the owner may open a board that is not running, because that starts a process.
             if name and name not in self._boards and not self.client.is_owner:
                 raise BoardError(
                     f"there is no board [{directory.name}]: {self.client.why_not_owner('start boards')}"
@@ -155,7 +155,7 @@ def _pin(value: object) -> int:
 
 
 def _leave(opening: Future[Board], pressed: set[int]) -> None:
-    """Release the buttons, and disconnect from the board if it was opened. Runs in the session's thread."""
+    """Release the buttons; disconnect from the board if it has been opened. Runs in the session's thread."""
     if opening.cancelled() or opening.exception():
         return
     board = opening.result()

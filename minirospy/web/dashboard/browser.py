@@ -22,20 +22,18 @@ from minirospy.base.private_files import create_file
 __all__ = ["LinkFile", "has_screen", "link_page", "open_link"]
 
 SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
-"""Browsers packaged as snaps: they cannot read the temporary folder or hidden folders, but can read other files in the home
-folder.
-"""
+"""Browsers installed as snaps, which can read files in the home folder, but not in hidden or temporary folders."""
 
 
 def has_screen(environ: Mapping[str, str], platform: str = sys.platform) -> bool:
-    """Return whether a browser has a display. Without a display, a text browser would take over the terminal."""
+    """Return whether there is a display. Without one, a text browser would take over the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME", "BROWSER"))
 
 
 def link_page(link: str) -> str:
-    """Return a page that redirects the browser to a link, with or without JavaScript."""
+    """Return an HTML page that redirects to a link, with or without JavaScript."""
     shown = html.escape(link)
     return (
         '<!doctype html>\n<html><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">\n'
@@ -45,11 +43,11 @@ def link_page(link: str) -> str:
 
 
 class LinkFile:
-    """A link's page in a folder that only this user can access."""
+    """A page that redirects to a link, in a folder that only this user can access."""
 
     def __init__(self, link: str) -> None:
-        """Create the link's file. Raise OSError if that fails."""
-        # mkdtemp makes the folder accessible only to this user; on Windows, it uses an access control list.
+        """Create the page's file. Raise OSError if that fails."""
+        # Only this user can access a folder made by mkdtemp, on Windows by means of an access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"
         try:
@@ -65,14 +63,14 @@ class LinkFile:
 
 
 def open_link(link: str) -> Callable[[], object] | None:
-    """Open a link without waiting for the browser; return a function that removes the link's file (None: nothing was opened).
+    """Open a link without waiting for the browser. Return a function that removes the link's file, or None if nothing is opened.
 
     Nothing is opened without a display, or if the file cannot be created.
     """
     if not has_screen(os.environ):
         return None
     if os.environ.get("WSL_DISTRO_NAME"):
-        # Pass the link itself, because a Windows browser cannot open a file by its Linux path.
+        # Pass the link itself, because a browser on Windows cannot open a Linux path.
         return _open(link, lambda: None)
     try:
         file = LinkFile(link)
@@ -82,13 +80,13 @@ def open_link(link: str) -> Callable[[], object] | None:
 
 
 def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
-    # Starting a browser may block for seconds. A daemon thread does not keep this process alive.
+    # Starting a browser may block for seconds. Use a daemon thread, so that it does not keep this process alive.
     threading.Thread(target=webbrowser.open, args=(address,), name="browser", daemon=True).start()
     return remove
 
 
 def _parent() -> Path | None:
-    """Return the folder in which to create the file's folder, or None for the system's temporary folder."""
+    """Return the parent folder for the link file's folder, or None for the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in SNAPS) and os.access(home, os.W_OK):
         return home

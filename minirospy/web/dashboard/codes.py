@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LIFETIME", "Codes"]
 
-LIFETIME = 60.0  # seconds; the browser starts immediately, and sends the code within a few seconds
+LIFETIME = 60.0  # seconds; the browser starts immediately, and sends its code within a few seconds
 ROOT_UID = 0
 
 
@@ -36,21 +36,21 @@ class _Code(NamedTuple):
 
 
 class Codes:
-    """The unused codes. Runs on the loop."""
+    """One-time codes that have not been used. Runs on the loop."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._waiting: dict[str, _Code] = {}
 
     def new(self, token: str) -> str:
-        """Return a code for a token."""
+        """Return a new code for a token."""
         self.forget_expired()
         code = secrets.token_urlsafe(16)
         self._waiting[code] = _Code(token, self._clock() + LIFETIME)
         return code
 
     def when_ended(self, code: str, action: Callable[[], object]) -> None:
-        """Call ``action`` once, when the code is used, expires or is discarded."""
+        """Call ``action`` once: when the code is used, expires or is discarded."""
         found = self._waiting.get(code)
         if found:
             self._waiting[code] = found._replace(on_end=action)
@@ -58,19 +58,19 @@ class Codes:
             action()
 
     def token_of(self, code: str) -> str:
-        """Return the token for a code, or "" if the code is not valid. The code stays valid."""
+        """Return a code's token without using up the code, or "" if the code is invalid."""
         self.forget_expired()
         found = self._waiting.get(code)
         return found.token if found else ""
 
     def redeem(self, code: str) -> str:
-        """Return the token for a code and invalidate the code, or return "" if the code is not valid."""
+        """Return a code's token and invalidate the code, or return "" if the code is invalid."""
         token = self.token_of(code)
         self._forget(code)
         return token
 
     def forget_expired(self) -> None:
-        """Discard the expired codes."""
+        """Discard all expired codes."""
         now = self._clock()
         for code in [code for code, found in self._waiting.items() if now >= found.end]:
             self._forget(code)
@@ -81,7 +81,7 @@ class Codes:
             self._forget(code)
 
     def serve(self, exchange: Exchange) -> None:
-        """Respond to a page that sends a code as a bearer token. The code stays valid if the request is refused."""
+        """Respond with the token to a page that sends a code as its bearer token. A refused request does not use up the code."""
         code = exchange.request.headers.get("authorization", "").removeprefix("Bearer ")
         if not self.token_of(code):
             exchange.respond(403, b"this link has been used\n")
@@ -97,7 +97,7 @@ class Codes:
 
 
 def _is_trusted(request: HttpRequest) -> bool:
-    """Return whether a request is from this user or root; always True on systems other than Linux."""
+    """Return whether this user or root has sent a request; on systems other than Linux, always return True."""
     if sys.platform != "linux":
         return True
     return owner_of((request.peer, request.peer_port), (request.address, request.port)) in (

@@ -24,7 +24,7 @@ PORT = 8766
 
 
 class Dashboard:
-    """Serves the page. Runs on the node's loop."""
+    """Serves the dashboard's page. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -60,11 +60,11 @@ class Dashboard:
 
     @property
     def port(self) -> int:
-        """Return the page's port, after :meth:`start`."""
+        """Return the page's port. It is known after :meth:`start`."""
         return self.bridge.listeners["foxglove"].port
 
     async def start(self) -> None:
-        """Start listening. Raise BridgeError if a port cannot be opened."""
+        """Open the ports. Raise BridgeError if one cannot be opened."""
         await self.bridge.start()
         if self._joints.always_publishes:
             self._joints.start_work()
@@ -73,8 +73,7 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         self.codes.close()
         async with AsyncExitStack() as closing:
-            # Close the parts in reverse order, and all of them even if one fails.
-            # Players use the bridge's graph until their sessions end.
+            # Close all parts, in reverse order, even if one fails: players use the bridge until their sessions end.
             for part in (
                 self._tools,
                 self._board,

@@ -47,7 +47,7 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""Seconds without a command after which a client that holds a control is considered lost; its topics are then stopped."""
+"""Seconds without a command after which a client that holds a control counts as lost, and its topics are stopped."""
 
 _log = logging.getLogger(__name__)
 
@@ -67,17 +67,17 @@ class Velocity:
 
     @property
     def is_zero(self) -> bool:
-        """Return whether the velocity is zero."""
+        """Return whether all components are zero."""
         return not any(self.values)
 
     def zero(self) -> Velocity:
-        """Return a zero velocity."""
+        """Return a velocity whose components are all zero."""
         return Velocity((0.0,) * 6)
 
 
 @dataclass(frozen=True)
 class Joystick:
-    """A sensor_msgs/Joy: axes from -1 to 1, and buttons that are 0 or 1."""
+    """A sensor_msgs/Joy with axes from -1 to 1, and buttons of 0 or 1."""
 
     axes: tuple[float, ...]
     buttons: tuple[int, ...]
@@ -94,7 +94,7 @@ class Joystick:
 
 @dataclass(frozen=True)
 class Target:
-    """A trajectory_msgs/JointTrajectory with one point: the joints' positions, and the seconds to reach them."""
+    """A trajectory_msgs/JointTrajectory with one point: the joints' positions, and the seconds to reach it."""
 
     joints: tuple[str, ...]
     positions: tuple[float, ...]
@@ -102,11 +102,11 @@ class Target:
 
     @property
     def is_zero(self) -> bool:
-        """Return whether the trajectory is empty: the joints hold their positions."""
+        """Return whether the trajectory is empty, which makes the joints hold their positions."""
         return not self.joints
 
     def zero(self) -> Target:
-        """Return an empty trajectory."""
+        """Return an empty trajectory, which makes the joints hold their positions."""
         return Target((), (), 0.0)
 
 
@@ -115,14 +115,14 @@ Held = Velocity | Joystick | Target
 
 @dataclass(frozen=True)
 class Command:
-    """A client's command: a topic and the message to publish, or None if the client has released the topic."""
+    """A client's command: a topic and the message to publish, or None to release the topic."""
 
     topic: str
     held: Held | None
 
 
 def parse(text: str) -> Command:
-    """Parse a command. Raise ValueError if it is invalid."""
+    """Parse a client's command. Raise ValueError if it is invalid."""
     if len(text) > _MAX_COMMAND_LENGTH:
         raise ValueError(f"it has more than {_MAX_COMMAND_LENGTH} characters")
     try:
@@ -188,7 +188,7 @@ def _numbers(values: object) -> tuple[float, ...]:
 
 
 class DriveEndpoint:
-    """Opens a session for each client; ``graph()`` returns the graph on which clients publish."""
+    """Opens a session for each client. ``graph()`` returns the graph in which clients publish."""
 
     def __init__(self, graph: Callable[[], SharedGraph]) -> None:
         self._graph = graph
@@ -206,7 +206,7 @@ class DriveEndpoint:
 
 
 class DriveSession:
-    """One client's session. Runs on the loop."""
+    """The session of one client. Runs on the loop."""
 
     def __init__(self, client: WebClient, graph: SharedGraph, guard: StopGuard) -> None:
         self._client = client
@@ -235,7 +235,7 @@ class DriveSession:
         self._send(error="binary messages have no meaning here")
 
     def ended(self) -> None:
-        """Stop and release every topic that the client drives."""
+        """Stop and release all topics that the client drives."""
         for topic in list(self._driven):
             try:
                 self._driven.pop(topic).close()
@@ -279,7 +279,7 @@ class _Driven:
         held: Held,
         stopped: Callable[[str], None],
     ) -> None:
-        """Advertise the topic. Raise BridgeError if clients may not publish it, or if it has another type."""
+        """Advertise the topic. Raise BridgeError if clients may not publish it, or its type is different."""
         self.kind = type(held)
         self._graph = graph
         self._guard = guard
@@ -287,15 +287,14 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # The lock protects the attributes below.
-        # A command (sent on the loop) and the guard's zero velocity must not be published concurrently.
+        # Protects the attributes below: a command and the guard's zero velocity must not be published concurrently.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
         self._joining: asyncio.Task[None] | None = None
 
     def hold(self, held: Held) -> None:
-        """Publish a command. Publish a zero velocity if no further command arrives in time.
+        """Publish a command; publish zero velocity if no other command arrives in time.
 
         Raise BridgeError and publish nothing if a later stop cannot be guaranteed.
         """
@@ -303,7 +302,7 @@ class _Driven:
         if held.is_zero:
             self._guard.disarm(self._silent)
         else:
-            # Arm the guard before publishing, so that every published command is followed by a stop.
+            # Arm the guard before publishing, so that a stop follows every published command.
             self._guard.arm(self._silent, deadline)
         with self._lock:
             self._deadline = deadline
@@ -312,32 +311,32 @@ class _Driven:
             self._joining = self._graph.spawn(self._publish_joined())
 
     def close(self) -> None:
-        """Publish a zero velocity and release the topic."""
+        """Publish zero velocity, and release the topic."""
         self._guard.disarm(self._silent)
         with self._lock:
             self._deadline = math.inf
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # The task that waits for subscribers still has to publish the zero velocity; it closes the topic afterwards.
+            # The task that waits for subscribers must publish zero velocity first; close the topic after that.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()
 
     def _silent(self) -> None:
-        """Publish a zero velocity because no command has arrived. Runs in the guard's thread."""
+        """Publish zero velocity, because no further command has arrived. Runs in the guard's thread."""
         with self._lock:
             if self._deadline > time.monotonic():
                 return  # a command has just arrived, or the topic was released
             self._deadline = math.inf
-            # If the node has been shut down, the topic is closed, and no further messages can be published on it.
+            # If the node is shut down, its topics are closed, and nothing more can be published.
             with contextlib.suppress(ROSException):
                 self._publish(self._last.zero())
         with contextlib.suppress(RuntimeError):  # the loop has been closed
             self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
     def _publish(self, held: Held) -> None:
-        """Publish a command now. If subscribers are still connecting, publish the newest command once they are connected.
+        """Publish a command. If subscribers are still connecting, publish only the newest command when they are connected.
 
         The caller must hold the lock.
         """

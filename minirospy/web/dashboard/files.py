@@ -35,19 +35,19 @@ SECURITY = {
     "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cross-Origin-Resource-Policy": "same-origin",
-    # The browser caches the file but revalidates it by its ETag on each start, so files of different releases are never mixed.
+    # The browser caches the file, but checks its ETag on each start, so that files of different releases are never mixed.
     "Cache-Control": "no-cache",
 }
 """The page's security headers: no inline scripts, no content from other sites, no embedding in other pages."""
 
 
 _NOTEBOOKS = "http://localhost:* http://127.0.0.1:* https://localhost:* https://127.0.0.1:* vscode-webview: vscode-file:"
-"""The origins of notebooks on this machine: JupyterLab and Jupyter Notebook, and VS Code's."""
+"""The origins of notebooks on this machine: of JupyterLab, Jupyter Notebook and VS Code."""
 
 
 @dataclass(frozen=True)
 class PageFile:
-    """A file: its bytes, its gzip-compressed bytes, its media type and its ETag."""
+    """A file of the page: its bytes, plain and gzip-compressed, its media type and its ETag."""
 
     body: bytes
     packed: bytes
@@ -56,7 +56,7 @@ class PageFile:
 
 
 def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
-    """Return a dict from request path to file; the path ``/`` is index.html."""
+    """Return a dict from request path to file, in which ``/`` is index.html."""
     found = {}
     for path in sorted(folder.rglob("*")):
         content_type = _TYPES.get(path.suffix)
@@ -71,7 +71,7 @@ def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
 
 
 def handlers(files: Mapping[str, PageFile], *, embeds: bool = False) -> dict[str, HttpHandler]:
-    """Return the request handler for each file. ``embeds``: notebooks on this machine may embed the page."""
+    """Return a request handler for each file. With ``embeds``, notebooks on this machine may embed the page."""
     security = dict(SECURITY)
     if embeds:
         policy = security["Content-Security-Policy"]

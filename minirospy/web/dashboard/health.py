@@ -22,13 +22,13 @@ from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, end_proc
 
 __all__ = ["Examiner", "last_log_lines", "running_boards"]
 
-_KEPT_SECONDS = 5.0  # findings younger than this are reused, so that several pages share them
+_KEPT_SECONDS = 5.0  # seconds for which findings are reused, so that several pages share them
 _TIMEOUTS = Timeouts(interrupt=3.0, terminate=1.0)  # SIGINT gives the doctor time to unregister its node
-_TAIL_BYTES = 64 * 1024  # of rosout.log: about 500 lines
+_TAIL_BYTES = 64 * 1024  # part of rosout.log that is shown: about 500 lines
 
 
 class Examiner:
-    """Runs `minirospy doctor` for the pages, one examination at a time. Thread-safe."""
+    """Runs `minirospy doctor` for the pages, never more than once at a time. Thread-safe."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -39,7 +39,7 @@ class Examiner:
         self._finished = -_KEPT_SECONDS
 
     def findings(self) -> list[Mapping[str, str]]:
-        """Return the findings: check, status, text and advice of each. Raise MinirospyError if the doctor fails."""
+        """Return the doctor's findings: check, status, text and advice of each. Raise MinirospyError if it fails."""
         with self._running:
             if time.monotonic() - self._finished >= _KEPT_SECONDS:
                 self._found = self._examine()
@@ -47,14 +47,14 @@ class Examiner:
             return self._found
 
     def close(self) -> None:
-        """Stop a running examination. Idempotent. Blocks for a few seconds at most."""
+        """Stop the running examination, if there is one. Idempotent. Blocks for at most a few seconds."""
         self._is_closed = True
         process = self._process
         if process:
             end_processes([process], _TIMEOUTS, lambda _: None)
 
     def _examine(self) -> list[Mapping[str, str]]:
-        # Run in an empty folder, because `python -m` searches the working folder first.
+        # Run in an empty folder, because `python -m` first searches the working folder for modules.
         with tempfile.TemporaryDirectory(prefix="minirospy-doctor-", ignore_cleanup_errors=True) as folder:
             process = start_process(
                 "minirospy doctor",
@@ -67,7 +67,7 @@ class Examiner:
             try:
                 if self._is_closed:
                     end_processes([process], _TIMEOUTS, lambda _: None)
-                assert isinstance(process.popen, subprocess.Popen)  # only roslaunch's nodes are forked
+                assert isinstance(process.popen, subprocess.Popen)  # only roslaunch forks processes
                 output, _ = process.popen.communicate()
             finally:
                 self._process = None
@@ -78,7 +78,7 @@ class Examiner:
 
 
 def running_boards() -> list[str]:
-    """Return the names of the boards on this machine that a program is using."""
+    """Return the names of this machine's boards that are in use."""
     try:
         own = BoardDirectory.find()
         found = [BoardDirectory(name, own.folder) for name in own.names()]
@@ -88,7 +88,7 @@ def running_boards() -> list[str]:
 
 
 def last_log_lines(log_dir: Path, run_id: object) -> str:
-    """Return the end of a run's rosout.log, from the start of a line; "" if the file is not on this machine."""
+    """Return the last lines of a run's rosout.log, or "" if the file is not on this machine."""
     folder = run_folder(log_dir, run_id)
     if folder is None:
         return ""

@@ -54,7 +54,7 @@ _FARTHEST = 1e6
 
 
 class JointEndpoint(JsonEndpoint["JointSession"]):
-    """Serves the joints in robot_description.
+    """Serves the joints of the robot in robot_description.
 
     ``always_publishes``: publish even without clients, as the node joint_state_publisher_gui does.
     """
@@ -67,11 +67,11 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.always_publishes = always_publishes
         self.joints: JointStates | None = None
         self.parameters: JointParameters | None = None
-        self.why = ""  # the reason why there are no joints, or ""
+        self.why = ""  # why there are no joints, or ""
         self.warnings: list[str] = []
         self.kinds: dict[str, str] = {}
         self.robot = ""
-        self.generation = 0  # number of descriptions read so far
+        self.generation = 0  # number of descriptions that have been read
         self.is_publishing = False
         self._graph = graph
         self._values: dict[str, object] = {}
@@ -100,7 +100,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     def publish(self, *, is_on: bool) -> None:
-        """Start or stop publishing. Raise UsageError if clients may not publish the topic."""
+        """Start or stop publishing the joints. Raise UsageError if clients may not publish the topic."""
         topic = self.node.resolve(_TOPIC)
         if is_on and not self._graph().filters.publishable(topic):
             raise UsageError(f"topic [{topic}] may not be published by clients")
@@ -123,7 +123,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
     # --- joints
 
     def start_work(self) -> None:
-        """Start the task that watches the parameters and publishes the joints.
+        """Start the task that watches the parameters and publishes the joint states.
 
         The task runs while there are clients, or always if ``always_publishes`` is set.
         """
@@ -142,7 +142,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             now = loop.time()
             if now >= next_load:
                 next_load = now + _RELOAD_SECONDS
-                with contextlib.suppress(MinirospyError):  # the master cannot be reached: retry later
+                with contextlib.suppress(MinirospyError):  # the master is unreachable: retry later
                     await self.load()
             end = next_load
             if self.parameters and self.is_publishing:
@@ -154,11 +154,11 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
                 publisher, self._publisher = self._publisher, None
                 await publisher.close()
             await wait_until(self._work_changed, end)
-        # Unsubscribe; the next page's task will subscribe again.
+        # Unsubscribe, because the next page's task subscribes again.
         self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
-        """Read the parameters. If one has changed, parse the description again.
+        """Read the parameters; if one of them has changed, parse the description again.
 
         Raise MinirospyError if the master cannot be reached.
         """
@@ -184,7 +184,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             parameters = read_parameters(
                 lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
             )
-            # Parse in a thread, because parsing a large description takes seconds.
+            # Parse in a thread, because that takes seconds for a large description.
             loop = asyncio.get_running_loop()
             joints, robot, kinds = await loop.run_in_executor(None, _described, parameters, warnings.append)
         except (JointError, UrdfError) as error:
@@ -196,7 +196,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             if (why := why_illegal(topic))
         ]
 
-        # Clients receive each generation only once, so increment the counter after the data is complete.
+        # Complete the data before incrementing the counter, because clients receive each generation only once.
         self._values, self.parameters, self.joints = values, parameters, joints
         self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
         self.generation += 1
@@ -208,7 +208,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return [topic for topic in sources if not why_illegal(topic)]
 
     def _follow(self, topics: Sequence[str]) -> None:
-        """Subscribe to exactly the topics in source_list."""
+        """Subscribe to these topics, and to no others."""
         from sensor_msgs.msg import JointState
 
         for task in self._sources:
@@ -273,7 +273,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return self.joints.free if self.joints else {}
 
     def description(self) -> dict[str, object]:
-        """Return the joints for the page, without their positions."""
+        """Return the joints without their positions, for the page."""
         joints, parameters = self.joints, self.parameters
         if joints is None or parameters is None:
             return {"joints": None, "why": self.why}
@@ -294,9 +294,9 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return {"joints": found, "why": ""}
 
     def state(self) -> dict[str, object]:
-        """Return the positions of all joints, including mimic joints, and the other nodes that publish the topic."""
+        """Return the positions of all joints, including mimic joints, and the other publishers of the topic."""
         values = self.joints.values() if self.joints else None
-        # A source may publish infinity or NaN, which JSON cannot represent.
+        # A source may publish NaN or infinity, which JSON cannot represent.
         pairs = zip(values.name, values.position, strict=False) if values else ()
         positions = {name: position if math.isfinite(position) else None for name, position in pairs}
         publishers = self._graph().snapshot.publishers.get(self.node.resolve(_TOPIC), ())
@@ -305,7 +305,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
 
 
 class JointSession(JsonSession):
-    """One client's session."""
+    """The session of one client."""
 
     subject: ClassVar[str] = "joints"
 
@@ -327,7 +327,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints if they have been reloaded, and their positions."""
+        """Send the joints' positions, after the joints themselves if they have been reloaded."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())
@@ -367,7 +367,7 @@ def _positions(fields: Fields) -> dict[str, float]:
 def _described(
     parameters: JointParameters, warn: Callable[[str], None]
 ) -> tuple[JointStates, str, dict[str, str]]:
-    """Parse a description; return the joints, the robot's name, and the joints' types.
+    """Parse a description. Return the joints, the robot's name, and each joint's type.
 
     Raise UrdfError or JointError if the description is invalid.
     """
@@ -376,7 +376,7 @@ def _described(
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:
-    """Return the robot's name and a dict from joint to type; the types determine the units."""
+    """Return the robot's name, and a dict from joint to type, which determines its unit."""
     root = parse_xml(description, "robot_description")
     kinds = {
         joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")

@@ -32,12 +32,12 @@ _log = logging.getLogger(__name__)
 
 _MAX_ERROR_LENGTH = 1000
 _VALUE_FACTOR = 4
-"""Memory of a parsed operation, in bytes per byte of its JSON text; measured for objects and lists of numbers."""
+"""Bytes of memory that a parsed operation takes per byte of JSON text, measured for objects and lists of numbers."""
 
 _INTERNAL_ERROR = 1011  # WebSocket close code for an internal error, RFC 6455, section 7.4.1
 
 CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
-"""Resolution of the loop's clock in seconds, 16 ms on Windows before Python 3.13."""
+"""Resolution of the loop's clock in seconds: 16 ms on Windows before Python 3.13."""
 
 _T = TypeVar("_T")
 Fields = Mapping[str, object]
@@ -46,7 +46,7 @@ Handler = Callable[[Fields], Awaitable[object]]
 
 
 class JsonSession:
-    """One client's session. Subclasses provide the table of operations, and send changes in :meth:`follow`."""
+    """The session of one client. Subclasses define the operations, and send changes in :meth:`follow`."""
 
     subject: ClassVar[str]
     """The subject of the operations, for error messages."""
@@ -58,17 +58,17 @@ class JsonSession:
     """Maximum number of characters in an operation. Parsing delays all clients, so it must be short."""
 
     max_waiting: ClassVar[int] = 100
-    pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
+    pace: ClassVar[float] = 0.05  # minimum interval in seconds between calls of :meth:`follow`
 
     def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
-        """Create the session. ``handlers``: the functions that execute the operations, keyed by operation name."""
+        """Create the session. ``handlers`` maps the name of each operation to the function that executes it."""
         self.client = client
         self.is_ended = False
         self._handlers = handlers
         self._operations: deque[tuple[str, Fields, int]] = deque()
         """The queued operations: name, fields, and memory in bytes."""
-        self._carried_out_size = 0  # memory used by the running operations, in bytes
-        self._operation_size = 0  # memory used by the last received operation, in bytes
+        self._carried_out_size = 0  # memory used by the operations being executed, in bytes
+        self._operation_size = 0  # memory used by the operation received last, in bytes
         self._thread = ThreadPoolExecutor(1, type(self).__name__)
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
@@ -79,30 +79,30 @@ class JsonSession:
         self._reporter = ErrorReporter(_log, f"serving {self.subject}")
         self._task = asyncio.ensure_future(self._run())
 
-    # --- for subclasses
+    # --- overridden or called by subclasses
 
     def refusal(self) -> str:
-        """Return the reason why this client may not execute operations, or "" if it may."""
+        """Return why this client may not execute operations, or "" if it may."""
         if self.owners_only and not self.client.is_owner:
             return self.client.why_not_owner(self.owners_only)
         return ""
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """Parse an operation into its name and fields. Raise ValueError, TypeError or LookupError if they are invalid."""
+        """Split an operation into its name and its fields. Raise ValueError, TypeError or LookupError if it is invalid."""
         return str(fields["op"]), fields
 
     async def started(self) -> None:
-        """Send the first messages after the session has started."""
+        """Send the first messages of the session."""
         self.send({"writes": not self.refusal()})
         if self.owners_only and (why := self.refusal()):
             self.send_error(why)
 
     async def follow(self) -> float | None:
-        """Send the changes; return the seconds until the next call, or None to wait for the next change."""
+        """Send changes. Return the seconds until the next call, or None to wait for the next change."""
         return None
 
     async def left(self) -> None:
-        """Release the client's resources after it has left."""
+        """Release the client's resources after it has disconnected."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """Queue an operation."""
@@ -114,26 +114,26 @@ class JsonSession:
         self._wake.set()
 
     def count(self) -> None:
-        """Charge this client's memory use to the server's budget."""
+        """Count this client's memory towards the server's budget."""
         self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """Run a blocking function in the session's thread, after the functions submitted earlier."""
+        """Run a blocking function in the session's thread, after all functions submitted earlier."""
         return await self._loop.run_in_executor(self._thread, work)
 
     def send(self, fields: Fields) -> None:
-        """Send a response with these fields."""
+        """Send these fields as a message."""
         self.client.send_text(json.dumps(fields))
 
     def send_error(self, text: str, fields: Fields | None = None) -> None:
-        """Send an error; ``fields`` are the operation's fields."""
+        """Send an error message for the operation with ``fields``."""
         self.send({"error": text[:_MAX_ERROR_LENGTH]})
 
     def send_answer(self, answer: object, fields: Fields) -> None:
-        """Send an operation's result."""
+        """Send the result of the operation with ``fields``."""
         self.client.send_text(json.dumps(answer))
 
-    # --- called by the connection
+    # --- called by the client's connection
 
     def received_text(self, text: str) -> None:
         """Parse and queue an operation."""
@@ -157,11 +157,11 @@ class JsonSession:
             self.dispatch(name, fields)
 
     def received_binary(self, data: bytes) -> None:
-        """Report an error, because clients send no binary messages."""
+        """Report an error, because clients must not send binary messages."""
         self.send_error("binary messages have no meaning here")
 
     def ended(self) -> None:
-        """End the session. Idempotent: resources are released only once, and the release is not interrupted."""
+        """End the session. Idempotent, so that the release of resources is not interrupted by a second call."""
         if not self.is_ended:
             self.is_ended = True
             self._task.cancel()
@@ -169,12 +169,12 @@ class JsonSession:
     # --- changes
 
     def changed(self) -> None:
-        """Schedule a call to :meth:`follow`. Must be called on the loop."""
+        """Schedule a call of :meth:`follow`. Must be called on the loop."""
         self._next_look = min(self._next_look, self._looked + self.pace)
         self._wake.set()
 
     def post_change(self) -> None:
-        """Schedule a call to :meth:`follow`. May be called from any thread, at any rate."""
+        """Schedule a call of :meth:`follow`. May be called from any thread and at any rate."""
         if not self._is_change_posted:
             self._is_change_posted = True
             with contextlib.suppress(RuntimeError):  # the loop has been closed
@@ -219,7 +219,7 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # Log other errors' messages only on the terminal: they may contain details that clients must not see.
+                    # Log the messages of other errors only locally, because they may contain details that clients must not see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
                     )
@@ -230,7 +230,7 @@ class JsonSession:
                 self._next_look = min(self._next_look, now + pause)
 
     async def carry_out(self, name: str, fields: Fields) -> None:
-        """Execute an operation and send its result or its error."""
+        """Execute an operation; send its result or its error."""
         try:
             answer = await self._handlers[name](fields)
         except (MinirospyError, OSError) as error:
@@ -249,7 +249,7 @@ _S = TypeVar("_S", bound=JsonSession)
 
 
 class JsonEndpoint(Generic[_S]):
-    """Opens a session for each client that uses a sub-protocol; ``session`` creates the session."""
+    """Opens a session, created by ``session``, for each client that uses the endpoint's sub-protocol."""
 
     def __init__(self, subprotocol: str, session: Callable[[WebClient], _S]) -> None:
         self.sessions: set[_S] = set()
@@ -281,23 +281,23 @@ class JsonEndpoint(Generic[_S]):
         self.left(session)
 
     def left(self, session: _S) -> None:
-        """Handle a session that has ended."""
+        """Do nothing; subclasses override this method to handle the end of a session."""
 
     def changed(self) -> None:
-        """Notify all sessions of a change. Must be called on the loop."""
+        """Notify all sessions that something has changed. Must be called on the loop."""
         self._is_change_posted = False
         for session in self.sessions:
             session.changed()
 
     def post_change(self) -> None:
-        """Notify all sessions of a change. May be called from any thread, at any rate."""
+        """Notify all sessions that something has changed. May be called from any thread and at any rate."""
         if self._loop and not self._is_change_posted:
             self._is_change_posted = True
             with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self.changed)
 
     def spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
-        """Run a coroutine to its end even if its client disconnects; :meth:`close` waits for it."""
+        """Run a coroutine to its end, even if its client disconnects. :meth:`close` waits for it."""
         task = asyncio.ensure_future(work)
         self._tasks.add(task)
         task.add_done_callback(self._spawned_ended)
@@ -305,12 +305,12 @@ class JsonEndpoint(Generic[_S]):
 
     def _spawned_ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
-        # MinirospyErrors are reported to the client if the client is still connected.
+        # MinirospyErrors have been reported to the client, if it is still connected.
         if not task.cancelled() and (error := task.exception()) and not isinstance(error, MinirospyError):
             _log.error("%s: %s", type(self).__name__, error, exc_info=error)
 
     async def close(self) -> None:
-        """End all sessions and wait for their tasks. Idempotent."""
+        """End all sessions, and wait for their tasks. Idempotent."""
         self.is_closed = True
         sessions = list(self.sessions)
         for session in sessions:
@@ -320,10 +320,9 @@ class JsonEndpoint(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event until the loop's clock reaches ``end``. On a timeout, the clock is guaranteed to be past ``end``."""
-    # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event.
-    # Add the clock's resolution, because a loop may run timers early by that much.
-    # Otherwise, a caller that compares times would spin until the clock advances.
+    """Wait for an event, or until the loop's clock is past ``end``."""
+    # Do not use asyncio.wait_for: before Python 3.12, it may lose a cancellation that coincides with the event.
+    # Loops may run timers early by the clock's resolution: without adding it, callers that compare times would spin.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + CLOCK_SECONDS, event.set) if end < math.inf else None
     try:
@@ -334,7 +333,7 @@ async def wait_until(event: asyncio.Event, end: float) -> None:
 
 
 def text_of(fields: Fields, name: str) -> str:
-    """Return an operation's string field. Raise LookupError if it is missing, TypeError if it is not a string."""
+    """Return a string field of an operation. Raise LookupError if it is missing, TypeError if it is not a string."""
     value = fields[name]
     if not isinstance(value, str):
         raise TypeError(f"{name} is a text")
@@ -342,7 +341,7 @@ def text_of(fields: Fields, name: str) -> str:
 
 
 def texts_of(fields: Fields, name: str) -> list[str]:
-    """Return an operation's list-of-strings field.
+    """Return a field of an operation that is a list of strings.
 
     Raise LookupError if it is missing, TypeError if it is not a list.
     """
@@ -353,14 +352,14 @@ def texts_of(fields: Fields, name: str) -> list[str]:
 
 
 def number(value: object) -> float:
-    """Return an operation's field as a finite number. Raise TypeError or OverflowError if it is not a finite number."""
+    """Return a field of an operation as a finite number. Raise TypeError or OverflowError if it is not one."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise TypeError(f"{value!r:.40} is not a number")
     return float(value)
 
 
 def _line(error: Exception) -> str:
-    """Return an error's message as one line."""
+    """Format an error's message as one line."""
     if isinstance(error, KeyError):
         return f"{error.args[0]!s:.80} is missing"
     return " ".join(str(error).split()) or type(error).__name__

@@ -31,18 +31,18 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""Poll interval, in seconds, for a log file that a page shows."""
+"""Seconds between checks for new lines in a log file that a page shows."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""maximum number of ended launches to keep, each with its last lines of output"""
+"""maximum number of launches kept after they have ended, each with its last lines of output"""
 
 _TAIL_BYTES = 64 * 1024
 
 
 class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
-    """Serves the launch files of the packages; all clients share the same launches."""
+    """Serves the packages' launch files. All clients share the same launches."""
 
     def __init__(self, master_uri: str) -> None:
         super().__init__(SUBPROTOCOL, lambda client: LaunchSession(self, client))
@@ -54,7 +54,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self._restarting: set[int] = set()
 
     def start(self, file: LaunchFile, path: Path, args: Mapping[str, str]) -> None:
-        """Start a launch file. Raise UsageError if it cannot be started."""
+        """Start a launch file with these arguments. Raise UsageError if that fails."""
         if self.is_closed:
             raise UsageError("the dashboard is shut down")
         if sum(not run.is_ended for run in self.runs.values()) >= _MAX_RUNS:
@@ -82,14 +82,14 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
             self._restarting.discard(run.id)
 
     def changed(self) -> None:
-        """See :meth:`JsonEndpoint.changed`. Also discard all but the newest of the ended launches."""
+        """See :meth:`JsonEndpoint.changed`. Also discard the oldest launches that have ended."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
         for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
         super().changed()
 
     async def close(self) -> None:
-        """End all sessions, stop all launches, and wait until the launches have ended."""
+        """End all sessions; stop all launches, and wait until they have ended."""
         self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
@@ -100,7 +100,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
 
 
 class _Tail:
-    """Reads the end of a growing log file."""
+    """Reads the last part of a growing log file, and then new lines."""
 
     def __init__(self, run: LaunchRun, node: str) -> None:
         self.run, self.node = run, node
@@ -110,11 +110,11 @@ class _Tail:
         self._count = 0
 
     def read(self) -> str:
-        """Return the log's new lines. Blocks."""
+        """Return the new lines of the log. Blocks."""
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Check for the exit before reading, so that the file contains everything that the node wrote before it exited.
+        # Check whether the node has exited before reading: the file then contains everything that it wrote.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -129,8 +129,7 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return whole lines only, because the data may end in the middle of a character.
-        # Exceptions are a very long line, and the last line after the node's exit.
+        # The data may end within a character, so return complete lines, except for a very long or a last line.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]
@@ -139,7 +138,7 @@ class _Tail:
 
 
 class LaunchSession(JsonSession):
-    """One client's session. File access blocks, so it runs in the session's thread."""
+    """The session of one client. File access blocks, so it runs in the session's thread."""
 
     subject: ClassVar[str] = "launch files"
     owners_only: ClassVar[str] = "start programs"
@@ -162,8 +161,8 @@ class LaunchSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the launches, if any of them has changed, and the log's new lines."""
-        # Check this before sending, so that a change in the meantime triggers another call.
+        """Send the launches if any of them has changed, and new lines of the shown log."""
+        # Check this before sending, so that a change during the sending causes another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -192,7 +191,7 @@ class LaunchSession(JsonSession):
         self._run_of(fields).stop()
 
     async def _restart(self, fields: Fields) -> None:
-        # The restart continues even if the page is closed; meanwhile, the session shows the progress.
+        # The restart continues even if the page is closed. Meanwhile, the session shows its progress.
         self._endpoint.spawn(self._report_restart(self._run_of(fields)))
 
     async def _report_restart(self, run: LaunchRun) -> None:
@@ -233,7 +232,7 @@ class LaunchSession(JsonSession):
             self.client.send_text_message("launches", text.encode(), newest_only=True)
 
     async def _send_log(self) -> bool:
-        """Send new log lines. Return whether to poll the log again even if the launch's state does not change."""
+        """Send new lines of the shown log. Return whether to poll it again even if no launch changes."""
         tail = self._tail
         if tail is None:
             return False
@@ -243,7 +242,7 @@ class LaunchSession(JsonSession):
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
             self.send(found)
-        # One read may not have returned all the data in the file.
+        # There may be more data in the file than a single read returns.
         return is_growing or bool(tail.node and text)
 
 

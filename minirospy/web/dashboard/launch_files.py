@@ -18,21 +18,21 @@ _MOST = 5000
 
 
 class LaunchFile(NamedTuple):
-    """A launch file: its package, and its path in the package, with slashes."""
+    """A launch file: its package, and its path in the package, with forward slashes."""
 
     package: str
     path: str
 
 
 class LaunchFiles:
-    """The launch files of packages. The methods read directories, so they block."""
+    """Finds the launch files in packages. The methods block, because they read directories."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
         self._found: dict[LaunchFile, Path] = {}
 
     def scan(self) -> list[LaunchFile]:
-        """Search for launch files; return them sorted."""
+        """Return all launch files, sorted."""
         found: dict[LaunchFile, Path] = {}
         folders = self._packages.folders()
         own = set(folders.values())
@@ -60,7 +60,7 @@ class LaunchFiles:
 
 
 def _launch_files(folder: Path, packages: set[Path], depth: int) -> Iterator[Path]:
-    """Yield a package's launch files, excluding those of nested packages."""
+    """Yield the launch files of a package, but not of packages nested in it."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:

@@ -28,7 +28,7 @@ _MAX_LINES = 2000
 
 
 class NodeState(NamedTuple):
-    """A node in a launch: starting, running, ending, exited (with ``status``), failed (it could not be started) or stopped.
+    """The state of a node in a launch: starting, running, ending, exited (with ``status``), failed (to start) or stopped.
 
     ``starts``: the number of starts; ``respawns``: whether it is restarted when it exits.
     """
@@ -43,7 +43,7 @@ class NodeState(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """A launch's state: starting, running, stopping or ended. ``error`` is the error that ended it, or ""."""
+    """The state of a launch: starting, running, stopping or ended. ``error`` is the error that ended it, or ""."""
 
     id: int
     package: str
@@ -101,7 +101,7 @@ class _PageLauncher(Launcher):
 
 
 class LaunchRun:
-    """One launch file, run in a thread.
+    """A launch file that runs in a separate thread.
 
     ``on_change`` is called in that thread when :meth:`state` or ``output`` has changed.
     """
@@ -132,18 +132,18 @@ class LaunchRun:
         self._exited: dict[str, Process] = {}
         self._known: dict[str, Process] = {}
         self._lock = threading.Lock()
-        # Use a daemon thread, so that this process can exit during a launch; the launcher's guardian then ends the nodes.
+        # A daemon thread lets this process exit during a launch; the launcher's guardian then stops the nodes.
         self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
         self._thread.start()
 
     @property
     def is_ended(self) -> bool:
-        """Return whether the launch and all its nodes have ended."""
+        """Return whether the launch and all its nodes have exited."""
         return self._state == "ended"
 
     @property
     def is_stopping(self) -> bool:
-        """Return whether the launch's nodes are being stopped."""
+        """Return whether the nodes are being stopped."""
         return self._state == "stopping"
 
     @property
@@ -151,12 +151,12 @@ class LaunchRun:
         return self._state in ("stopping", "ended")
 
     def has_exited(self, node: str) -> bool:
-        """Return whether a node was started and has exited."""
+        """Return whether a node has been started and has exited."""
         process = self._known.get(node)
         return process is not None and not process.is_running
 
     def state(self) -> RunState:
-        """Return the current state. May be called from any thread."""
+        """Return the launch's current state. May be called from any thread."""
         launcher = self._launcher
         for process in tuple(launcher.processes) if launcher else ():
             if process.node:
@@ -165,12 +165,12 @@ class LaunchRun:
         return RunState(self.id, self.package, self.file, self.args, self._state, self._error, nodes)
 
     def log_file(self, node: str) -> Path | None:
-        """Return the file with a node's output, or None if it does not exist yet."""
+        """Return the file that contains a node's output, or None if it does not exist yet."""
         process = self._known.get(node)
         return process.stdout_file if process else None
 
     def stop(self) -> None:
-        """Start stopping all nodes, without waiting. May be called from any thread."""
+        """Start to stop all nodes, without waiting for them. May be called from any thread."""
         with self._lock:
             self._is_stopped = True
             if self._state in ("starting", "running"):
@@ -184,7 +184,7 @@ class LaunchRun:
         self._thread.join()
 
     def end_node(self, name: str, *, restarts: bool) -> None:
-        """Stop one node and, with ``restarts``, start it again. Raise UsageError if it is not running."""
+        """Stop a node; if ``restarts`` is true, start it again. Raise UsageError if it is not running."""
         launcher, process = self._launcher, self._known.get(name)
         if not launcher or not process or not process.is_running or self._state != "running":
             raise UsageError(f"node [{name[:200]}] does not run")

@@ -21,12 +21,10 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts for stopping, in seconds. The first is long, because rosbag completes the file after SIGINT, possibly on a slow
-disk.
-"""
+"""Timeouts in seconds for stopping a recording. After SIGINT, rosbag completes the file, possibly on a slow disk."""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
-"""Timeouts while no file is open.
+"""Timeouts in seconds for stopping while no file is open.
 
 They are short, because a starting interpreter may lose a SIGINT that arrives in a callback of importlib.
 """
@@ -38,7 +36,7 @@ COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
 
 
 class RecordingState(NamedTuple):
-    """A recording's state: file name, topics, duration in seconds, and size in bytes.
+    """The state of a recording: file name, topics, duration in seconds, and size in bytes.
 
     ``error`` describes why an ended recording failed; it is "" if it did not fail.
     """
@@ -52,7 +50,7 @@ class RecordingState(NamedTuple):
 
 
 class Recording:
-    """A process that runs `rosbag record` into ``path``, whose suffix is .bag or .mcap.
+    """A process that runs `rosbag record`. The suffix of ``path``, .bag or .mcap, determines the format.
 
     Raise MinirospyError if the process cannot be started.
     """
@@ -107,14 +105,14 @@ class Recording:
             "rosbag record",
             command,
             environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
-            # Run `python -m` in a folder without the user's modules, because it imports from the working folder first.
+            # `python -m` imports from the working folder first, so run it in a folder without the user's modules.
             folder=Path(minirospy.__file__).parents[2],
             stdout=subprocess.PIPE,
             log_errors=True,
         )
 
     def _read(self) -> None:
-        """Keep the last output lines, and record the time of the exit."""
+        """Read the output until the process exits; keep the last lines, and record the time of the exit."""
         stream = self._process.popen.stdout
         assert stream
         with stream:
@@ -124,8 +122,8 @@ class Recording:
         self._seconds = time.monotonic() - self._started
 
     def state(self) -> RecordingState:
-        """Return the current state."""
-        # Query the exit status first, because the size is final only after the exit.
+        """Return the recording's current state."""
+        # Query the exit status before the size, which is final only after the exit.
         status = self._process.exit_code
         size = 0
         for path in self._paths:
@@ -135,7 +133,7 @@ class Recording:
                 continue
         seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
         error = ""
-        # An interpreter that is stopped while it starts may also exit with status 0.
+        # An interpreter that is stopped during its start-up may exit with status 0, too.
         if status is not None and self._process.is_ending and not size:
             error = "it was stopped before it had started: nothing was recorded"
         elif status:
@@ -146,7 +144,7 @@ class Recording:
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)
 
     async def stop(self) -> None:
-        """Stop the recording and wait until the file is complete. Idempotent."""
+        """Stop the recording, and wait until the file is complete. Idempotent."""
         await asyncio.get_running_loop().run_in_executor(None, self._stop)
 
     def _stop(self) -> None:

@@ -46,12 +46,12 @@ def read_file(path: Path) -> dict[str, object] | None:
 
 
 def _write_file(path: Path, text: str) -> None:
-    """Replace a file atomically, so that it is never half written. Raise RvizFileError if that fails."""
-    # Write to a link's target, so that the link remains and the target keeps its permissions.
+    """Replace a file atomically, so that it is never incomplete. Raise RvizFileError if that fails."""
+    # Write to the target of a link, so that the link remains, and the target keeps its permissions.
     file = path.resolve()
     part = file.with_name(f".{file.name}.part")
     try:
-        # The file name is predictable: create_file() refuses a link that another user has created there.
+        # The name is predictable, but create_file() does not follow a link that another user has created there.
         with os.fdopen(create_file(part, 0o666), "w", encoding="utf-8") as stream:
             stream.write(text)
         with contextlib.suppress(FileNotFoundError):
@@ -65,7 +65,7 @@ def _write_file(path: Path, text: str) -> None:
 
 
 class RvizEndpoint(JsonEndpoint["RvizSession"]):
-    """Serves the command's .rviz file, if there is one."""
+    """Serves the .rviz file from the command line, if there is one."""
 
     def __init__(self, file: Path | None = None) -> None:
         super().__init__(SUBPROTOCOL, lambda client: RvizSession(self, client))
@@ -77,13 +77,13 @@ class RvizEndpoint(JsonEndpoint["RvizSession"]):
         """
 
     async def close(self) -> None:
-        """End all sessions after completing the saves in progress."""
+        """End all sessions, after the saves in progress have been completed."""
         await super().close()
         self.thread.shutdown(wait=False)
 
 
 class RvizSession(JsonSession):
-    """One client's session. Its operations are read and parsed in the endpoint's thread."""
+    """The session of one client. The endpoint's thread reads, writes and parses files."""
 
     subject: ClassVar[str] = ".rviz files"
     longest: ClassVar[int] = 600_000
@@ -100,15 +100,15 @@ class RvizSession(JsonSession):
         super().__init__(client, handlers)
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`. Each operation has a single field, whose name is the operation."""
+        """See :meth:`JsonSession.parse`. An operation has a single field, named like the operation."""
         (name,) = fields
         return name, fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`. Sends nothing without a request."""
+        """See :meth:`JsonSession.started`. Sends nothing until the client requests it."""
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`. Runs in the endpoint's thread."""
+        """See :meth:`JsonSession.in_thread`. Runs the function in the endpoint's thread."""
         return await asyncio.get_running_loop().run_in_executor(self._endpoint.thread, work)
 
     async def _read(self, _: Fields) -> Fields:
@@ -132,7 +132,7 @@ class RvizSession(JsonSession):
             parse_rviz(text)
             _write_file(file, text)
 
-        # Complete the save even if the page is closed in the meantime.
+        # Complete the save even if the page is closed meanwhile.
         await asyncio.shield(self._endpoint.spawn(self.in_thread(save)))
         return {"name": file.name}
 

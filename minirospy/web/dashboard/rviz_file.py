@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CHARACTERS", "format_rviz", "parse_rviz"]
 
-MAX_CHARACTERS = 200_000  # maximum number of characters; RViz's own files have some 10,000
+MAX_CHARACTERS = 200_000  # maximum size in characters; RViz's own files have about 10,000
 
 _MANAGER = "Visualization Manager"
 _MAX_DEPTH = 50
@@ -36,11 +36,11 @@ _SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
 """Patterns and parsers for values that are not strings. Other YAML 1.1 types (dates, octal numbers) stay strings, as in RViz."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
-"""Strings that need no quotes, except those that another parser could read as a number."""
+"""Matches strings that need no quotes, except those that another parser could read as a number."""
 
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
-    """Parse a .rviz file into JSON-compatible values.
+    """Convert the text of a .rviz file to JSON-compatible values.
 
     Raise RvizFileError, which contains ``name`` and the line, if it is invalid.
     """
@@ -49,7 +49,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        # If the end of the file is missing, the compiled parser reports an error one line after the last line.
+        # If the end of the file is missing, the compiled parser reports the line after the last one.
         line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
@@ -61,16 +61,16 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
 
 
 def _built(events: Iterator[Event], name: str) -> object:
-    """Return the document's value. Raise RvizFileError if it is invalid."""
+    """Build the document's value from YAML events. Raise RvizFileError if the document is invalid."""
     result: list[object] = []
-    # The open collections (first the stream), each with the keys whose values have not been parsed yet.
+    # The open collections (first the whole stream), each with the keys whose values are still missing.
     stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
     for event in events:
         line = event.start_mark.line + 1 if event.start_mark else 0
         value: object
         match event:
             case yaml.AliasEvent(anchor=anchor):
-                # Aliases could expand a small file to a large value.
+                # Aliases could expand a small file to a huge value.
                 raise RvizFileError(name, line, f"a file of RViz has no aliases (*{anchor})")
             case yaml.DocumentStartEvent() if result:
                 raise RvizFileError(name, line, "more than one document")
@@ -112,7 +112,7 @@ def _scalar(event: yaml.ScalarEvent) -> object:
 
 
 def format_rviz(config: Mapping[str, object]) -> str:
-    """Format a .rviz file as RViz does: keys sorted, lists indented below their key.
+    """Format a .rviz file like RViz: keys are sorted, and lists are indented below their keys.
 
     Raise RvizFileError if ``config`` is nested more deeply than :func:`parse_rviz` accepts.
     """
@@ -120,8 +120,8 @@ def format_rviz(config: Mapping[str, object]) -> str:
 
 
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
-    """Yield the lines for a nonempty map or list at a nesting depth of ``depth``."""
-    # Limit the depth, because it determines the cost per line: one generator and one indentation per level.
+    """Yield the lines of a nonempty map or list at nesting level ``depth``."""
+    # Limit the depth, because each level adds a generator and an indentation to every line.
     if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):
@@ -133,7 +133,7 @@ def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[s
 
 
 def _after(start: str, value: object, separator: str, depth: int) -> Iterator[str]:
-    """Yield the lines for a value that follows a key or a dash."""
+    """Yield the lines of a value that follows ``start``, a key or a dash."""
     if not isinstance(value, dict | list) or not value:
         yield f"{start} {_word(value)}"
         return

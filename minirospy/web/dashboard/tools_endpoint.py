@@ -42,20 +42,20 @@ SUBPROTOCOL = "minirospy.tools.v1"
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-# List bool first, because it is a subclass of int.
+# bool comes first, because it is a subclass of int.
 _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
 _MAX_PREVIEW = 200
-"""Maximum number of characters to show of a value that the user is typing."""
+"""Maximum number of characters shown of a value that the user is entering."""
 
 REPORT_SECONDS = 2.0
 _MAX_CONCURRENT = 4
-"""Maximum concurrent requests from one client. Nodes that do not respond take seconds."""
+"""Maximum number of concurrent requests per client; each takes seconds if a node does not respond."""
 
 
 class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
-    """Serves requests from pages. ``tool`` is the caller_id used to call nodes."""
+    """Serves the pages' requests. ``tool`` is the caller_id for calls to nodes."""
 
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
         super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
@@ -82,11 +82,11 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             threads.shutdown(wait=False, cancel_futures=True)
 
     def graph(self) -> Graph:
-        """Return a graph with its own connection to the master, because calls run in threads."""
+        """Return a graph that calls the master over its own connection, because requests run in several threads."""
         return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
 
     def watch(self, session: ToolsSession) -> None:
-        """Send a graph report to a session now, and then every few seconds."""
+        """Send a session a graph report now, and then every few seconds."""
         self._watching.add(session)
         if self._reporting is None or self._reporting.done():
             self._last = None
@@ -96,7 +96,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             session.report(_report_of(describe(self._last)))
 
     def unwatch(self, session: ToolsSession) -> None:
-        """Stop sending reports to a session. If no sessions are left, nodes are not queried."""
+        """Stop sending reports to a session. Without sessions, the nodes are not queried."""
         self._watching.discard(session)
         if not self._watching and self._reporting:
             self._reporting.cancel()
@@ -106,7 +106,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # Use one thread, so that the next survey waits until a cancelled one has ended.
+                # A single thread delays the next survey until a cancelled one has ended.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}
@@ -116,11 +116,11 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             data = _report_of(fields)
             for session in tuple(self._watching):
                 session.report(data)
-            # If nodes respond slowly, wait longer before the next survey.
+            # Wait longer before the next survey if nodes respond slowly.
             await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return a dict from topic to the type that the master knows, or ``*`` if all subscribers accept any type."""
+        """Return a dict from topic to type. The type is ``*`` if all subscribers of a topic accept any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 
@@ -130,7 +130,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
 
 
 class ToolsSession(JsonSession):
-    """One client's session. Each request gets a response with the request's ``id``."""
+    """The session of one client. The response to a request contains the request's ``id``."""
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
@@ -164,7 +164,7 @@ class ToolsSession(JsonSession):
         return text_of(fields, "do"), fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`. Sends nothing without a request."""
+        """See :meth:`JsonSession.started`. Sends nothing until the client requests it."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """See :meth:`JsonSession.dispatch`."""
@@ -193,7 +193,7 @@ class ToolsSession(JsonSession):
         self.send({**({"id": fields["id"]} if fields else {}), "error": text[:500]})
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`. Runs in one of several threads."""
+        """See :meth:`JsonSession.in_thread`. Runs the function in one of several threads."""
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
     def ended(self) -> None:
@@ -205,7 +205,7 @@ class ToolsSession(JsonSession):
         self._threads.shutdown(wait=False, cancel_futures=True)
 
     def report(self, data: bytes) -> None:
-        """Send a report; replace an older report that is still queued."""
+        """Send a report, replacing an older one that is still queued."""
         self.client.send_text_message("report", data, newest_only=True)
 
     async def _watch(self, _: Fields) -> Fields:
@@ -217,7 +217,7 @@ class ToolsSession(JsonSession):
         return {}
 
     async def _ping(self, fields: Fields) -> Fields:
-        """Call ``node`` and return the round-trip time in seconds."""
+        """Call the node ``node``; return the round-trip time in seconds."""
 
         name = text_of(fields, "node")
 
@@ -228,21 +228,21 @@ class ToolsSession(JsonSession):
         return {"seconds": await self.in_thread(ping)}
 
     async def _kill(self, fields: Fields) -> Fields:
-        """Ask ``node`` to shut down."""
+        """Ask the node ``node`` to shut down."""
         self._require_writing("shuts down no node")
         name = text_of(fields, "node")
 
         def kill() -> None:
             with self._endpoint.graph() as graph:
                 node = find_node(graph, name)
-                ping_node(graph, node)  # raises the reason if the node has already exited
+                ping_node(graph, node)  # raises an error with the reason if the node has already exited
                 kill_node(graph, node, "requested in the dashboard")
 
         await self.in_thread(kill)
         return {}
 
     async def _cleanup(self, fields: Fields) -> list[str]:
-        """Unregister the nodes in ``nodes`` that still do not respond, as `rosnode cleanup` does; return their names."""
+        """Unregister those of ``nodes`` that still do not respond, like `rosnode cleanup`; return their names."""
         self._require_writing("unregisters no node")
         wanted = texts_of(fields, "nodes")
 
@@ -256,7 +256,7 @@ class ToolsSession(JsonSession):
         return await self.in_thread(clean)
 
     async def _type(self, fields: Fields) -> Fields:
-        """Return the full definition of the message type ``name`` from the installed packages.
+        """Return the full definition of the installed message type ``name``.
 
         With ``topic`` instead of ``name``, return the definition of the type that the master has for the topic, even if
         the topic has only subscribers.
@@ -274,15 +274,15 @@ class ToolsSession(JsonSession):
         return {"name": name, "definition": found.definition}
 
     async def _examine(self, _: Fields) -> Fields:
-        """Return the findings of `minirospy doctor`, which takes seconds."""
+        """Run `minirospy doctor`, which takes seconds; return its findings."""
         return {"findings": await self.in_thread(self._endpoint.examiner.findings)}
 
     async def _boards(self, _: Fields) -> Fields:
-        """Return the names of the boards that a program on this machine uses."""
+        """Return the names of this machine's boards that are in use."""
         return {"names": await self.in_thread(running_boards)}
 
     async def _log(self, _: Fields) -> Fields:
-        """Return the end of the master's rosout.log, or "" if it is not on this machine."""
+        """Return the last lines of the master's rosout.log, or "" if the file is not on this machine."""
 
         def read() -> str:
             with self._endpoint.graph() as graph:
@@ -295,23 +295,23 @@ class ToolsSession(JsonSession):
             raise UsageError(f"this token is read-only: it {what}")
 
     async def _yaml(self, fields: Fields) -> Fields:
-        """Return the values, keyed by name, in a file saved by rqt_reconfigure or dynparam."""
+        """Return the values in a file that rqt_reconfigure or dynparam has saved, keyed by name."""
         text = text_of(fields, "text")
         loop = asyncio.get_running_loop()
         values = await loop.run_in_executor(self._endpoint.parser, parameter_values, text)
-        # JSON cannot represent infinity, so represent it as a string.
+        # JSON cannot represent infinity, so convert it to a string.
         return {
             name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
             for name, value in values.items()
         }
 
     async def _value(self, fields: Fields) -> Fields:
-        """Parse ``text`` as `rosparam set` does; return the value's type and its YAML text."""
+        """Parse ``text`` like `rosparam set`; return the value's type, and the value as YAML."""
         value = await self._parsed(fields)
         return {"type": _type_name(value), "text": format_value(value)[:_MAX_PREVIEW]}
 
     async def _set(self, fields: Fields) -> Fields:
-        """Set the parameter ``name`` to the value in ``text``, as `rosparam set` does."""
+        """Set the parameter ``name`` to the value in ``text``, like `rosparam set`."""
         self._require_writing("sets no parameter")
         name = text_of(fields, "name")
         why = why_illegal(name)
@@ -330,7 +330,7 @@ class ToolsSession(JsonSession):
         text = text_of(fields, "text")
 
         def parse() -> object:
-            # An empty string stays a string, as on the command line; YAML would parse it as null.
+            # As on the command line, an empty string stays a string, although YAML would parse it as null.
             value = parse_value(text) if text.strip() else ""
             check_parameter(value, "the value")
             return value
@@ -339,7 +339,7 @@ class ToolsSession(JsonSession):
 
 
 def _type_name(value: object) -> str:
-    """Return the name of a parameter's type, as in roscpp and the wiki."""
+    """Return the name of a parameter's type, as used in roscpp and the wiki."""
     for type_, name in _TYPE_NAMES.items():
         if isinstance(value, type_):
             return name

@@ -46,7 +46,7 @@ VIEWS = (
 """The views' names in links, in the order of their tabs; the page has one module for each view."""
 
 LAYOUTS = ("workshop", "console", "rviz", "teleop", "classroom")
-"""The page's built-in layouts: several views next to each other."""
+"""Layouts built into the page, each with several views next to each other."""
 
 
 def link(
@@ -59,7 +59,7 @@ def link(
     code: str = "",
     encrypted: bool = False,
 ) -> str:
-    """Return a view's URL; ``fields`` are the view's settings, which may have several values. ``code``: see codes.py."""
+    """Return the URL of a view. ``fields`` contains the view's settings; for ``code``, see codes.py."""
     words = [(name, value) for name, values in (fields or {}).items() for value in values]
     words += [(name, value) for name, value in (("token", token), ("code", code)) if value]
     query = f"?{urlencode(words, quote_via=quote, safe='/[]:')}" if words else ""
@@ -72,7 +72,7 @@ _IN_BAG = re.compile(r".+?\.(bag|mcap):/")
 
 
 def plotted_fields(words: Iterable[str]) -> list[str]:
-    """Return the paths in rqt_plot's arguments: ``/a/x,/b/y`` has two, and ``/pose/x:y`` means /pose/x and /pose/y.
+    """Return the paths in rqt_plot's arguments: /a/x and /b/y for ``/a/x,/b/y``, /pose/x and /pose/y for ``/pose/x:y``.
 
     A path in a bag, ``run.bag:/pose/x``, remains as it is. Raise UsageError if an argument is not a path.
     """
@@ -81,7 +81,7 @@ def plotted_fields(words: Iterable[str]) -> list[str]:
         if _IN_BAG.match(word):
             found.append(word)
             continue
-        # A colon in brackets is part of a slice.
+        # A colon within brackets belongs to a slice.
         head, *others = _split_colons(word)
         base = head.rpartition("/")[0]
         if not base and not head.startswith("/"):

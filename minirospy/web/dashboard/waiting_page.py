@@ -18,7 +18,7 @@ __all__ = ["WaitingPage"]
 
 
 class WaitingPage:
-    """Serves the page until the dashboard takes over the port. Until then, the pages keep trying to connect."""
+    """Serves the page until the dashboard takes over the port. Meanwhile, open pages try to connect repeatedly."""
 
     def __init__(
         self, master_uri: str, codes: Codes, options: BridgeOptions, *, embeds: bool = False
@@ -35,7 +35,7 @@ class WaitingPage:
 
     @property
     def port(self) -> int:
-        """Return the page's port. Call this after :meth:`open`."""
+        """Return the page's port. It is known after :meth:`open`."""
         return self._listener.port
 
     async def open(self) -> None:

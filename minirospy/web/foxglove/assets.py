@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 __all__ = ["ALLOWED", "MAX_BYTES", "Assets"]
 
 ALLOWED = r"^package://(?:[-\w%]+/)*[-\w%.]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff|urdf|webp|xacro)$"
-"""The URIs that foxglove_bridge allows; the whole URI must match, ignoring case."""
+"""The URIs that foxglove_bridge allows. The whole URI must match, ignoring case."""
 
-MAX_BYTES = 100_000_000  # maximum size of a file
+MAX_BYTES = 100_000_000  # maximum size of a file, in bytes
 
 
 class Assets:
-    """Reads files by ``package://`` URIs, and by ``file://`` URIs of files inside packages. Methods block."""
+    """Reads files inside packages, given by ``package://`` or ``file://`` URIs. Methods block."""
 
     def __init__(
         self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), max_bytes: int = MAX_BYTES
     ) -> None:
-        """Create a reader for files in ``packages`` whose URI matches a regular expression in ``allowed``.
+        """Create a reader for files in ``packages``. Each URI must match one of the regular expressions in ``allowed``.
 
         Raise BridgeError if an expression is invalid.
         """
@@ -41,13 +41,13 @@ class Assets:
             raise BridgeError(f"'{error.pattern!s}' is not a regular expression: {error}") from error
 
     def open(self, uri: str) -> tuple[BinaryIO, int]:
-        """Return an open file and its size. Raise BridgeError, with the reason, if the file may not or cannot be read."""
+        """Open a file; return it and its size. Raise BridgeError, with the reason, if it may not or cannot be read."""
         try:
             file = self._path(uri).open("rb")
         except OSError as error:
             raise BridgeError(f"{uri}: {error.strerror}") from None
         except ValueError:
-            # A file name cannot contain this character, for example a lone surrogate.
+            # A file name cannot contain such a character, for example an unpaired surrogate.
             raise BridgeError(f"Asset URI not allowed: {uri[:200]!a}") from None
         size = os.fstat(file.fileno()).st_size
         if size > self._max_bytes:
@@ -70,7 +70,7 @@ class Assets:
 
         root = folder.resolve()
         path = (folder / name).resolve()
-        # A symbolic link must not lead out of the package.
+        # A symbolic link must not point outside the package.
         if not path.is_relative_to(root):
             raise BridgeError(f"Asset URI not allowed: {uri[:200]} leaves its package")
         if not path.is_file():
@@ -78,12 +78,12 @@ class Assets:
         return path
 
     def _package_uri(self, uri: str) -> str:
-        """Return the ``package://`` URI of a file inside a known package. Raise BridgeError if it is in none.
+        """Convert the ``file://`` URI of a file inside a package to ``package://``. Raise BridgeError if it is in no package.
 
         xacro replaces ``$(find pkg)`` by the package's folder, so descriptions contain such URIs.
         """
         text = unquote(uri[len("file://") :])
-        # On Windows, looking up \\host\share would connect to that host.
+        # On Windows, accessing \\host\share would connect to that host.
         if "\\" in text or "\0" in text:
             raise BridgeError(f"Asset URI not allowed: {uri[:200]}")
         path = Path(text.lstrip("/") if os.name == "nt" else text)  # file:///C:/folder

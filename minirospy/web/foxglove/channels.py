@@ -14,13 +14,11 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout in seconds for querying topic types that are not installed. It is short, because the channels of all clients wait
-for it.
-"""
+"""Timeout in seconds for querying types that are not installed; short, because the channels of all clients wait for it."""
 
 
 class Channels:
-    """The graph's topics as channels. A topic whose type or definition changes gets a new channel."""
+    """Offers the graph's topics as channels. A topic gets a new channel if its type or definition changes."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, Channel] = {}
@@ -31,16 +29,16 @@ class Channels:
         self._definitions: dict[str, set[str]] = {}
 
     def clear(self) -> None:
-        """Remove all channels, without reusing their ids."""
+        """Remove all channels. Their ids are not reused."""
         for table in (self.by_id, self._by_topic, self._types, self._declared, self._definitions):
             table.clear()
 
     def type_of(self, channel_id: int) -> InterfaceType:
-        """Return the type of a channel's messages."""
+        """Return the message type of a channel."""
         return self._types[channel_id]
 
     async def update(self, graph: SharedGraph) -> tuple[list[Channel], list[int]]:
-        """Update the channels from the graph; return the new channels and the ids of the removed ones."""
+        """Match the channels to the graph; return new channels, and the ids of removed ones."""
         snapshot = graph.snapshot
         wanted = {
             topic: snapshot.types[topic]
@@ -66,7 +64,7 @@ class Channels:
             else:
                 others[topic] = snapshot.publishers.get(topic, ())
 
-        # If no publisher responds in time, take the type from the first message.
+        # If no publisher responds in time, the first message will provide the type.
         found = await graph.texts.of_publishers(others, TYPE_SECONDS)
         new += [
             self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
@@ -75,7 +73,7 @@ class Channels:
         return new, removed
 
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
-        """Return a replacement for a channel whose publisher sends messages with another definition.
+        """Replace a channel whose publisher uses another definition; return the new channel.
 
         Return None if the channel has been removed, or if it was replaced before, because its publishers then contradict
         each other.
@@ -107,7 +105,7 @@ class Channels:
 
 
 class Services:
-    """The graph's services, each with an id. A service whose type changes gets a new id."""
+    """The graph's services, each with an id. A service gets a new id if its type changes."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, ServiceOffer] = {}
@@ -115,12 +113,12 @@ class Services:
         self._ids = itertools.count(1)
 
     def clear(self) -> None:
-        """Remove all services, without reusing their ids."""
+        """Remove all services. Their ids are not reused."""
         self.by_id.clear()
         self.infos.clear()
 
     def update(self, graph: SharedGraph) -> tuple[list[ServiceOffer], list[int]]:
-        """Update the services from the graph; return the new services and the ids of the removed ones."""
+        """Match the services to the graph; return new services, and the ids of removed ones."""
         infos = (graph.service_info(name) for name in graph.snapshot.services)
         wanted: Mapping[str, ServiceInfo] = {info.name: info for info in infos if info}
         removed = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]

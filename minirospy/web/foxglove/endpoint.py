@@ -28,7 +28,7 @@ __all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions"]
 _log = logging.getLogger(__name__)
 
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services", "connectionGraph", "assets")
-"""The capabilities that clients have by default."""
+"""Capabilities that clients have by default."""
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
@@ -36,7 +36,7 @@ _DROP_REPORT_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class FoxgloveOptions:
-    """The options of the endpoint.
+    """Options of the Foxglove endpoint.
 
     ``name`` is the server name shown by clients; ``session_id`` is different for each start of the bridge.
     """
@@ -66,7 +66,7 @@ class FoxgloveEndpoint:
 
         self.sessions: set[FoxgloveSession] = set()
         self._options = options or FoxgloveOptions()
-        self._waiting: set[FoxgloveSession] = set()  # clients that have not received the channels yet
+        self._waiting: set[FoxgloveSession] = set()  # clients to which the channels have not been sent yet
         self._is_known = False
         self._updating: asyncio.Task[None] | None = None
         self._is_outdated = False
@@ -107,7 +107,7 @@ class FoxgloveEndpoint:
         return session
 
     def left(self, session: FoxgloveSession) -> None:
-        """Remove a client."""
+        """Remove a client that has disconnected."""
         self.sessions.discard(session)
         self._waiting.discard(session)
         if not self.sessions:
@@ -116,7 +116,7 @@ class FoxgloveEndpoint:
     # --- called by sessions
 
     def capabilities_of(self, client: WebClient) -> list[str]:
-        """Return the capabilities that a client has."""
+        """Return the capabilities of a client."""
         found = list(self._options.capabilities)
         if self.graph.node.simulated or self.playback:
             found.append("time")
@@ -125,7 +125,7 @@ class FoxgloveEndpoint:
         return [each for each in found if client.may_write or each not in _FOR_WRITERS]
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel whose publisher uses a definition that differs from the installed one."""
+        """Replace a channel because its publisher's definition differs from the installed one."""
         replaced = self.channels.redefine(channel, header)
         if replaced:
             _log.info(
@@ -136,7 +136,7 @@ class FoxgloveEndpoint:
                 session.send(serializing.advertise([replaced]))
 
     def playback_changed(self, state: PlaybackState) -> None:
-        """Send a player's state to all clients."""
+        """Send the state of a player to all clients."""
         for session in list(self.sessions):
             session.client.send_binary(serializing.playback_state(state))
 
@@ -175,7 +175,7 @@ class FoxgloveEndpoint:
             self._updating = self.graph.spawn(self._update())
 
     async def _update(self) -> None:
-        """Advertise new channels and services and remove old ones. Repeat if the graph has changed in the meantime."""
+        """Advertise new channels and services, and remove old ones. Repeat this if the graph changes meanwhile."""
         while self._is_outdated:
             self._is_outdated = False
             new_services, removed_services = self.services.update(self.graph)

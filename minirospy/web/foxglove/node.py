@@ -26,7 +26,7 @@ _WITHOUT_EFFECT = ("use_compression",)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     return exit_status("foxglove_bridge", lambda: run("foxglove_bridge", argv, _start, _announce))
 
 
@@ -36,7 +36,7 @@ async def _start(node: Node) -> Bridge:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options set by a node's private parameters. Raise BridgeError if one is invalid."""
+    """Return the options given by a node's private parameters. Raise BridgeError if one of them is invalid."""
     uses_tls = value(private, "tls", bool, False)
     certificate = value(private, "certfile", str, "")
     if uses_tls and not certificate:
@@ -64,7 +64,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _capabilities(names: Sequence[str]) -> list[str]:
-    """Return the capabilities for the configured names; "time" depends on /use_sim_time, as in the real bridge."""
+    """Return the capabilities with the configured names. As in the real bridge, "time" depends on /use_sim_time."""
     unknown = [name for name in names if name not in (*CAPABILITIES, "time")]
     if unknown:
         raise BridgeError(f"~capabilities: {', '.join(unknown)}: known are {', '.join(CAPABILITIES)}")

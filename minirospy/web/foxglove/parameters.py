@@ -16,13 +16,13 @@ _ROOT = "/"
 
 
 class ParameterListener(Protocol):
-    """A client that subscribes to parameters."""
+    """A client that can subscribe to parameters."""
 
     def parameters_changed(self, changed: list[Parameter]) -> None: ...
 
 
 class Parameters:
-    """The graph's parameters. One subscription, to the root namespace at the master, serves all clients."""
+    """Reads, writes and watches the graph's parameters. All clients share one subscription to the root namespace."""
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
@@ -54,7 +54,7 @@ class Parameters:
         return found
 
     async def write(self, parameters: Iterable[Parameter]) -> list[str]:
-        """Set or delete parameters; return one line for each failure."""
+        """Set or delete parameters; return an error line for each failure."""
         master = self._graph.node.call_master
         failed = []
         for parameter in parameters:
@@ -72,7 +72,7 @@ class Parameters:
         return failed
 
     def subscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Report changes of these parameters, or of all if ``names`` is empty, to ``listener``."""
+        """Notify ``listener`` of changes of these parameters, or of all parameters if ``names`` is empty."""
         before = self._wanted.get(listener, set())
         self._wanted[listener] = None if not names or before is None else before | set(names)
         if not self._is_watching:
@@ -81,11 +81,11 @@ class Parameters:
             self._graph.spawn(self._in_order(self._graph.node.parameters.add))
 
     def count(self, listener: ParameterListener) -> int:
-        """Return the number of parameter names that a client subscribes to."""
+        """Return the number of parameters to which a client subscribes by name."""
         return len(self._wanted.get(listener) or ())
 
     def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Stop reporting changes of the parameters in ``names`` to a client, or of all parameters if ``names`` is empty."""
+        """Stop notifying ``listener`` of changes of these parameters, or of all parameters if ``names`` is empty."""
         before = self._wanted.get(listener, set())
         rest = set() if not names or before is None else before - set(names)
         if rest:
@@ -94,7 +94,7 @@ class Parameters:
             self.forget(listener)
 
     def forget(self, listener: ParameterListener) -> None:
-        """Remove all of a client's subscriptions."""
+        """Cancel all subscriptions of a client."""
         self._wanted.pop(listener, None)
         if not self._wanted and self._is_watching:
             self._is_watching = False
@@ -102,7 +102,7 @@ class Parameters:
             self._graph.spawn(self._in_order(self._graph.node.parameters.remove))
 
     async def _in_order(self, request: Callable[[str], Awaitable[object]]) -> None:
-        """Call the master to subscribe or unsubscribe, after earlier requests have finished.
+        """Subscribe or unsubscribe at the master with ``request``, after all earlier requests.
 
         Otherwise requests could overtake each other, because each may use its own connection.
         """
@@ -110,11 +110,11 @@ class Parameters:
             await request(_ROOT)
 
     def _changed(self, name: str, value: object) -> None:
-        """Report a change of ``name``, a parameter or a namespace; the value ``{}`` means deleted or empty."""
+        """Report a change of a parameter or namespace. A ``value`` of ``{}`` means that it was deleted or is empty."""
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # Query the master for the value: its notification does not distinguish a deleted namespace from an empty one.
+        # Query the master, because its notification does not distinguish a deleted namespace from an empty one.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):
@@ -126,7 +126,7 @@ class Parameters:
             self._graph.spawn(self._report(tuple(again), emptied))
 
     async def _report(self, names: tuple[str, ...], emptied: str) -> None:
-        """Report current values to subscribers, and ``emptied`` to clients that subscribe to all parameters."""
+        """Send current values to the subscribers, and ``emptied`` to clients that subscribe to all parameters."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
             mine = [each for each in found if each.name in (wanted or (emptied,))]
@@ -135,7 +135,7 @@ class Parameters:
 
 
 def _is_affected(wanted: str, name: str, value: object) -> bool:
-    """Return whether a change of ``name`` may change the parameter ``wanted`` in a way that ``value`` does not show."""
+    """Return whether a change of ``name`` may change the parameter ``wanted`` to a value that ``value`` does not contain."""
     if name.startswith(wanted.rstrip("/") + "/"):
         return True
     if not isinstance(value, dict):

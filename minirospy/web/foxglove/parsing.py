@@ -40,11 +40,11 @@ __all__ = [
 
 _Fields = Mapping[str, Any]  # a parsed JSON operation
 
-_MAX_ITEMS = 100_000  # maximum number of entries in one array in a client's message
+_MAX_ITEMS = 100_000  # maximum number of entries in an array in a client's message
 
 _MAX_VALUES = 1_000_000
 _MAX_COLLECTIONS = 100_000
-"""Maximum number of brackets in a JSON message, including those in strings. Keeps parsing below 50 ms.
+"""Maximum number of brackets in a JSON message, even within strings. Keeps the parsing time below 50 ms.
 
 Messages that clients publish are binary and not affected.
 """

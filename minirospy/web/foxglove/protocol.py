@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
-"""Two names for the same protocol; the newer one is preferred if a client offers both."""
+"""Two names for the same protocol. If a client offers both, the newer one is chosen."""
 
 MESSAGE_ENCODING = "ros1"
 SCHEMA_ENCODING = "ros1msg"
@@ -59,7 +59,7 @@ class StatusLevel(IntEnum):
 
 
 class PlaybackCommand(IntEnum):
-    """A client's command to a player."""
+    """A playback command from a client."""
 
     PLAY = 0
     PAUSE = 1
@@ -75,14 +75,14 @@ class PlaybackStatus(IntEnum):
 
 
 class Schema(NamedTuple):
-    """A type's name and its full definition."""
+    """The name of a type, and its full definition."""
 
     name: str
     text: str
 
 
 class Channel(NamedTuple):
-    """A topic that clients may subscribe to. An id belongs to one topic with one schema, and is never reused."""
+    """A topic to which clients may subscribe. Its id is never reused for another topic or schema."""
 
     id: int
     topic: str
@@ -100,7 +100,7 @@ class ServiceOffer(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """A parameter. ``is_set`` is False if the parameter is not set or is to be deleted."""
+    """A parameter. ``is_set`` is False if it is not set, or is to be deleted."""
 
     name: str
     value: object = None
@@ -108,7 +108,7 @@ class Parameter(NamedTuple):
 
 
 class GraphTables(NamedTuple):
-    """Dicts from the names of topics or services to the nodes that use them."""
+    """Dicts from topic or service to the nodes that use it."""
 
     published: Mapping[str, Sequence[str]]
     subscribed: Mapping[str, Sequence[str]]
@@ -116,7 +116,7 @@ class GraphTables(NamedTuple):
 
 
 class PlaybackState(NamedTuple):
-    """A player's status, position (nanoseconds) and speed. ``request_id`` identifies the request that this state answers."""
+    """A player's status, position in nanoseconds, and speed. ``request_id`` identifies the request being answered, if any."""
 
     status: PlaybackStatus
     now: int
@@ -127,7 +127,7 @@ class PlaybackState(NamedTuple):
 
 @dataclass(frozen=True)
 class Subscribe:
-    """Subscribe to channels; ``subscriptions``: (subscription id, channel id)."""
+    """Subscribe to channels. ``subscriptions`` contains pairs (subscription id, channel id)."""
 
     subscriptions: tuple[tuple[int, int], ...]
 
@@ -140,7 +140,7 @@ class Unsubscribe:
 
 
 class ClientChannel(NamedTuple):
-    """A topic that a client publishes; the client chooses the id."""
+    """A topic that a client publishes. The client chooses its id."""
 
     id: int
     topic: str
@@ -150,14 +150,14 @@ class ClientChannel(NamedTuple):
 
 @dataclass(frozen=True)
 class ClientAdvertise:
-    """Advertise the topics that a client publishes."""
+    """Advertise topics that the client will publish."""
 
     channels: tuple[ClientChannel, ...]
 
 
 @dataclass(frozen=True)
 class ClientUnadvertise:
-    """Unadvertise topics that a client published."""
+    """Unadvertise topics that the client has published."""
 
     ids: tuple[int, ...]
 
@@ -172,7 +172,7 @@ class ClientMessage:
 
 @dataclass(frozen=True)
 class GetParameters:
-    """Request the values of parameters, or of all if ``names`` is empty."""
+    """Request the values of parameters, or of all parameters if ``names`` is empty."""
 
     names: tuple[str, ...]
     id: str | None
@@ -188,14 +188,14 @@ class SetParameters:
 
 @dataclass(frozen=True)
 class SubscribeParameterUpdates:
-    """Subscribe to changes of parameters, or of all if ``names`` is empty."""
+    """Subscribe to changes of parameters, or of all parameters if ``names`` is empty."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class UnsubscribeParameterUpdates:
-    """Unsubscribe from changes to the named parameters, or to all if ``names`` is empty."""
+    """Unsubscribe from changes of parameters, or of all parameters if ``names`` is empty."""
 
     names: tuple[str, ...]
 
@@ -212,7 +212,7 @@ class UnsubscribeConnectionGraph:
 
 @dataclass(frozen=True)
 class FetchAsset:
-    """Request a file."""
+    """Request a file by its URI."""
 
     uri: str
     request_id: int
@@ -230,7 +230,7 @@ class ServiceRequest:
 
 @dataclass(frozen=True)
 class PlaybackControl:
-    """Control a player; ``seek``: the new position in nanoseconds, or None to keep the current one."""
+    """Control a player. ``seek`` is the new position in nanoseconds, or None to keep the current one."""
 
     command: PlaybackCommand
     speed: float
@@ -246,7 +246,7 @@ class Playback(Protocol):
         """Return the recording's start and end times, in nanoseconds."""
 
     def now(self) -> int:
-        """Return the current playback time, which messages use as their timestamp."""
+        """Return the playback time, in nanoseconds, with which messages are stamped."""
 
     def state(self) -> PlaybackState: ...
 

@@ -54,7 +54,7 @@ def server_info(
     session_id: str,
     data_range: tuple[int, int] | None = None,
 ) -> str:
-    """Return the first message to a client; ``data_range``: start and end of a player's recording, in nanoseconds."""
+    """Return the first message to a client. ``data_range`` is the start and end of a player's recording, in nanoseconds."""
     fields: dict[str, object] = {
         "op": "serverInfo",
         "name": name,
@@ -72,7 +72,7 @@ def server_info(
 
 
 def status(level: StatusLevel, message: str, id_: str | None = None) -> str:
-    """Return a status message. A later message with the same id replaces it in the client."""
+    """Return a status message. In the client, it replaces an earlier one with the same id."""
     fields: dict[str, object] = {"op": "status", "level": int(level), "message": message}
     if id_ is not None:
         fields["id"] = id_
@@ -106,7 +106,7 @@ def unadvertise(ids: Iterable[int]) -> str:
 
 
 def advertise_services(services: Iterable[ServiceOffer]) -> str:
-    """Return the message that advertises services, including fields that only old clients need."""
+    """Return the message that advertises services. It includes fields that only older clients need."""
 
     def described(schema: Schema) -> dict[str, str]:
         return {
@@ -155,7 +155,7 @@ def service_call_failure(service_id: int, call_id: int, message: str) -> str:
 def connection_graph_update(
     changed: GraphTables, removed_topics: Iterable[str], removed_services: Iterable[str]
 ) -> str:
-    """Return the message with the tables' changed entries, each in full, and the removed names."""
+    """Return the message with changed entries of the graph's tables, each complete, and the removed names."""
 
     def listed(table: Mapping[str, Sequence[str]], key: str) -> list[dict[str, object]]:
         return [{"name": name, key: list(nodes)} for name, nodes in table.items()]
@@ -173,34 +173,34 @@ def connection_graph_update(
 
 
 def message_head(subscription_id: int, nanoseconds: int) -> bytes:
-    """Return the header that precedes a topic's message."""
+    """Return the header that precedes a message on a topic."""
     return _MESSAGE_HEAD.pack(1, subscription_id, nanoseconds)
 
 
 def time_frame(nanoseconds: int) -> bytes:
-    """Return the frame with the current time."""
+    """Return the frame that contains the current time."""
     return _TIME.pack(2, nanoseconds)
 
 
 def service_response_head(service_id: int, call_id: int, encoding: str = MESSAGE_ENCODING) -> bytes:
-    """Return the header that precedes a service's response."""
+    """Return the header that precedes the response of a service."""
     name = encoding.encode()
     return _SERVICE_HEAD.pack(3, service_id, call_id, len(name)) + name
 
 
 def asset_head(request_id: int) -> bytes:
-    """Return the header that precedes a file's bytes."""
+    """Return the header that precedes the bytes of a file."""
     return _ASSET_HEAD.pack(4, request_id, 0, 0)
 
 
 def asset_failure(request_id: int, why: str) -> bytes:
-    """Return the frame for a file that is not available."""
+    """Return the frame that reports that a file is not available."""
     text = why.encode("utf-8", "replace")
     return _ASSET_HEAD.pack(4, request_id, 1, len(text)) + text
 
 
 def playback_state(state: PlaybackState) -> bytes:
-    """Return the frame with a player's state."""
+    """Return the frame that contains a player's state."""
     name = state.request_id.encode()
     return _PLAYBACK_STATE.pack(5, state.status, state.now, state.speed, state.did_seek, len(name)) + name
 
@@ -223,7 +223,7 @@ def _parameter_fields(parameter: Parameter) -> dict[str, object]:
 
 
 def _json_value(value: object) -> object:
-    """Convert a parameter's value for JSON: bytes become base64, and numbers that JSON lacks become strings."""
+    """Convert a parameter's value for JSON: bytes to base64, and numbers that JSON does not have to strings."""
     if isinstance(value, dict):
         return {str(key): _json_value(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -42,24 +42,24 @@ __all__ = ["FoxgloveServer", "FoxgloveSession"]
 _log = logging.getLogger(__name__)
 
 _MAX_CALLS = 200
-"""maximum number of concurrent calls and requests from one client"""
+"""maximum number of concurrent calls and requests per client"""
 
 _MAX_CHANNELS = 1000
-"""Maximum number of topics that one client may publish, and of subscriptions that it may have (each receives every message)."""
+"""Maximum number of topics that a client may publish, and of its subscriptions, each of which gets every message."""
 
 _MAX_PARAMETERS = 10_000
-"""maximum number of parameter names that one client may subscribe to"""
+"""maximum number of parameters that a client may subscribe to by name"""
 
-# maximum per client message, which may name thousands of nonexistent channels
+# maximum number of status messages per client message, which may contain thousands of invalid channels
 _MAX_STATUSES = 100
 _VALUE_FACTOR = 4
-"""Memory of a parsed operation, in bytes per byte of its JSON text; measured for objects and lists of numbers."""
+"""Bytes of memory that a parsed operation takes per byte of JSON text, measured for objects and lists of numbers."""
 
-_TIME = "time"  # key of time messages in a client's queue, which keeps only the newest one
+_TIME = "time"  # key of time messages in a client's queue, which keeps only the newest message per key
 
 
 class FoxgloveServer(Protocol):
-    """The interface through which a client's session uses the endpoint."""
+    """The endpoint, as used by the session of a client."""
 
     graph: SharedGraph
     assets: Assets
@@ -69,20 +69,20 @@ class FoxgloveServer(Protocol):
     parameters: Parameters
 
     def capabilities_of(self, client: WebClient) -> list[str]:
-        """Return the capabilities that a client has."""
+        """Return the capabilities of a client."""
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel if its publisher's definition differs from the installed one."""
+        """Replace a channel because its publisher's definition differs from the installed one."""
 
     def playback_changed(self, state: PlaybackState) -> None:
-        """Send a player's state to all clients."""
+        """Send the state of a player to all clients."""
 
     def left(self, session: FoxgloveSession) -> None:
-        """Remove a client."""
+        """Remove a client that has disconnected."""
 
 
 class FoxgloveSession:
-    """One client's session. The client's connection calls the methods on the loop."""
+    """The session of one client. Its connection calls the methods on the loop."""
 
     def __init__(self, endpoint: FoxgloveServer, client: WebClient) -> None:
         self.client = client
@@ -92,12 +92,12 @@ class FoxgloveSession:
         self._subscriptions: dict[int, tuple[Channel, Callable[[Arrival], None]]] = {}
         self._publications: dict[int, Publication] = {}
         self._calls: set[asyncio.Task[None]] = set()
-        self._calls_size = 0  # memory of the running calls, in bytes
-        self._operation_size = 0  # memory of the current operation, in bytes
+        self._calls_size = 0  # memory of the calls in progress, in bytes
+        self._operation_size = 0  # memory of the operation being handled, in bytes
         self._dropped = 0
         self._are_drops_shown = False
         self._statuses = 0
-        # _statuses counts the status messages about the current message.
+        # _statuses is the number of status messages about the client message being handled.
 
         self._handlers: Mapping[type[Event], Callable[[Any], None]] = {
             protocol.Subscribe: self._subscribe,
@@ -116,7 +116,7 @@ class FoxgloveSession:
             protocol.PlaybackControl: self._control_playback,
         }
 
-    # --- called by the connection
+    # --- called by the client's connection
 
     def received_text(self, text: str) -> None:
         """Handle a JSON message."""
@@ -129,7 +129,7 @@ class FoxgloveSession:
         self._handle(parsing.parse_binary, data)
 
     def ended(self) -> None:
-        """Close the client's subscriptions, publications and calls."""
+        """Close the client's subscriptions and publications, and cancel its calls."""
         for channel, listener in self._subscriptions.values():
             self._graph.unsubscribe(channel.topic, listener)
         self._subscriptions.clear()
@@ -152,7 +152,7 @@ class FoxgloveSession:
         self.client.send_message(_TIME, frame, b"", newest_only=True)
 
     def channels_removed(self, ids: list[int]) -> None:
-        """Close the subscriptions to removed channels."""
+        """Cancel the subscriptions to removed channels."""
         for subscription_id, (channel, listener) in list(self._subscriptions.items()):
             if channel.id in ids:
                 del self._subscriptions[subscription_id]
@@ -160,7 +160,7 @@ class FoxgloveSession:
         self.send(serializing.unadvertise(ids))
 
     def report_drops(self) -> None:
-        """Notify the client when messages start or stop being dropped. Called at regular intervals."""
+        """Notify the client when messages start to be dropped, or are no longer dropped. Called periodically."""
         dropped = self.client.queue.dropped
         if dropped > self._dropped:
             counts = self.client.queue.dropped_of.most_common(3)
@@ -201,7 +201,7 @@ class FoxgloveSession:
         self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:
-        """Raise BridgeError, whose message names what the client is ``doing``, if the client lacks a capability."""
+        """Raise BridgeError if the client lacks a capability. ``doing`` describes the refused activity in the message."""
         if capability not in self._endpoint.capabilities_of(self.client):
             why = (
                 "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"
@@ -209,7 +209,7 @@ class FoxgloveSession:
             raise BridgeError(f"{doing} is not allowed: {why}")
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:
-        """Start a task for the received request; the request's memory counts until the task ends."""
+        """Start a task for the received request. The request's memory is counted until the task ends."""
         if len(self._calls) >= _MAX_CALLS:
             work.close()
             raise BridgeError(f"{_MAX_CALLS} requests are under way: wait for an answer")
@@ -257,7 +257,7 @@ class FoxgloveSession:
         if (arrival.header["md5sum"] != md5sum and md5sum != ANY) or (
             not channel.schema.text and md5sum == ANY
         ):
-            # The client decodes messages with a definition that does not match this publisher's.
+            # The client would decode the message with a definition that does not match the publisher's.
             self._endpoint.definition_differs(channel, arrival.header)
             return
         head = serializing.message_head(subscription_id, arrival.nanoseconds)
@@ -411,7 +411,7 @@ class FoxgloveSession:
         except (ServiceException, BridgeError) as error:
             self._call_failed(event, str(error))
         except Exception:
-            # The task logs the error; the client still needs a response.
+            # The task logs the error, but the client also needs a response.
             self._call_failed(event, "the bridge failed on this call")
             raise
         else:

@@ -138,7 +138,7 @@ class Rosapi:
     async def _typed_topics(self) -> tuple[list[str], list[str]]:
         graph = await self._graph()
         types = {topic: _known(graph.types.get(topic)) for topic in graph.topics}
-        # Put topics of unknown type last.
+        # Topics of unknown type come last.
         topics = sorted(types, key=lambda topic: (not types[topic], topic))
         return topics, [types[topic] for topic in topics]
 
@@ -197,7 +197,7 @@ class Rosapi:
         return {"type": await self._type_of(self.node.resolve(request.service))}
 
     async def _service_providers(self, request: ServiceProvidersRequest) -> object:
-        """Return the nodes that provide services of a type. Despite its name, ``service`` is the type."""
+        """Return the nodes that provide services of a type, which the request calls ``service``."""
         found = await self._services_of(request.service)
         return {"providers": [node for _, nodes in found for node in nodes]}
 
@@ -283,7 +283,7 @@ class Rosapi:
 
 
 def _guarded(handler: _Handler) -> _Handler:
-    """Wrap a handler so that a BridgeError is reported to the client in one line, without a traceback in the log."""
+    """Wrap a handler: report a BridgeError to the client on one line, without a traceback in the log."""
 
     async def handle(request: object) -> object:
         try:
@@ -299,7 +299,7 @@ def _known(type_: str | None) -> str:
 
 
 def _text_of(type_: str) -> str:
-    """Return the full text of a type, or "" if the type is not installed."""
+    """Return the full definition of a type, or "" if it is not installed."""
     try:
         text: str = message_class(type_)._full_text
     except BridgeError:

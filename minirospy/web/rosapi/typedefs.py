@@ -25,7 +25,7 @@ _NOT_AN_ARRAY = -1
 
 @dataclass
 class TypeDefinition:
-    """A type's fields and constants.
+    """The fields and constants of a type.
 
     In ``lengths``, -1 means that a field is not an array, and 0 means an array of any length.
     """
@@ -39,7 +39,7 @@ class TypeDefinition:
 
 
 def describe(class_: type[Message], find: Callable[[str], type[Message]]) -> list[TypeDefinition]:
-    """Describe a type and all types that it uses, each once. ``find`` maps a name to a class."""
+    """Describe a type, and each type that it uses once. ``find`` maps a type's name to its class."""
     return list(_walk(_described(class_), find, {_name_of(class_)}))
 
 

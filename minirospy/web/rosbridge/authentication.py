@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["SERVICE", "authenticate"]
 
 SERVICE = "authenticate"
-"""The service of the node `rosrun rosauth ros_mac_authentication`, in the server's namespace."""
+"""Name, in the server's namespace, of the service that `rosrun rosauth ros_mac_authentication` provides."""
 
 
 async def authenticate(node: Node, event: Auth) -> bool:
-    """Return whether rosauth's node accepts a client. Raise ServiceException if the node cannot be called."""
+    """Return whether rosauth's node accepts a client. Raise ServiceException if the call fails."""
     class_: Any = service_class("rosauth/Authentication")
     response = await node.call(
         SERVICE,

@@ -30,7 +30,7 @@ TYPED_ARRAYS = {
 """Dict from element type to (tag, format character) of its arrays."""
 
 _MAX_VALUES = 1_000_000
-"""Maximum number of values in a client's message; a tagged array counts as one."""
+"""Maximum number of values in a client's message. A tagged array counts as one value."""
 
 _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
 
@@ -42,7 +42,7 @@ def encode_cbor(value: object) -> bytes:
 
 
 def decode_cbor(data: bytes) -> object:
-    """Decode CBOR data; typed arrays become lists.
+    """Decode CBOR data; convert typed arrays to lists.
 
     Raise ValueError if the data is invalid, BridgeProtocolError if cbor2 is not installed.
     """
@@ -61,7 +61,7 @@ def decode_cbor(data: bytes) -> object:
 
 
 def _check_heads(data: bytes) -> None:
-    """Raise ValueError if there are too many values, or tags that messages do not use.
+    """Raise ValueError if the data has too many values, or tags that messages do not use.
 
     Given other tags, cbor2 would, for example, compile regular expressions.
     """
@@ -74,7 +74,7 @@ def _check_heads(data: bytes) -> None:
             argument = int.from_bytes(data[at : at + size], "big")
             at += size
         elif argument == 31:
-            argument = 0  # the length is indefinite: the parts follow
+            argument = 0  # indefinite length: the parts follow
         if major in (2, 3):
             at += argument
         elif major == 6 and argument not in _FORMATS:
@@ -85,7 +85,7 @@ def _check_heads(data: bytes) -> None:
 
 
 def typed_array(type_: str, values: Sequence[float]) -> object:
-    """Return an array of numbers as tagged bytes."""
+    """Return an array of numbers as bytes with a CBOR tag."""
     tag, format_ = TYPED_ARRAYS[type_]
     packed = array(format_, values)
     if sys.byteorder == "big":
@@ -94,7 +94,7 @@ def typed_array(type_: str, values: Sequence[float]) -> object:
 
 
 def _from_tag(first: Any, second: Any = None, *_: object) -> object:
-    """Convert a typed array to a list. Old versions of cbor2 pass the decoder as the first argument."""
+    """Convert a typed array to a list. Old versions of cbor2 pass the decoder as first argument."""
     tag = first if hasattr(first, "tag") else second
     format_ = _FORMATS.get(tag.tag)
     if format_ is None or not isinstance(tag.value, bytes):
@@ -112,7 +112,7 @@ def _library() -> Any:
     try:
         import cbor2
     except ImportError as error:
-        # Do not include the install command, which contains the server's interpreter path: clients receive this text.
+        # Clients receive this text, so omit the install command, which contains the path of the server's interpreter.
         raise BridgeProtocolError(
             "compression cbor needs the library cbor2: install it on the server"
         ) from error

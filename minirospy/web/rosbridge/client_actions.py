@@ -28,9 +28,9 @@ __all__ = ["ClientActions"]
 
 _log = logging.getLogger(__name__)
 
-_MAX_GOALS = 100  # maximum number of running goals per client
+_MAX_GOALS = 100  # maximum number of unfinished goals per client
 _MAX_ACTIONS = 50  # maximum number of actions per client; each action has five topics
-SERVER_SECONDS = 5.0  # maximum wait for a server's connection, as in rosbridge
+SERVER_SECONDS = 5.0  # maximum seconds to wait for an action server, as in rosbridge
 
 _UNKNOWN = 0  # values of ROS 2's action_msgs/GoalStatus
 _STATUSES = {
@@ -43,7 +43,7 @@ _STATUSES = {
 
 @dataclass
 class _Running:
-    """A goal without a result. ``goal``: set once it can be sent. ``is_cancelled``: whether a cancellation was requested."""
+    """A goal without a result. ``goal`` is set once it can be sent; ``is_cancelled`` is set on a cancel request."""
 
     goal: ClientGoal[Message, Message] | None = None
     is_cancelled: bool = False
@@ -56,26 +56,26 @@ class _Running:
 
 @dataclass
 class _Action:
-    """The client of an action, and the number of the action's goals without a result."""
+    """A client for an action, and the number of its goals that have no result yet."""
 
     client: ActionClient[Any, Message, Message]
     goals: int = 0
 
 
 class ClientActions:
-    """The actions that one rosbridge client uses. Call the methods in the order of the client's operations."""
+    """The actions used by one rosbridge client. Call the methods in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self.goals_size = 0
         """Memory used by the running goals, in bytes."""
         self._session = session
-        self._actions: dict[tuple[str, Any], _Action] = {}  # by (name, class)
-        self._goals: dict[object, _Running] = {}  # by the operation's id
-        self._count = 0  # number of running goals, including those without an id
+        self._actions: dict[tuple[str, Any], _Action] = {}  # keyed by (name, class)
+        self._goals: dict[object, _Running] = {}  # keyed by the id of the operation
+        self._count = 0  # number of unfinished goals, including those without an id
         self._reporter = ErrorReporter(_log, "a client's goal")
 
     def close(self) -> None:
-        """Leave the actions' topics. Running goals continue."""
+        """Unregister the actions' topics. Unfinished goals continue."""
         for action in self._actions.values():
             self._session.graph.spawn(action.client.close())
         self._actions.clear()
@@ -102,7 +102,7 @@ class ClientActions:
 
         work = self._send(event, running, is_large=self._session.is_large)
         self._session.spawn(work).add_done_callback(ended)
-        # Report the memory last: if it exceeds the limit, this disconnects the client and cancels the goal's task.
+        # Report the memory last: beyond the limit, this disconnects the client and cancels the goal's task.
         self._session.count()
 
     def cancel_goal(self, event: protocol.CancelActionGoal) -> None:
@@ -171,7 +171,7 @@ class ClientActions:
     def _action(self, name: str, class_: Any) -> _Action:
         key = (name, class_)
         if key not in self._actions:
-            # This imports the messages of actionlib, which most clients do not need.
+            # Import this here, because most clients do not need the messages of actionlib.
             from minirospy.ros.actionlib.actionlib.aio import ActionClient
 
             if len(self._actions) >= _MAX_ACTIONS:
@@ -180,13 +180,13 @@ class ClientActions:
             try:
                 client = ActionClient(self._session.graph.node, name, class_)
             except ValueError as error:
-                # Another goal uses this action with a different type.
+                # Another goal uses this action name with a different type.
                 raise BridgeError(str(error)) from error
             self._actions[key] = _Action(client)
         return self._actions[key]
 
     def _check_type(self, name: str, class_: Any) -> None:
-        """Raise BridgeError if the action's server has a different type.
+        """Raise BridgeError if the type of the action's server differs.
 
         Check the type of the result topic: only the server publishes results, while an earlier client may have set the goal
         topic's type.
@@ -198,7 +198,7 @@ class ClientActions:
             raise type_conflict(topic, wanted, known)
 
     async def _leave(self, name: str, class_: Any) -> None:
-        """Leave an action's topics, so that the action can be used with another type."""
+        """Unregister an action's topics, so that it can be used with another type."""
         if action := self._actions.pop((name, class_), None):
             await asyncio.wait([self._session.graph.spawn(action.client.close())])
 
@@ -225,7 +225,7 @@ class ClientActions:
             "values": conversion.values(feedback),
         }
         messages = await self._encoded(event, fields)
-        # A slow client may miss feedback, but not results.
+        # A slow client may miss feedback, but not the result.
         client, key = self._session.client, ("feedback", goal_id)
         if texts := [each for each in messages if isinstance(each, str)]:
             client.send_texts(key, texts, newest_only=True)
@@ -258,7 +258,7 @@ class ClientActions:
 async def _cancel_without_server(
     client: ActionClient[Any, Message, Message], goal: ClientGoal[Message, Message]
 ) -> Exception | None:
-    """Wait for a server. If none appears, cancel the goal, so that it is not sent later, and return the error."""
+    """Wait for a server. If there is none in time, cancel the goal, so that it is not sent later; return the error."""
     try:
         await client.wait_for_server(SERVER_SECONDS)
     except Exception as error:  # noqa: BLE001 - the caller raises it once the goal has ended
@@ -268,7 +268,7 @@ async def _cancel_without_server(
 
 
 def _action_class(type_: str) -> type[Message]:
-    """Return the class of an action. ROS 2 names are accepted, too. Raise UnknownTypeError if it is not installed."""
+    """Return the class of an action type, also for a ROS 2 name. Raise UnknownTypeError if it is not installed."""
     package, _, short = type_.replace("/action/", "/", 1).partition("/")
     name = f"{package}/{short}" if short.endswith("Action") else f"{package}/{short}Action"
     try:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ClientPublications"]
 
-_LARGE_LATCHED = 100_000  # maximum bytes of a latched message to keep after its publisher has disconnected
+_LARGE_LATCHED = 100_000  # bytes; a larger latched message is dropped as soon as its publisher disconnects
 
 
 @dataclass
@@ -31,14 +31,14 @@ class _Published:
     publication: Publication
     message_class: type[Message]
     latch: bool = False
-    latched: int = 0  # size in bytes of the last message, if it is latched for later subscribers
-    ids: set[object] = field(default_factory=set)  # ids of the advertisements
-    # sequence numbers for headers
+    latched: int = 0  # size in bytes of the last message if the topic is latched, otherwise 0
+    ids: set[object] = field(default_factory=set)  # ids of the client's advertisements
+    # sequence numbers for message headers
     numbers: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
 
 
 class ClientPublications:
-    """The topics that one client publishes. Its methods are called in the order of the client's operations."""
+    """The topics that one client publishes. Call the methods in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self.latched_size = 0
@@ -76,7 +76,7 @@ class ClientPublications:
             self._session.count()
 
     def _release(self, published: _Published) -> None:
-        """Release a publication after a delay, within which it may be advertised again.
+        """Release a publication after a delay, so that it can be advertised again meanwhile.
 
         Release it immediately if it stores a large message.
         """
@@ -94,7 +94,7 @@ class ClientPublications:
         return self._publish_to(published, event)
 
     async def _publish_established(self, event: protocol.Publish) -> None:
-        """Publish on a topic that the client has not advertised, with the type that the graph has for the topic."""
+        """Publish on a topic that the client has not advertised, using the type in the graph."""
         type_ = await self._session.type_of(event.topic)
         published = self._open(event.topic, type_, event.latch)
         published.ids.add(None)
@@ -118,7 +118,7 @@ class ClientPublications:
         await self._publish_when_joined(published.publication, body)
 
     def _count_latched(self, published: _Published, body: bytes) -> None:
-        """Count the memory of a message that is stored as the latched message.
+        """Count the memory of a message that is kept because its topic is latched.
 
         Raise BridgeError if the client's latched messages exceed the limit.
         """

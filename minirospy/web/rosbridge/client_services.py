@@ -22,12 +22,12 @@ __all__ = ["ClientServices"]
 
 _log = logging.getLogger(__name__)
 
-_MAX_CALLS = 200  # maximum number of concurrent calls from one client
-_MAX_SERVICES = 200  # maximum number of services that one client may offer
+_MAX_CALLS = 200  # maximum number of concurrent calls per client
+_MAX_SERVICES = 200  # maximum number of services that a client may offer
 
 
 class ClientServices:
-    """The calls and services of one client. Its methods are called in the order of the client's operations."""
+    """The calls and services of one client. Call the methods in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self.calls_size = 0
@@ -37,7 +37,7 @@ class ClientServices:
         self._reporter = ErrorReporter(_log, "a client's call of a service")
 
     def close(self) -> None:
-        """Stop offering the client's services. The session itself cancels the client's calls, which are its tasks."""
+        """Stop offering the client's services. The session cancels the calls, which are its tasks."""
         shared = self._session.shared
         for name, service in list(shared.services.items()):
             if service.owner is self._session:
@@ -58,7 +58,7 @@ class ClientServices:
             self._session.count()
 
         self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
-        # Report the memory last: if the limit is exceeded, this disconnects the client and cancels the call.
+        # Report the memory last: beyond the limit, this disconnects the client and cancels the call.
         self._session.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:
@@ -79,7 +79,7 @@ class ClientServices:
         self._session.send_encoded(messages)
 
     async def _encoded(self, event: protocol.CallService, response: Response) -> list[str | bytes]:
-        """Encode a response as the messages that contain it. A large response is encoded in a thread."""
+        """Encode a response as one or more messages. Encode a large response in a thread."""
         shared = self._session.shared
         size = event.fragment_size or shared.options.fragment_size
 

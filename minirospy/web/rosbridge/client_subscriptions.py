@@ -20,14 +20,14 @@ __all__ = ["ClientSubscriptions"]
 
 
 class ClientSubscriptions:
-    """One client's subscriptions, keyed by topic. Its methods are called in the order of the client's operations."""
+    """One client's subscriptions, keyed by topic. Call the methods in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self._session = session
         self._subscribed: dict[str, ClientTopic] = {}
 
     def close(self) -> None:
-        """Cancel all of the client's subscriptions."""
+        """Cancel all subscriptions of the client."""
         for topic in self._subscribed.values():
             topic.close()
         self._subscribed.clear()
@@ -57,7 +57,7 @@ class ClientSubscriptions:
         self._add(event)
 
     async def _subscribe_unknown(self, event: protocol.Subscribe, error: BridgeError) -> None:
-        """Subscribe with a type that is not installed here, if the topic has that type. The publishers send its definition."""
+        """Subscribe with a type that is not installed, if the topic has this type: its publishers send the definition."""
         with contextlib.suppress(BridgeError):
             if await self._session.type_of(event.topic) == event.type:
                 self._add(event)

@@ -20,7 +20,7 @@ __all__ = ["ClientTopics"]
 
 
 class ClientTopics:
-    """Publishes the number of clients, their addresses, and their connection times, after each change."""
+    """Publishes the number of clients, and their addresses and connection times, after each change."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -29,7 +29,7 @@ class ClientTopics:
         self._clients: Publisher[Message] | None = None
 
     async def start(self) -> None:
-        """Start publishing the connected clients.
+        """Start to publish the clients.
 
         Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
         """
@@ -51,7 +51,7 @@ class ClientTopics:
                 await publisher.close()
 
     def changed(self, sessions: Sequence[RosbridgeSession]) -> None:
-        """Publish the list of connected clients."""
+        """Publish the clients of the open sessions."""
         self._sessions = sessions
         self._publish()
 

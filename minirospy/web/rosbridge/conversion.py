@@ -38,19 +38,19 @@ _Convert = Callable[[Any], object]
 
 
 class ConversionError(BridgeProtocolError):
-    """A value does not match a message's field."""
+    """Raised if a value does not match a message's field."""
 
 
 # --- messages -> dictionaries
 
 
 def values(message: Message) -> dict[str, object]:
-    """Convert a message's fields to values for JSON."""
+    """Convert a message to a dictionary of JSON-compatible values."""
     return {name: convert(getattr(message, name)) for name, convert in _json_fields(type(message))}
 
 
 def cbor_values(message: Message) -> dict[str, object]:
-    """Convert a message's fields to values for CBOR."""
+    """Convert a message to a dictionary of CBOR-compatible values."""
     return {name: convert(getattr(message, name)) for name, convert in _cbor_fields(type(message))}
 
 
@@ -117,7 +117,7 @@ def _float(found: float) -> float | None:
 
 
 def _floats(found: Sequence[float]) -> list[float | None]:
-    # The sum of finite numbers is finite unless it overflows, so checking the sum is enough for most arrays.
+    # The sum of finite numbers is finite unless it overflows, so this fast check suffices for most arrays.
     if math.isfinite(sum(found)):
         return list(found)
     return [each if math.isfinite(each) else None for each in found]
@@ -131,7 +131,7 @@ def _time(found: Time | Duration) -> dict[str, int]:
 
 
 def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
-    """Set a message's fields from a dictionary. A header without ``stamp`` gets the current time.
+    """Set a message's fields from a dictionary. A header without a stamp gets the current time.
 
     Raise ConversionError, with rosbridge's message, if a field is unknown or a value has the wrong type.
     """
@@ -139,7 +139,7 @@ def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return a call's arguments as the request's fields; the arguments are a dictionary, or a list in field order.
+    """Return a call's arguments, a dictionary or a list in field order, as a dictionary of the request's fields.
 
     For other arguments, return no fields.
     """
@@ -216,13 +216,13 @@ def _from_time(
         return now()
     if not isinstance(value, dict):
         raise _mismatch(root, path, type_, value)
-    # Also accept ROS 2's names, which roslib.js may send.
+    # Also accept the names that ROS 2 uses, which roslib.js may send.
     for name, other in (("secs", "sec"), ("nsecs", "nanosec")):
         part = value.get(name, value.get(other, getattr(present, name)))
         if type(part) is not int:
             raise _mismatch(root, (*path, name), "int32", part)
         setattr(present, name, part)
-    # Clients may send more than a second of nanoseconds. C++ nodes do not normalize received times.
+    # Clients may send a second or more in nanoseconds, and C++ nodes do not normalize received times.
     present.canon()  # type: ignore[attr-defined]
     return present
 

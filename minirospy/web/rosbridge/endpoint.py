@@ -27,13 +27,13 @@ class RosbridgeEndpoint:
         options: RosbridgeOptions | None = None,
         on_clients: Callable[[Sequence[RosbridgeSession]], object] = lambda _: None,
     ) -> None:
-        """Create the endpoint. ``on_clients`` is called with the open sessions whenever a client connects or disconnects."""
+        """Create the endpoint. ``on_clients`` is called with the open sessions when a client connects or disconnects."""
         self.sessions: list[RosbridgeSession] = []
         self.shared = RosbridgeShared(graph, options)
         self._on_clients = on_clients
 
     def select(self, offered: Sequence[str]) -> str | None:
-        """Return the sub-protocol to use, or None."""
+        """Return the sub-protocol to use, or None for no sub-protocol."""
         return _SUBPROTOCOL if _SUBPROTOCOL in offered else None
 
     def open(self, client: WebClient) -> RosbridgeSession:
@@ -46,7 +46,7 @@ class RosbridgeEndpoint:
         return session
 
     def close(self) -> None:
-        """Stop the threads once the work in progress is done. Idempotent."""
+        """Stop the threads after the work in progress. Idempotent."""
         self.shared.close()
 
     def _left(self, session: RosbridgeSession) -> None:
@@ -59,4 +59,4 @@ class RosbridgeEndpoint:
 
 
 def _ignore(_: Changes) -> None:
-    """Ignore graph changes, because sessions query the graph when they need it."""
+    """Ignore graph changes: sessions query the graph when they need it."""

@@ -32,7 +32,7 @@ _ARGUMENTS = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
 
     def body() -> int:
         given, rest = _arguments(sys.argv[1:] if argv is None else argv)
@@ -57,7 +57,7 @@ def refuse(program: str) -> int:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options set by a node's private parameters. Raise BridgeError if a parameter is invalid."""
+    """Return the options given by a node's private parameters. Raise BridgeError if one of them is invalid."""
     if private.get("bson_only_mode") or private.get("binary_encoder") == "bson":
         raise BridgeError("BSON is not offered: subscribe with compression cbor, which is as small")
     services = globs(private, "services_glob")
@@ -82,7 +82,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
         filters=Filters(
             topics=topics,
             publishable=topics,
-            # Programs find topics and services by calling rosapi's services.
+            # Allow rosapi's services, which programs call to find topics and services.
             services=NameFilter.of([*services, "/rosapi/*"] if services else ()),
             parameters=NameFilter.of(globs(private, "params_glob")),
         ),
@@ -99,7 +99,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _size(private: Mapping[str, object]) -> int | None:
-    """Return the size above which messages to clients are sent in fragments.
+    """Return the size above which messages to clients are fragmented.
 
     As in rosbridge, the parameter limits only messages to clients.
     """
@@ -112,7 +112,7 @@ def _size(private: Mapping[str, object]) -> int | None:
 
 
 def _arguments(argv: Sequence[str]) -> tuple[dict[str, object], list[str]]:
-    """Return the parameters passed as `--name value`, and the remaining arguments, which are remappings."""
+    """Return the parameters given as `--name value`, and all other arguments, which are remappings."""
     from minirospy.introspect.values import parse_value
 
     given: dict[str, object] = {}

@@ -32,20 +32,20 @@ __all__ = [
     "type_conflict",
 ]
 
-# maximum number of topics that one client may publish, and maximum number that it may subscribe to
+# maximum number of topics that a client may publish, and of topics that it may subscribe to
 MAX_TOPICS = 1000
-# Maximum per client: bytes of operations queued behind a blocked one, and bytes of latched messages
+# maximum size in bytes, per client, of operations queued behind a blocked one, and of latched messages
 MAX_WAITING_BYTES = 64_000_000
 
 REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, MessageException)
-"""Exceptions raised by an operation that are reported to the client."""
+"""Exceptions of an operation that are reported to the client."""
 
 Work = Coroutine[object, object, None]
 """The remaining work of an operation that must wait, for example for the graph."""
 
 
 class OperationSession(Protocol):
-    """The session of the client whose operation is being executed, as the handlers see it."""
+    """The session of the client that has sent the operation, as the handlers use it."""
 
     @property
     def client(self) -> WebClient: ...
@@ -58,39 +58,39 @@ class OperationSession(Protocol):
 
     @property
     def budget(self) -> Budget:
-        """Return the byte budget for messages on topics whose rate the client limits."""
+        """Return the byte budget for topics whose message rate the client limits."""
 
     @property
     def operation_size(self) -> int:
-        """Return the memory, in bytes, used by the current operation."""
+        """Return the memory that the current operation uses, in bytes."""
 
     @property
     def is_large(self) -> bool:
-        """Return whether the current operation's message is large enough to create the ROS message in a thread."""
+        """Return whether the current operation is so large that its ROS message must be created in a thread."""
 
     def send(self, fields: Mapping[str, object]) -> None:
-        """Send a message that does not belong to a topic."""
+        """Send a message that is not about a topic."""
 
     def send_encoded(self, messages: Sequence[str | bytes]) -> None:
-        """Send messages that are already JSON or CBOR."""
+        """Send messages that are already encoded as JSON or CBOR."""
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status message, if the client has requested this level."""
+        """Send a status message if the client has requested its level."""
 
     def count(self) -> None:
-        """Charge this client's memory use to the server's budget."""
+        """Count this client's memory towards the server's budget."""
 
     def spawn(self, work: Work) -> asyncio.Task[None]:
-        """Start a task; it is cancelled when the session ends."""
+        """Start a task that is cancelled when the session ends."""
 
     async def type_of(self, topic: str) -> str:
-        """Return a topic's type in the graph. Raise BridgeError if it has none."""
+        """Return the type of a topic in the graph. Raise BridgeError if it has none."""
 
     def is_allowed(self, kind: str, name: str, what: str) -> bool:
-        """Return whether a name matches the globs; if not, send a warning with rosbridge's message."""
+        """Return whether the globs allow a name; if not, send rosbridge's warning."""
 
     def require_write(self, what: str) -> None:
-        """Raise BridgeError if the client's token is read-only."""
+        """Raise BridgeError if the token is read-only. ``what`` describes the refused operation."""
 
 
 def check_name(kind: str, name: str) -> None:
@@ -101,7 +101,7 @@ def check_name(kind: str, name: str) -> None:
 
 
 def type_conflict(topic: str, wanted: str, known: str) -> BridgeError:
-    """Return the error for a topic that has another type in the graph, with rosbridge's message."""
+    """Return the error that a topic has another type in the graph, with rosbridge's message."""
     return BridgeError(
         f"Tried to register topic {topic} with type {wanted} but it is already established with type {known}"
     )

@@ -16,9 +16,7 @@ from minirospy.base.errors import BridgeProtocolError
 __all__ = ["decode", "encode"]
 
 _MAX_PIXELS = 5_600_000
-"""Maximum number of pixels in a client's image. They decode to 17 MB of text (3 bytes per pixel), or four times that with
-wide characters.
-"""
+"""Maximum number of pixels in a client's image: 17 MB of text (3 bytes per pixel), four times that with wide characters."""
 
 
 def encode(text: str) -> str:
@@ -36,7 +34,7 @@ def encode(text: str) -> str:
 
 
 def decode(data: str) -> str:
-    """Decode the text in a base64-encoded PNG.
+    """Return the text in a base64-encoded PNG.
 
     Raise BridgeProtocolError if the data is invalid, the image is too large, or Pillow is not installed.
     """
@@ -57,7 +55,7 @@ def _pillow() -> Any:
     try:
         from PIL import Image
     except ImportError as error:
-        # Do not include the install command, which contains the server's interpreter path: clients receive this text.
+        # Clients receive this text, so omit the install command, which contains the path of the server's interpreter.
         raise BridgeProtocolError(
             "compression png needs Pillow: install minirospy[images] on the server"
         ) from error

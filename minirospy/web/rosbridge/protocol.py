@@ -61,17 +61,15 @@ Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
 _MAX_FRAGMENTS = 2_000
-"""Maximum number of fragments per message to a client. A client may request fragments of one character, each sent as a
-message.
-"""
+"""Maximum number of fragments per message: a client may request fragments of a single character."""
 
 _LONGEST_ID = 1000
 _SHOWN = 200
-"""Maximum characters of a client's message to quote in an error."""
+"""Maximum number of characters quoted from a client's message in an error."""
 
 
 class StatusLevel(IntEnum):
-    """The severity of a status message. A client sets the level up to which it receives messages."""
+    """The severity of a status message. A client chooses the lowest severity that it receives."""
 
     NONE = 0
     ERROR = 1
@@ -80,7 +78,7 @@ class StatusLevel(IntEnum):
 
 
 class OperationError(BridgeProtocolError):
-    """An operation was refused. ``id`` is the one in the client's message."""
+    """Raised if an operation is refused. ``id`` is the operation's id."""
 
     def __init__(self, text: str, id_: Id = None) -> None:
         super().__init__(text)
@@ -146,7 +144,7 @@ class Unsubscribe(TopicEvent):
 
 @dataclass(frozen=True)
 class CallService(ServiceEvent):
-    """Call a service. ``arguments``: the request's fields, or a list of their values; any other value means no fields."""
+    """Call a service. ``arguments`` contains the request's fields, or a list of their values; any other value means none."""
 
     arguments: object
     fragment_size: int | None
@@ -155,7 +153,7 @@ class CallService(ServiceEvent):
 
 @dataclass(frozen=True)
 class ServiceResponse(ServiceEvent):
-    """Respond to a call; if ``result`` is False, ``values`` is an error message."""
+    """Respond to a call. If ``result`` is False, ``values`` is an error message."""
 
     values: object
     result: bool
@@ -174,7 +172,7 @@ class UnadvertiseService(ServiceEvent):
 
 @dataclass(frozen=True)
 class SendActionGoal(Event):
-    """Send a goal to an action server. ``arguments``: the goal's fields, or a list of their values."""
+    """Send a goal to an action server. ``arguments`` contains the goal's fields, or a list of their values."""
 
     action: str
     type: str
@@ -186,7 +184,7 @@ class SendActionGoal(Event):
 
 @dataclass(frozen=True)
 class CancelActionGoal(Event):
-    """Cancel the goal that the client sent with the same id."""
+    """Cancel the goal that the client has sent with this id."""
 
     action: str
 
@@ -205,7 +203,7 @@ class SetLevel(Event):
 
 @dataclass(frozen=True)
 class Auth(Event):
-    """An authentication request, as in http://wiki.ros.org/rosauth; times are in seconds."""
+    """Authenticate, as in http://wiki.ros.org/rosauth; times are in seconds."""
 
     mac: str
     client: str
@@ -223,17 +221,17 @@ Fields = Mapping[str, Any]
 
 
 def is_quick(data: str | bytes) -> bool:
-    """Return whether a message can be decoded in a few milliseconds."""
+    """Return whether decoding a message takes only a few milliseconds."""
     return is_quick_text(data) if isinstance(data, str) else len(data) <= MAX_QUICK_CHARACTERS
 
 
 def decode(data: str | bytes) -> Fields:
-    """Decode the object in a message: JSON in a string, or CBOR in bytes. Raise OperationError if the data is invalid."""
+    """Decode an operation: JSON if it is a string, CBOR if it is bytes. Raise OperationError if it is invalid."""
     return _decode(data, load_json)
 
 
 def decode_in_pieces(data: str | bytes) -> Fields:
-    """Like :func:`decode`, but without holding the GIL for long. For use in a thread alongside the event loop."""
+    """Decode an operation like :func:`decode`, but without holding the GIL for long. For use in a thread beside the loop."""
     return _decode(data, load_json_in_pieces)
 
 
@@ -250,7 +248,7 @@ def _decode(data: str | bytes, load: Callable[[str], object]) -> Fields:
 
 
 def parse(fields: Fields) -> Event:
-    """Parse an operation into an event. For a PNG, parse the operation inside it.
+    """Parse an operation into an event. If the operation is a PNG, parse the operation that it contains.
 
     Raise OperationError if it is invalid.
     """
@@ -286,18 +284,18 @@ def _without_op(fields: Fields, id_: Id) -> OperationError:
 
 
 def _shown(value: object) -> str:
-    """Return the start of ``str(value)``, without formatting the whole value."""
+    """Return the first characters of ``str(value)``, without formatting the whole value."""
     return _text_of(value, _SHOWN)[:_SHOWN]
 
 
 def _text_of(value: object, most: int) -> str:
-    """Return ``str(value)``, or a longer string that starts with the same ``most`` characters."""
+    """Return a string whose first ``most`` characters are those of ``str(value)``."""
     return value if isinstance(value, str) else str(_cut(value, most, itertools.count()))
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Truncate a value from JSON or CBOR to its first items; each item takes at least one character of output."""
-    # The quotes around a string depend on the quotes inside it, even in the part that is cut off.
+    """Cut off a JSON or CBOR value after as many items as may be visible: each takes at least one character of output."""
+    # Python chooses a string's quotes by the quotes in it, so keep those in the part that is cut off.
     if isinstance(value, str) and len(value) > most:
         return value[:most] + "".join(quote for quote in "'\"" if quote in value)
     if isinstance(value, bytes) and len(value) > most:
@@ -322,7 +320,7 @@ def _id(fields: Fields) -> Id:
 
 
 def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ...) -> Any:
-    """Return a field, or ``default`` if it is missing.
+    """Return a field of an operation, or ``default`` if it is missing.
 
     Raise BridgeProtocolError, with rosbridge's message, if it is invalid.
     """
@@ -459,7 +457,7 @@ def _cancel_action_goal(fields: Fields, id_: Id) -> Event:
 
 
 def _action(fields: Fields) -> tuple[str, Id]:
-    """Return an action's name, and the id that may be appended to it."""
+    """Return an action's name, and the id that a client may have appended to it."""
     action: str = _text(fields, "action")
     name, _, old_id = action.partition("#")
     return name, old_id or None
@@ -517,7 +515,7 @@ OPERATIONS = (
 def encode(
     fields: Fields, compression: Compression = "none", dump: Callable[[object], str] = dump_json
 ) -> str | bytes:
-    """Encode a message: as a string, or as bytes for CBOR. ``dump`` converts a value to JSON."""
+    """Encode a message as a string or, for CBOR, as bytes. ``dump`` encodes a value as JSON."""
     if compression in ("cbor", "cbor-raw"):
         return encode_cbor(fields)
     text = dump(fields)
@@ -532,7 +530,7 @@ def encode_messages(
     fragment_size: int | None,
     dump: Callable[[object], str] = dump_json,
 ) -> list[str | bytes]:
-    """Return the messages to send: the message itself, or its fragments if it is a string and a size is given."""
+    """Encode a message as one or more messages to send: fragments if it is a string and a fragment size is given."""
     data = encode(fields, compression, dump)
     if isinstance(data, bytes) or not fragment_size:
         return [data]
@@ -540,7 +538,7 @@ def encode_messages(
 
 
 def fragments(text: str, size: int, id_: Id) -> list[str]:
-    """Split text into fragments of ``size`` characters. Text that is not longer than that is returned as is.
+    """Split text into fragments of at most ``size`` characters. Return text of at most this length unchanged.
 
     The fragments are longer if there would be too many.
     """
@@ -570,7 +568,7 @@ def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
 
 
 def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
-    """Return the response to a call; if ``result`` is False, ``values`` is an error message."""
+    """Return the response to a service call. If ``result`` is False, ``values`` is an error message."""
     fields: dict[str, object] = {
         "op": "service_response",
         "service": service,
@@ -581,5 +579,5 @@ def service_response(service: str, values: object, id_: Id, *, result: bool) -> 
 
 
 def service_call(service: str, arguments: object, id_: str) -> dict[str, object]:
-    """Return the message that calls a service offered by the client."""
+    """Return the message that calls a client's service."""
     return {"op": "call_service", "id": id_, "service": service, "args": arguments}

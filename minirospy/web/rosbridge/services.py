@@ -24,19 +24,19 @@ _T = TypeVar("_T")
 
 
 class InThread(Protocol):
-    """A function that runs work on a large message in a thread."""
+    """A function that processes a large message in a thread."""
 
     async def __call__(self, work: Callable[[], _T]) -> _T: ...
 
 
 class Response(NamedTuple):
-    """A service's serialized response, and the response's class."""
+    """The serialized response of a service, and the response's class."""
 
     message_class: type[Message]
     data: bytes
 
     def message(self) -> Message:
-        """Deserialize the response. Invalid bytes raise the exceptions of the message class."""
+        """Deserialize the response. If its bytes are invalid, raise the exceptions of the message class."""
         message = self.message_class()
         message.deserialize(self.data)
         return message
@@ -45,7 +45,7 @@ class Response(NamedTuple):
 async def call(
     graph: SharedGraph, name: str, arguments: object, in_thread: InThread | None = None
 ) -> Response:
-    """Call a service and return its response.
+    """Call a service; return the response.
 
     Raise BridgeError, ServiceException or ROSSerializationException if the call fails. With ``in_thread`` the arguments
     are converted in a thread, because they are large.
@@ -56,7 +56,7 @@ async def call(
         try:
             return await _call(graph, service, info.type, arguments, in_thread)
         except (BridgeError, ServiceException) as error:
-            # The node may have offered the service again with another type. The call was not executed in these cases.
+            # The node may have offered the service again with another type. These errors show that the call was not executed.
             is_other = isinstance(error, BridgeError) or isinstance(error.__cause__, HandshakeRefused)
             if not is_other or (type_ := await _type_of(graph, service)) == info.type:
                 raise
@@ -67,7 +67,7 @@ async def call(
 
 
 async def _type_of(graph: SharedGraph, service: str) -> str:
-    """Query a service's type. Raise BridgeError if the service does not exist, ServiceException if it cannot be reached."""
+    """Query the type of a service. Raise BridgeError if it does not exist, ServiceException if it cannot be reached."""
     try:
         return (await service_header(graph.node, service)).get("type", "")
     except ServiceException as error:
@@ -91,7 +91,7 @@ async def _call(
 
 
 class ClientService:
-    """A service that a client offers: forwards calls from the graph to the client, and its responses back."""
+    """A service offered by a client: forwards calls from the graph to the client, and responses from the client."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class ClientService:
         graph.refresh_soon()
 
     async def close(self, why: str) -> None:
-        """Stop offering the service; calls in progress fail with the error ``why``."""
+        """Stop offering the service. Calls in progress fail with ``why`` as the error."""
         for future in self._waiting.values():
             if not future.done():
                 future.set_exception(ServiceException(why))
@@ -125,7 +125,7 @@ class ClientService:
         self._graph.refresh_soon()
 
     def answered(self, event: protocol.ServiceResponse) -> None:
-        """Process a client's response. Raise BridgeError if its values do not match, or no call is waiting for it."""
+        """Process a client's response. Raise BridgeError if its values do not match the type, or there is no such call."""
         future = self._taken(event)
         if not event.result:
             future.set_exception(ServiceException(str(event.values)))
@@ -138,7 +138,7 @@ class ClientService:
         future.set_result(response)
 
     async def answered_large(self, event: protocol.ServiceResponse, in_thread: InThread) -> None:
-        """Like :meth:`answered`, for a large response, which is converted in a thread."""
+        """Process a large response like :meth:`answered`, but convert it in a thread."""
         future = self._taken(event)
         try:
             response = await in_thread(lambda: self._response(event)) if event.result else None
@@ -147,7 +147,7 @@ class ClientService:
                 future.set_exception(ServiceException(str(error)))
             raise
         if future.done():
-            return  # the call was cancelled in the meantime
+            return  # the call was cancelled meanwhile
         if response is None:
             future.set_exception(ServiceException(str(event.values)))
         else:

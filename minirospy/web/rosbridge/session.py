@@ -32,10 +32,10 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-# A parsed operation takes about this many times the memory of its text, if it holds objects or lists of numbers.
+# Bytes of memory that a parsed operation takes per byte of text, if it contains objects or lists of numbers.
 _VALUE_FACTOR = 4
 
-# maximum bytes per CBOR message from a read-only client, which only sends small requests; each byte may become a value
+# maximum size of a CBOR message from a read-only client, which sends only small requests: each byte may become a value
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4
@@ -43,14 +43,14 @@ _FAILED = 1011
 
 
 class _Pending(NamedTuple):
-    """The remaining work of an operation that must wait. ``event`` is None if the work reports its own errors."""
+    """The rest of an operation that must wait. ``event`` is None if ``work`` reports its errors itself."""
 
     event: Event | None
     work: Work
 
 
 class RosbridgeSession:
-    """The session of one client. The client's connection calls the methods on the loop.
+    """The session of one client. Its connection calls the methods on the loop.
 
     Operations are executed in the order of arrival: if one has to wait (for the graph, or for the subscribers of a new topic),
     later operations wait too, except for service calls.
@@ -59,17 +59,17 @@ class RosbridgeSession:
     def __init__(
         self, shared: RosbridgeShared, client: WebClient, on_end: Callable[[RosbridgeSession], None]
     ) -> None:
-        """Create the session. ``on_end`` is called with the session once its client has disconnected."""
+        """Create the session. ``on_end`` is called with the session after its client has disconnected."""
         self.client = client
         self.shared = shared
         self.graph = shared.graph
-        self.connected = shared.graph.node.now()  # time when the client connected, for /connected_clients
-        self.budget = Budget()  # budget of bytes for queued messages on topics whose rate the client limits
-        self.operation_size = 0  # bytes of memory of the current operation
-        # True if the current operation's message is large; a thread then also creates the ROS message
+        self.connected = shared.graph.node.now()  # when the client connected, for /connected_clients
+        self.budget = Budget()  # byte budget for queued messages on topics whose rate the client limits
+        self.operation_size = 0  # memory of the current operation, in bytes
+        # whether the current operation's message is so large that its ROS message is created in a thread
         self.is_large = False
         self._on_end = on_end
-        self._level = StatusLevel.ERROR  # maximum level of the status messages that the client receives
+        self._level = StatusLevel.ERROR  # lowest severity of the status messages that the client receives
         self._is_authenticated = not shared.options.authenticate
         # received fragments of incomplete messages
         self._fragments = Fragments(shared.options.fragment_timeout)
@@ -77,12 +77,12 @@ class RosbridgeSession:
         self._subscriptions = ClientSubscriptions(self)
         self._services = ClientServices(self)
         self._actions = ClientActions(self)
-        # waiting operations, and calls; cancelled when the session ends
+        # waiting operations and calls, which are cancelled when the session ends
         self._tasks: set[asyncio.Task[None]] = set()
         self._inbox: deque[str | bytes] = deque()  # messages queued behind a waiting operation
-        # bytes of memory used by the inbox and by the message whose operation is waiting
+        # memory of the inbox, and of the message whose operation is waiting, in bytes
         self._inbox_size = 0
-        self._is_working = False  # True while an operation is waiting
+        self._is_working = False  # whether an operation is waiting
         self._handlers: Mapping[type[Event], Callable[[Any], Work | _Pending | None]] = {
             protocol.Advertise: self._publications.advertise,
             protocol.Unadvertise: self._publications.unadvertise,
@@ -100,40 +100,40 @@ class RosbridgeSession:
             protocol.Auth: self._auth,
         }
 
-    # --- called by the connection
+    # --- called by the client's connection
 
     def received_text(self, text: str) -> None:
-        """Process a JSON message."""
+        """Execute the operation in a JSON message."""
         self._received(text)
 
     def received_binary(self, data: bytes) -> None:
-        """Process a CBOR message."""
+        """Execute the operation in a CBOR message."""
         if len(data) > _MAX_READ_ONLY_CBOR and not self.client.may_write:
             self._refuse_large(data)
             return
         self._received(data)
 
     def ended(self) -> None:
-        """Release everything that belongs to the client."""
+        """Release all of the client's resources."""
         self._subscriptions.close()
         self._publications.close()
         self._services.close()
         self._actions.close()
-        # The session is part of reference cycles: release its memory now instead of when the garbage collector runs.
+        # Release memory now: the session is in reference cycles, so the garbage collector would do it later.
         self._inbox.clear()
         self._fragments.clear()
         for task in list(self._tasks):
             task.cancel()
         self._on_end(self)
 
-    # --- called by services and topics
+    # --- called by the services and topics
 
     def send(self, fields: Mapping[str, object]) -> None:
-        """Send a message that does not belong to a topic's stream."""
+        """Send a message that is not about a topic."""
         self.send_encoded(protocol.encode_messages(fields, "none", self.shared.options.fragment_size))
 
     def send_encoded(self, messages: Sequence[str | bytes]) -> None:
-        """Send messages: strings as JSON, bytes as CBOR."""
+        """Send encoded messages: strings are JSON, bytes are CBOR."""
         for message in messages:
             if isinstance(message, bytes):
                 self.client.send_binary(message)
@@ -141,7 +141,7 @@ class RosbridgeSession:
                 self.client.send_text(message)
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status message if the client has requested this level. Log it if it is more severe than INFO."""
+        """Send a status message if the client has requested its level. Log warnings and errors."""
         if level <= self._level:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:
@@ -151,7 +151,7 @@ class RosbridgeSession:
     # --- sequential execution
 
     def count(self) -> None:
-        """Charge this client's memory use to the server's budget."""
+        """Count this client's memory towards the server's budget."""
         self.client.holds(
             self._inbox_size
             + self._fragments.size
@@ -175,12 +175,12 @@ class RosbridgeSession:
         if first is not None:
             self._is_working = True
             self._inbox_size += size
-            # A task that is cancelled before its first step does not start the work, so close it.
+            # If the task is cancelled before its first step, the work was never started and must be closed.
             self.spawn(self._work(first, size)).add_done_callback(lambda _: first.work.close())
             self.count()
 
     async def _work(self, first: _Pending, size: int) -> None:
-        """Finish an operation whose message has ``size`` bytes, then execute the operations received in the meantime."""
+        """Finish an operation whose message has ``size`` bytes; then execute the operations received meanwhile."""
         try:
             await self._finish(first)
             self._inbox_size -= size
@@ -199,7 +199,7 @@ class RosbridgeSession:
         self._is_working = False
 
     def _begin(self, data: str | bytes) -> _Pending | None:
-        """Execute an operation; return the part that has to wait, or None."""
+        """Start an operation. Return the rest if it must wait, otherwise None."""
         self.operation_size = _VALUE_FACTOR * sys.getsizeof(data)
         if not protocol.is_quick(data):
             return self._begin_large(data)
@@ -211,9 +211,9 @@ class RosbridgeSession:
         return self._carry_out(event)
 
     def _begin_large(self, data: str | bytes) -> _Pending | None:
-        """Parse a large message in a thread, so that no other client has to wait. Pause reading from the client until then."""
+        """Parse a large message in a thread, so that other clients need not wait; meanwhile, do not read from this client."""
         if not self.client.may_write:
-            # The message comes from joined fragments or a PNG; the connection itself refuses messages of this size.
+            # The message consists of fragments, or was in a PNG: the connection would have refused a message of this size.
             self._refuse_large(data)
             return None
         self.client.pause()
@@ -253,7 +253,7 @@ class RosbridgeSession:
         except REFUSALS as error:
             self._failed(event, error)
             return None
-        # An operation that a fragment completes is a separate operation with its own event.
+        # If a fragment completes an operation, this operation has its own event.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:
@@ -264,7 +264,7 @@ class RosbridgeSession:
             self._failed(pending.event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
-        # rosbridge prefixes the operation's name unless it reported the error itself.
+        # rosbridge prefixes the operation's name, except to errors that it detects itself.
         front = "" if isinstance(error, OperationError) else f"{_OPERATIONS[type(event)]}: "
         self.status(StatusLevel.ERROR, f"{front}{error}", event.id)
 
@@ -295,10 +295,10 @@ class RosbridgeSession:
         self.shared.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
         self.client.close(_POLICY, "not authenticated")
 
-    # --- called by operation handlers
+    # --- called by the handlers of operations
 
     async def type_of(self, topic: str) -> str:
-        """Return a topic's type in the graph. Raise BridgeError if it has none."""
+        """Return the type of a topic in the graph. Raise BridgeError if it has none."""
         resolved = self.graph.node.resolve(topic)
         if self.graph.snapshot.types.get(resolved, ANY) == ANY:
             await self.graph.look()
@@ -308,7 +308,7 @@ class RosbridgeSession:
         return found
 
     def is_allowed(self, kind: str, name: str, what: str) -> bool:
-        """Return whether a name matches the globs; if not, send a warning with rosbridge's message."""
+        """Return whether the globs allow a name; if not, send rosbridge's warning."""
         filters = self.graph.filters
         if (filters.topics if kind == "topics" else filters.services)(self.graph.node.resolve(name)):
             return True

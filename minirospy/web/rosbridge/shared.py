@@ -23,21 +23,21 @@ __all__ = ["RosbridgeOptions", "RosbridgeShared", "encode_arrival"]
 
 _LOG_LINES = 20
 
-# maximum bytes of a message to encode on the loop; 8,000 numbers take 8 ms
+# maximum size in bytes of a message that is encoded on the loop: 8,000 numbers take 8 ms
 _MAX_QUICK_BODY = 64 * 1024
-# maximum bytes of an image to encode on the loop; base64-encoding it takes 3 ms
+# maximum size in bytes of an image that is encoded on the loop: base64 takes 3 ms
 _MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
     "sensor_msgs/CompressedImage",
-}  # types whose only array is the data, which is sent as base64 or as a typed array
+}  # types whose only array is ``data``, which is sent as base64 or as a typed array
 
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
 class RosbridgeOptions:
-    """The options of the rosbridge server. ``fragment_timeout`` and ``unregister_timeout`` are in seconds.
+    """Options of the rosbridge server. ``fragment_timeout`` and ``unregister_timeout`` are in seconds.
 
     ``fragment_size`` is the maximum number of characters in a message to clients; None disables fragments.
     """
@@ -49,17 +49,17 @@ class RosbridgeOptions:
 
 
 class _LargeWork:
-    """Runs work on large messages in one thread, one job at a time."""
+    """Processes large messages in a single thread, one at a time."""
 
     def __init__(self, name: str) -> None:
         self._name = name  # name of the thread
-        self._thread: ThreadPoolExecutor | None = None  # created for the first work
+        self._thread: ThreadPoolExecutor | None = None  # created when it is first needed
         self._is_busy = asyncio.Lock()
         self._is_closed = False
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
-        """Run ``work`` in the thread and return its result."""
-        # Do not queue work in the executor: if a client leaves while its work waits here, its message is freed immediately.
+        """Run ``work`` in the thread; return its result."""
+        # Do not queue work in the executor, so that its message is freed immediately if the client leaves while it waits here.
         async with self._is_busy:
             if self._is_closed:
                 raise asyncio.CancelledError
@@ -68,7 +68,7 @@ class _LargeWork:
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def close(self) -> None:
-        """Stop the thread once the work in progress is done, and cancel queued work. Idempotent."""
+        """Stop the thread after the work in progress, and cancel waiting work. Idempotent."""
         self._is_closed = True
         if self._thread:
             self._thread.shutdown(wait=False, cancel_futures=True)
@@ -76,7 +76,7 @@ class _LargeWork:
 
 
 class RosbridgeShared:
-    """The state that the sessions of all clients share. Used on the loop."""
+    """The state shared by the sessions of all clients. Used on the loop."""
 
     def __init__(self, graph: SharedGraph, options: RosbridgeOptions | None = None) -> None:
         self.graph = graph
@@ -94,20 +94,20 @@ class RosbridgeShared:
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
 
     def close(self) -> None:
-        """Stop the threads once the work in progress is done. Idempotent."""
+        """Stop the threads after the work in progress. Idempotent."""
         self.in_thread.close()
         self.encode.close()
 
     def forget_messages(self) -> None:
-        """Discard the encodings of all topics' last messages."""
+        """Discard the cached encodings of all topics."""
         self._encoded.clear()
 
     def release(self, publication: Publication) -> None:
-        """Release a publication after a delay, in which clients may advertise it again."""
+        """Release a publication after a delay, so that clients can advertise it again meanwhile."""
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
 
     def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
-        """Start closing a client's service; return the task."""
+        """Start to close a client's service; return the task that closes it."""
         name = service.name
         del self.services[name]
         task = self._closing[name] = self.graph.spawn(service.close(why))
@@ -115,23 +115,23 @@ class RosbridgeShared:
         return task
 
     async def free_service(self, name: str, why: str) -> None:
-        """Close the service that a client offers with this name and wait until the name is free."""
+        """Close the service that a client offers under this name; wait until the name is free."""
         while name in self.services or name in self._closing:
             if name in self.services:
                 self.close_service(self.services[name], why)
             await asyncio.wait([self._closing[name]])
 
     def forget_topic(self, topic: str) -> None:
-        """Discard the encodings of a topic's last message."""
+        """Discard the cached encodings of a topic's last message."""
         self._encoded.pop(topic, None)
 
     def class_of(self, arrival: Arrival) -> type[Message] | None:
-        """Return the class of a received message, or None if its definition is unknown."""
+        """Return the class of a received message, or None if its definition is not known."""
         return self._types.of(arrival.header)
 
     @staticmethod
     def is_quick(body: bytes | memoryview, compression: str = "none", type_: str = "") -> bool:
-        """Return whether a message can be encoded in a few milliseconds."""
+        """Return whether encoding a message takes only a few milliseconds."""
         if type_ in _IMAGES and compression != "png":
             return len(body) <= _MAX_QUICK_IMAGE
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
@@ -150,11 +150,11 @@ class RosbridgeShared:
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Like :meth:`encoded`, but encode in a thread, so that only the clients that receive this message wait."""
+        """Return an encoded message like :meth:`encoded`, but encode it in a thread, so that only its receivers wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:
-            # The encoding may have been created for another client in the meantime.
+            # The message may have been encoded for another client meanwhile.
             return found.get(compression) or encode_arrival(
                 topic, class_, arrival, compression, dump_json_in_pieces
             )
@@ -164,7 +164,7 @@ class RosbridgeShared:
         return found[compression]
 
     def _encodings(self, topic: str, arrival: Arrival) -> dict[str, bytes]:
-        """Return the message's cached encodings, keyed by compression."""
+        """Return the cached encodings of a message, keyed by compression."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}
@@ -178,7 +178,7 @@ def encode_arrival(
     compression: str,
     dump: Callable[[object], str],
 ) -> bytes:
-    """Return a message encoded for clients; ``dump`` encodes JSON. Raise BridgeError if it cannot be encoded."""
+    """Encode a message for clients. ``dump`` encodes JSON. Raise BridgeError if the message cannot be encoded."""
     if compression == "cbor-raw":
         secs, nsecs = divmod(arrival.nanoseconds, 1_000_000_000)
         raw = {"secs": secs, "nsecs": nsecs, "bytes": bytes(arrival.body)}
@@ -202,6 +202,6 @@ def _message(topic: str, class_: type[Message] | None, arrival: Arrival) -> Mess
     message = class_()
     try:
         message.deserialize(bytes(arrival.body))
-    except Exception as error:  # any exception that a third-party message class raises on invalid bytes
+    except Exception as error:  # third-party message classes may raise any exception on invalid bytes
         raise BridgeError(f"a message of [{topic}] does not fit [{message._type}]: {error}") from error
     return message

@@ -18,18 +18,16 @@ _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
 
 MAX_FRAGMENT_BYTES = 64_000_000
-"""Maximum memory, in bytes, for one client's incomplete messages, including overhead. A wide character takes two or four
-bytes.
-"""
+"""Maximum memory in bytes for a client's incomplete messages, with overhead; a wide character takes two or four bytes."""
 _MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
-"""Bytes of overhead of each fragment, beyond its text, and of each incomplete message, beyond its fragments."""
+"""Overhead in bytes of each fragment in addition to its text, and of each incomplete message in addition to its fragments."""
 
 
 @dataclass(frozen=True)
 class Merged:
-    """The merged parameters of a client's subscriptions to one topic; ``throttle`` is in seconds."""
+    """The combined parameters of a client's subscriptions to a topic. ``throttle`` is in seconds."""
 
     throttle: float
     queue_length: int
@@ -38,7 +36,7 @@ class Merged:
 
 
 def merge(subscriptions: Iterable[Subscribe]) -> Merged:
-    """Merge the subscriptions: the shortest interval, the smallest queue and fragment size, and the strongest compression."""
+    """Combine the subscriptions: the shortest interval, the smallest queue and fragment size, and the strongest compression."""
     each = tuple(subscriptions)
     sizes = [one.fragment_size for one in each if one.fragment_size is not None]
     return Merged(
@@ -51,7 +49,7 @@ def merge(subscriptions: Iterable[Subscribe]) -> Merged:
 
 @dataclass
 class Budget:
-    """The number of bytes that a client's rate-limited topics have queued, and the maximum."""
+    """The number of bytes queued for a client's rate-limited topics, and its maximum."""
 
     most: int = DEFAULT_LIMIT
     taken: int = 0
@@ -64,7 +62,7 @@ class Pacer(Generic[_T]):
     """
 
     def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:
-        """Create the rate limiter. ``budget`` may be shared with other topics; ``size_of`` returns a message's size in bytes."""
+        """Create the rate limiter. Other topics may share ``budget``; ``size_of`` returns the size of a message in bytes."""
         self.throttle = 0.0
         self._budget = budget
         self._size_of = size_of
@@ -74,12 +72,12 @@ class Pacer(Generic[_T]):
         self._waiting: deque[_T] = deque()
 
     def set(self, throttle: float, queue_length: int) -> None:
-        """Change the interval and the queue length. The newest messages are kept."""
+        """Change the interval and the queue length, keeping the newest messages."""
         self.throttle, self._length = throttle, queue_length
         self._trim()
 
     def arrived(self, message: _T, now: float) -> bool:
-        """Return whether to send a message now. Otherwise it is queued or dropped."""
+        """Return whether to send a message now; if not, queue or drop it."""
         if not self._waiting and now >= self._last + self.throttle:
             self._last = now
             return True
@@ -93,18 +91,18 @@ class Pacer(Generic[_T]):
 
     @property
     def due(self) -> float | None:
-        """Return the time at which to send the next queued message, or None if there is none."""
+        """Return the time at which the next queued message is due, or None if none is queued."""
         return self._last + self.throttle if self._waiting else None
 
     def next(self, now: float) -> _T | None:
-        """Remove and return a message that is due, or return None if there is none."""
+        """Remove and return the next message if it is due, otherwise return None."""
         if not self._waiting or now < self._last + self.throttle:
             return None
         self._last = now
         return self._popped()
 
     def clear(self) -> None:
-        """Drop the queued messages."""
+        """Drop all queued messages."""
         while self._waiting:
             self._popped()
 
@@ -132,18 +130,18 @@ class _Parts(NamedTuple):
 
 
 class Fragments:
-    """The fragments of one client's incomplete messages."""
+    """The fragments received for incomplete messages of one client."""
 
     def __init__(self, timeout: float = 600.0) -> None:
-        """Create the collection. ``timeout``: seconds after which an incomplete message is discarded."""
+        """Create the collection. An incomplete message is discarded after ``timeout`` seconds."""
         self._timeout = timeout
-        # The messages are ordered by the time of their last fragment, oldest first.
+        # Messages are ordered by the time of their last fragment, oldest first.
         self._messages: OrderedDict[Hashable, _Parts] = OrderedDict()
         self.size = 0
         """Total bytes of memory of the fragments."""
 
     def add(self, fragment: Fragment, now: float) -> str | None:
-        """Add a fragment. Return the message that it completes, or None if the message is still incomplete.
+        """Add a fragment. Return its message if that is complete now, otherwise None.
 
         Raise OperationError if the fragment is invalid or too large.
         """
@@ -169,7 +167,7 @@ class Fragments:
         if len(known.parts) < known.total:
             return None
         self._forget(fragment.id)
-        # One wide character makes all characters of the message wide in memory.
+        # A single wide character makes all characters of a message wide in memory.
         width = max(map(width_of, known.parts.values()))
         if width * sum(map(len, known.parts.values())) > MAX_FRAGMENT_BYTES:
             raise OperationError(

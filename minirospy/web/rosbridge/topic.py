@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 __all__ = ["MAX_IDS", "ClientTopic"]
 
 MAX_IDS = 100
-"""Maximum number of subscriptions of one client to one topic, and of advertisements of one topic by one client."""
+"""Maximum number of a client's subscriptions to a topic, and of its advertisements of a topic."""
 
 
 class ClientTopic:
-    """The single subscription to the graph for all of a client's subscriptions to one topic."""
+    """A client's single subscription in the graph, which serves all of its subscriptions to a topic."""
 
     def __init__(self, session: OperationSession, shared: RosbridgeShared, name: str) -> None:
         self.name = name
@@ -39,11 +39,11 @@ class ClientTopic:
 
     @property
     def is_wanted(self) -> bool:
-        """Return whether any subscriptions remain."""
+        """Return whether there are any subscriptions."""
         return bool(self._subscriptions)
 
     def add(self, event: protocol.Subscribe) -> None:
-        """Add a subscription, or replace the one with the same id."""
+        """Add a subscription, or replace one with the same id."""
         is_first = not self._subscriptions
         if event.id not in self._subscriptions and len(self._subscriptions) >= MAX_IDS:
             raise BridgeError(f"a client may subscribe to a topic {MAX_IDS} times")
@@ -51,7 +51,7 @@ class ClientTopic:
         self._update()
         self._shared.graph.subscribe(self._topic, self._arrived)
         if not is_first:
-            # Cancel the extra subscription, which was only made to receive the latched messages again.
+            # The extra subscription was only needed to receive the latched messages again.
             self._shared.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
@@ -64,7 +64,7 @@ class ClientTopic:
             self._update()
 
     def close(self) -> None:
-        """Unsubscribe."""
+        """Unsubscribe from the topic."""
         self._is_closed = True
         self._shared.graph.unsubscribe(self._topic, self._arrived)
         self._shared.forget_topic(self.name)
@@ -99,7 +99,7 @@ class ClientTopic:
         self._wait()
 
     def _send(self, arrival: Arrival) -> None:
-        # Encode only in the client's turn, because encoding and fragmenting a large message takes milliseconds per client.
+        # Encode only in the client's turn, because a large message takes milliseconds to encode and fragment.
         self._session.client.in_turn(lambda: self._send_now(arrival), arrival.body)
 
     def _send_now(self, arrival: Arrival) -> None:
@@ -121,7 +121,7 @@ class ClientTopic:
         self._queue(data, self._fragments(data, size, arrival) if size else None, self._merged)
 
     async def _send_large(self, arrival: Arrival, class_: type[Message] | None, merged: Merged) -> None:
-        """Send a message that is slow to encode; the session's other messages wait until it is sent."""
+        """Send a message that is slow to encode. The session's other messages wait until it has been sent."""
         try:
             data = await self._shared.encoded_large(self.name, class_, arrival, merged.compression)
             size = self._fragment_size(merged, data)
@@ -134,7 +134,7 @@ class ClientTopic:
             self._session.client.hold_work(is_held=False)
 
     def _fragment_size(self, merged: Merged, data: bytes) -> int | None:
-        """Return the fragment size for a message, in characters, or None to send it whole."""
+        """Return the fragment size in characters for a message, or None to send it whole."""
         size = merged.fragment_size or self._shared.options.fragment_size
         is_cut = size and len(data) > size and not merged.compression.startswith("cbor")
         return size if is_cut else None

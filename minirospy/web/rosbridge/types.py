@@ -17,16 +17,16 @@ _Class = TypeVar("_Class")
 
 
 class UnknownTypeError(BridgeError):
-    """A type is not installed."""
+    """Raised if a type is not installed."""
 
 
 def message_class(name: str) -> type[Message]:
-    """Return the message class ``name``. Raise UnknownTypeError if the type is not installed."""
+    """Return the message class named ``name``. Raise UnknownTypeError if it is not installed."""
     return _installed(get_message_class, name, "msg")
 
 
 def service_class(name: str) -> ServiceClass:
-    """Return the service class ``name``. Raise UnknownTypeError if the type is not installed."""
+    """Return the service class named ``name``. Raise UnknownTypeError if it is not installed."""
     return _installed(get_service_class, name, "srv")
 
 
@@ -34,7 +34,7 @@ def _installed(get: Callable[[str], _Class | None], name: str, kind: str) -> _Cl
     try:
         found = get(name)
     except Exception as error:
-        # Importing a third-party message module may raise any exception. Report it as the reason why the type is unknown.
+        # Importing a third-party module may raise any exception: report it as the reason.
         raise _unknown(
             name, kind, f"{type(error).__name__}: {error}" if _is_foreign(error) else str(error)
         ) from error
@@ -64,12 +64,12 @@ def _is_installed(package: str) -> bool:
     try:
         return package.isidentifier() and importlib.util.find_spec(package) is not None
     except (ImportError, ValueError):
-        # ValueError means that the module has no spec, such as __main__.
+        # ValueError: the module has no spec, like __main__.
         return False
 
 
 class ArrivingTypes:
-    """Classes for received messages.
+    """Finds the classes of received messages.
 
     Uses the installed class if the publisher's md5sum matches; otherwise generates one from the publisher's definition.
     """
@@ -78,7 +78,7 @@ class ArrivingTypes:
         self._classes: dict[tuple[str, str], type[Message] | None] = {}
 
     def of(self, header: Header) -> type[Message] | None:
-        """Return the class for a publisher's messages, or None if the definition is unknown."""
+        """Return the class of a publisher's messages, or None if their definition is unknown."""
         key = header.get("type", ""), header.get("md5sum", "")
         if key not in self._classes:
             if len(self._classes) > 1000:

@@ -16,19 +16,19 @@ from collections.abc import Callable, Sequence
 __all__ = ["LARGE_PIECE", "MAX_BYTES", "Account", "Share"]
 
 MAX_BYTES = 160_000_000
-"""Maximum memory, in bytes, that a server uses for all clients.
+"""Maximum memory in bytes that a server uses for all clients together.
 
 The process stays below 400 MB, including copies while it handles a message.
 """
 
 LARGE_PIECE = 32_768
-"""Minimum size, in bytes, of a large piece. A large piece is counted only once even if it is queued for many clients."""
+"""Minimum size in bytes of a large piece, which is counted only once even if it is queued for many clients."""
 
 Piece = bytes | memoryview | bytearray
 
 
 class Share:
-    """One client's memory use."""
+    """The memory that one client uses."""
 
     def __init__(self, account: Account, address: str, shed: Callable[[], object]) -> None:
         self.address = address
@@ -44,11 +44,11 @@ class Share:
 
     @property
     def weight(self) -> int:
-        """Return the number of bytes that the client uses, including those shared with other clients."""
+        """Return the number of bytes that the client uses, including those that other clients share."""
         return self.size + self.large
 
     def set(self, size: int) -> None:
-        """Set the number of bytes that only this client uses. If the limit is exceeded, make clients release memory."""
+        """Set the number of bytes that only this client uses. Above the limit, make clients release memory."""
         grown = size - self.size
         if grown:
             self.size = size
@@ -57,16 +57,16 @@ class Share:
                 self._account.enforce()
 
     def hold(self, pieces: Sequence[Piece]) -> None:
-        """Charge the large pieces among ``pieces`` to the account."""
+        """Count the large pieces among ``pieces`` as in use."""
         self.large += self._account.hold(pieces)
 
     def release(self, pieces: Sequence[Piece]) -> None:
-        """Stop counting pieces, which must be the objects that were passed to :meth:`hold`."""
+        """Stop counting pieces, which must be the same objects that were passed to :meth:`hold`."""
         self.large -= self._account.release(pieces)
 
 
 class Account:
-    """The memory use of all of a server's clients. Runs on the loop."""
+    """The memory that all clients of a server use. Runs on the loop."""
 
     def __init__(self, limit: int = MAX_BYTES) -> None:
         self.limit = limit
@@ -82,19 +82,19 @@ class Account:
         self._is_enforcing = False
 
     def open(self, address: str, shed: Callable[[], object]) -> Share:
-        """Return the share of a new client; ``shed`` is called when the client has to release memory."""
+        """Add a client; return its share. ``shed`` is called when the client must release memory."""
         share = Share(self, address, shed)
         self._shares.add(share)
         return share
 
     def close(self, share: Share) -> None:
-        """Remove a client's share; its pieces must have been released. Idempotent."""
+        """Remove a client's share, whose pieces must have been released before. Idempotent."""
         self._shares.discard(share)
         self.total -= share.size
         share.size = 0
 
     def hold(self, pieces: Sequence[Piece]) -> int:
-        """Charge the large pieces among ``pieces`` to the account; return their total size in bytes."""
+        """Count the large pieces among ``pieces`` as in use; return their total size in bytes."""
         found = 0
         for piece in pieces:
             size = len(piece)
@@ -106,7 +106,7 @@ class Account:
         return found
 
     def release(self, pieces: Sequence[Piece]) -> int:
-        """Stop counting pieces that were held; return the total bytes of the large ones."""
+        """Stop counting pieces passed to :meth:`hold`; return the total size of the large ones in bytes."""
         found = 0
         for piece in pieces:
             size = len(piece)
@@ -119,7 +119,7 @@ class Account:
         return found
 
     def enforce(self) -> None:
-        """Make clients release memory until the total is within the limit."""
+        """Make clients release memory until the total does not exceed the limit."""
         if self._is_enforcing:
             return  # releasing memory calls this method again
         self._is_enforcing = True
@@ -132,13 +132,13 @@ class Account:
                 self.shed += 1
                 share.shed()
                 if share.weight >= before:
-                    # The client has not released anything: remove it, so that it is not chosen again and again.
+                    # The client has not released anything, so remove it: otherwise it would be chosen again and again.
                     self.close(share)
         finally:
             self._is_enforcing = False
 
     def heaviest(self) -> Share | None:
-        """Return the share of the client that has to release memory next, or None if no client uses any."""
+        """Return the share of the client that must release memory next, or None if no client uses memory."""
         holding = [share for share in self._shares if share.weight]
         holding = [share for share in holding if not share.is_owner] or holding
         if not holding:

@@ -22,33 +22,33 @@ from minirospy.web.access import Grant
 
 __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 
-# seconds within which a client should send its request; a browser opens some connections in advance
+# seconds that a client has to send its request; browsers open some connections in advance
 SILENT_SECONDS = 5.0
-# maximum connections per address that are younger than SILENT_SECONDS and have sent no request; a browser opens six
+# maximum number of connections per address within SILENT_SECONDS and without a request; a browser opens six
 MAX_SILENT = 16
-# seconds without traffic after which a client counts as idle; the dashboard's pages send or receive something more often
+# seconds without traffic after which a client counts as idle; the dashboard's pages always have traffic sooner
 IDLE_SECONDS = 30.0
-FEW = 8  # an address has few connections if it holds less than an eighth of all connections
+FEW = 8  # an address has few connections if it has less than an eighth of all
 
 
 class Rank(IntEnum):
-    """A connection's rank by its rights, as far as they are known."""
+    """The rank of a connection, which depends on the client's rights, if they are known."""
 
     SILENT = 0
     """The client has sent no request yet."""
     READ = 1
     WRITE = 2
     OWN = 3
-    """The client has the token for owners, or belongs to the server's user."""
+    """The client has the owner's token, or belongs to the server's user."""
 
 
 def rank_of(grant: Grant) -> Rank:
-    """Return the rank for a client's rights."""
+    """Return the rank of a client with these rights."""
     return {Grant.READ: Rank.READ, Grant.WRITE: Rank.WRITE, Grant.OWN: Rank.OWN}[grant]
 
 
 class Occupant(Protocol):
-    """An admitted connection."""
+    """A connection that has been admitted."""
 
     @property
     def peer(self) -> str:
@@ -59,14 +59,14 @@ class Occupant(Protocol):
 
     @property
     def active(self) -> float:
-        """The time when the connection was opened, or last sent or received a message. Uses the same clock as ``now``."""
+        """When the connection was opened, or last sent or received a message. Uses the same clock as ``now``."""
 
 
 _O = TypeVar("_O", bound=Occupant)
 
 
 def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O | None:
-    """Return the connection to close so that ``peer`` can connect, or None if there is none."""
+    """Return the connection to close in favour of a new one from ``peer``, or None if there is none."""
     found = list(occupants)
     silent = [each for each in found if each.rank is Rank.SILENT]
     old = [each for each in silent if now - each.active >= SILENT_SECONDS]
@@ -94,7 +94,7 @@ def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O 
 
 
 def _of_heaviest(occupants: list[_O]) -> list[_O]:
-    """Return the connections from the address that has the most connections."""
+    """Return the connections from the address with the most connections."""
     counts = Counter(each.peer for each in occupants)
     heaviest = max(counts, key=counts.__getitem__)
     return [each for each in occupants if each.peer == heaviest]

@@ -47,7 +47,7 @@ The headers prevent caching, because the contents change constantly, and the pat
 
 @dataclass(frozen=True)
 class Limits:
-    """One client's limits: bytes per message, frames per second, queued bytes, seconds without progress.
+    """Limits for one client: bytes per message, frames per second, queued bytes, seconds without progress.
 
     ``connections`` is the maximum number of all clients together; an address may open ``connections_a_second``, and initially
     ``connection_burst``.
@@ -76,7 +76,7 @@ class Limits:
 
 
 class HttpRequest(NamedTuple):
-    """An HTTP request; header names are in lower case."""
+    """An HTTP request. The names of the headers are in lower case."""
 
     path: str
     query: Mapping[str, str]
@@ -89,7 +89,7 @@ class HttpRequest(NamedTuple):
 
 
 class Session(Protocol):
-    """One client's session in a protocol. Its methods are called on the loop; an exception closes the connection."""
+    """The session of one client in a protocol. Methods are called on the loop; an exception closes the connection."""
 
     def received_text(self, text: str) -> None: ...
 
@@ -99,7 +99,7 @@ class Session(Protocol):
 
 
 class Endpoint(Protocol):
-    """One endpoint of the server: a protocol served over WebSocket."""
+    """A protocol that the server offers over WebSocket."""
 
     def select(self, offered: Sequence[str]) -> str | None:
         """Return the sub-protocol to use, or None for no sub-protocol.
@@ -115,7 +115,7 @@ HttpHandler = Callable[["Exchange"], None]
 
 
 class ClientConnection(Protocol):
-    """The part of a client's connection that :class:`WebClient` and :class:`Exchange` use."""
+    """The methods of a client's connection that :class:`WebClient` and :class:`Exchange` use."""
 
     @property
     def is_open(self) -> bool: ...
@@ -143,7 +143,7 @@ class ClientConnection(Protocol):
 
 
 class WebClient:
-    """One WebSocket client, as its session sees it."""
+    """A WebSocket client, as its session uses it."""
 
     def __init__(
         self, connection: ClientConnection, request: HttpRequest, grant: Grant, subprotocol: str | None
@@ -155,7 +155,7 @@ class WebClient:
 
     @property
     def name(self) -> str:
-        """Return the client's address for display."""
+        """Return the client's address, for display."""
         return self.request.peer
 
     @property
@@ -165,31 +165,31 @@ class WebClient:
 
     @property
     def is_owner(self) -> bool:
-        """Return whether the client may start programs and open files as the user who runs the server."""
+        """Return whether the client may start programs, and open files, as the server's user."""
         return self.grant is Grant.OWN
 
     def why_not_owner(self, what: str) -> str:
-        """Return the error message for a client that may not do ``what``, because it is not the owner."""
+        """Return the error for a client that may not do ``what`` because it is not the owner."""
         if self.may_write:
             return f"only a client that has the token may {what}: open the link that the command printed"
         return f"this token is read-only: it does not let you {what}"
 
     @property
     def queue(self) -> SendQueue:
-        """Return the queue of frames for the client, with its counters."""
+        """Return the queue of frames to the client, with its counters."""
         return self._connection.queue
 
     def send_text(self, text: str) -> None:
-        """Send a response as a text message; it is never dropped."""
+        """Send a response as a text message, which is never dropped."""
         data = text.encode()
         self._connection.answer((frame_head(_TEXT, len(data)), data))
 
     def send_binary(self, *pieces: Piece) -> None:
-        """Send a response as one binary message; it is never dropped."""
+        """Send a response as a single binary message, which is never dropped."""
         self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
 
     def send_file(self, answer: FileAnswer) -> None:
-        """Send a file as one binary message, read in pieces when it reaches the front of the queue.
+        """Send a file as a single binary message. It is read in pieces when it reaches the front of the queue.
 
         The parts of ``answer`` do not include WebSocket frame headers.
         """
@@ -198,20 +198,20 @@ class WebClient:
         )
 
     def holds(self, count: int) -> None:
-        """Record how many bytes of memory the session uses for the client's queued and current messages."""
+        """Record how many bytes of memory the session uses for queued messages from the client and the current one."""
         self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
-        """Send a stream's message as one binary message. If the client is slow, older messages with ``key`` are dropped."""
+        """Send a binary message of the stream ``key``. If the client is slow, drop older messages of the stream."""
         front = frame_head(_BINARY, len(head) + len(payload)) + head
         self._connection.stream(key, (front, payload), newest_only=newest_only)
 
     def send_text_message(self, key: Hashable, text: bytes, *, newest_only: bool = False) -> None:
-        """Like :meth:`send_message`, but send a text message; ``text`` is UTF-8."""
+        """Send a text message (UTF-8) of a stream, like :meth:`send_message`."""
         self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
 
     def send_texts(self, key: Hashable, texts: Sequence[str], *, newest_only: bool = False) -> None:
-        """Send one of a stream's messages as several text messages, queued or dropped together."""
+        """Send a message of a stream as several text messages, which are queued or dropped together."""
         pieces: list[Piece] = []
         for text in texts:
             data = text.encode()
@@ -219,25 +219,25 @@ class WebClient:
         self._connection.stream(key, tuple(pieces), newest_only=newest_only)
 
     def discard(self, key: Hashable) -> None:
-        """Remove the messages queued under a key."""
+        """Remove the queued messages of a stream."""
         self._connection.queue.discard(key)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Run ``work``, which is slow, in the client's turn.
+        """Run ``work``, a slow function, when it is the client's turn.
 
         ``work`` uses ``message``, whose bytes are counted until then.
         """
         self._connection.in_turn(work, message)
 
     def hold_work(self, *, is_held: bool) -> None:
-        """Stop or continue running the functions passed to :meth:`in_turn`.
+        """Stop running the functions passed to :meth:`in_turn`, or continue.
 
         Used to preserve the order while the last one continues in a thread.
         """
         self._connection.hold_jobs(are_held=is_held)
 
     def pause(self) -> None:
-        """Stop handling messages from the client, until :meth:`resume` is called."""
+        """Stop handling messages from the client until :meth:`resume`."""
         self._connection.hold(is_held=True)
 
     def resume(self) -> None:
@@ -245,12 +245,12 @@ class WebClient:
         self._connection.hold(is_held=False)
 
     def close(self, code: int = 1000, reason: str = "") -> None:
-        """Close the connection after sending the queued messages; ``reason`` is truncated to 123 bytes."""
+        """Send the queued messages, then close the connection. ``reason`` is truncated to 123 bytes."""
         self._connection.close_websocket(code, reason)
 
 
 class Exchange:
-    """One HTTP request and its response."""
+    """An HTTP request and its response."""
 
     def __init__(self, connection: ClientConnection, request: HttpRequest, grant: Grant) -> None:
         self.request = request
@@ -261,31 +261,31 @@ class Exchange:
 
     @property
     def is_open(self) -> bool:
-        """Return whether the client is still connected and the response has not ended."""
+        """Return whether the client is connected and the response has not ended."""
         return self._connection.is_open
 
     @property
     def queue(self) -> SendQueue:
-        """Return the queue of data for the client, with its counters."""
+        """Return the queue of data to the client, with its counters."""
         return self._connection.queue
 
     def respond(
         self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
     ) -> None:
-        """Send a complete response and close the connection."""
+        """Send a complete response, then close the connection."""
         head = response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type,
                                        "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
         self._connection.answer((head, body))
         self._connection.close_when_sent()
 
     def start(self, status: int, content_type: str, **headers: str) -> None:
-        """Start a response whose parts are sent with :meth:`send`, until :meth:`end` is called."""
+        """Start a response, whose parts are sent with :meth:`send`; :meth:`end` ends it."""
         self._connection.answer(
             (response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type, **_dashed(headers)}),)
         )
 
     def send(self, key: Hashable, *pieces: Piece, newest_only: bool = True) -> None:
-        """Send a part of the response; if the client is slow, older parts with ``key`` are dropped."""
+        """Send a part of the response. If the client is slow, drop older parts with the same ``key``."""
         self._connection.stream(key, pieces, newest_only=newest_only)
 
     def end(self) -> None:
@@ -304,7 +304,7 @@ def _file_failure(answer: FileAnswer, why: str) -> bytes:
 
 
 def frame_head(opcode: int, length: int) -> bytes:
-    """Return the header of a server's frame that contains a whole message of ``length`` bytes."""
+    """Return the header of a frame from the server that contains a whole message of ``length`` bytes."""
     if length < 126:
         return bytes((opcode, length))
     if length < 65536:

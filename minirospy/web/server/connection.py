@@ -54,19 +54,19 @@ __all__ = ["Connection", "Site", "Traffic"]
 
 _log = logging.getLogger(__name__)
 
-_PONG = 0x8A  # first byte of a pong frame, and the key under which a pong is queued
+_PONG = 0x8A  # first byte of a pong frame, and the key of a queued pong
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
-"""Clients' weights in the sharing of the loop's time.
+"""Weights with which clients share the loop's time, by their rights.
 
 On loopback any program may write; the dashboard's page has the owner's token.
 """
-# weight until the request is known; low, so that 250 handshakes do not delay established clients
+# weight until the request has arrived; low, so that 250 handshakes do not delay established clients
 _NEW_WEIGHT = 0.25
 
 
 @dataclass
 class Traffic:
-    """A client's traffic counters, and the number of times that reading from it was suspended."""
+    """Counts a client's messages and bytes, and how often reading from it was suspended."""
 
     received: int = 0
     received_bytes: int = 0
@@ -75,7 +75,7 @@ class Traffic:
 
 
 class Site(Protocol):
-    """The pages and endpoints that a listener serves, and the limits and rights of its clients."""
+    """The pages and endpoints of a listener, and its clients' limits and rights."""
 
     @property
     def limits(self) -> Limits: ...
@@ -99,31 +99,31 @@ class Site(Protocol):
 
 
 class _Phase(IntEnum):
-    """The phases of a connection's lifetime."""
+    """The phases in the life of a connection."""
 
     OPEN = 0
     CLOSING = 1
-    """Nothing more is handled or queued; queued data may still be sent."""
+    """Nothing more is handled or queued, but queued data may still be sent."""
     ENDED = 2
-    """The pipe has closed."""
+    """The pipe is closed."""
 
 
 class Connection:
-    """The state of one connection. Receives the events from the connection's pipe."""
+    """The state of a connection, which receives the events of its pipe."""
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
         limits = site.limits
         now = loop.time()
         self.peer = peer  # the client's address
-        self.share = site.account.open(peer, self._shed)  # the connection's share of the server's memory
-        self.traffic = Traffic()  # counters for display
-        self.session: Session | None = None  # set from a WebSocket's handshake until the connection closes
-        self.client: WebClient | None = None  # set once a WebSocket's handshake is complete
+        self.share = site.account.open(peer, self._shed)  # counts the server's memory for the client
+        self.traffic = Traffic()  # traffic counters, for display
+        self.session: Session | None = None  # set from the WebSocket handshake until the connection closes
+        self.client: WebClient | None = None  # set when the WebSocket handshake is complete
         self.exchange: Exchange | None = None  # set from the request for a page until the connection closes
-        # the client's rights; the listener sets them when it admits the request
+        # rank of the client's rights, set by the listener when it admits the request
         self.rank = Rank.SILENT
-        self.active = now  # when the connection was opened, or last received a message or sent one
-        # bytes of incomplete messages, and of the message that the session is processing
+        self.active = now  # when the connection was opened, or last sent or received a message
+        # size in bytes of incomplete messages, and of the message that the session is processing
         self.unfinished = 0
         self.site = site  # the listener
         self._limits = limits  # the listener's limits
@@ -131,20 +131,20 @@ class Connection:
         self.loop = loop
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
-        # work for the client that is not a response to its messages
+        # queued work for the client, except responses to its messages
         self._jobs = Jobs(limits.queue, self.share)
         self.liveness = Liveness(limits.silent_seconds, now)
         self.turn = site.turns.join(self._work)  # the client's share of the loop
         self.turn.weight = _NEW_WEIGHT
-        self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
+        self._endpoint: Endpoint | None = None  # set by the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
-        self._is_held_back = False  # True if the client has used up its frame quota for the current second
-        self._is_paused = False  # True while the session is processing a message, see hold()
+        self._is_held_back = False  # whether the client has used up its frame quota for the current second
+        self._is_paused = False  # whether the session is processing a message; see hold()
         self._worked_on = 0  # size in bytes of the message that the session is processing
-        self._are_jobs_held = False  # True while a job continues in a thread; see hold_jobs()
+        self._are_jobs_held = False  # whether a job continues in a thread; see hold_jobs()
         self._held = 0  # bytes of memory that the session uses for the client; see session_holds()
-        self._is_in_turn = False  # True while _work() runs
-        # Calls _handshake_late at first, then the periodic check of the open connection, and _abort while closing.
+        self._is_in_turn = False  # whether _work() is running
+        # Calls _handshake_late at first, later the periodic check of the open connection or, while closing, _abort.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
 
     @property
@@ -164,21 +164,21 @@ class Connection:
 
     @property
     def endpoints(self) -> Endpoints:
-        """Return the ports of the client and the server, and the server's address."""
+        """Return the client's port, the server's port, and the server's address."""
         return self._pipe.endpoints
 
-    # --- called by the pipe
+    # --- called by the connection's pipe
 
     def received(self, data: bytes) -> None:
-        """Process bytes received from the client."""
+        """Process bytes that the client has sent."""
         if not self.is_open:
             return
         self.liveness.heard(self.loop.time())
         self.traffic.received_bytes += len(data)
         if self.exchange:
-            return  # a connection has only one request
+            return  # each connection has only one request
         self._websocket.feed(data)
-        # Read a large message in large pieces, unless other clients are waiting for their turn.
+        # Read a large message in large pieces, if no other client is waiting for its turn.
         is_alone = len(data) >= SMALL_READ and not self.site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
         if self._is_held_back or self._is_paused or self.site.turns.start(self.turn):
@@ -205,7 +205,7 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
-        # The connection is part of reference cycles: release its memory now instead of when the garbage collector runs.
+        # Release memory now: the connection is in reference cycles, so the garbage collector would do it later.
         self._jobs.clear()
         self._output.end()
         self.site.account.close(self.share)
@@ -214,10 +214,10 @@ class Connection:
     # --- output
 
     def answer(self, pieces: tuple[Piece, ...]) -> None:
-        """Send a message that must not be dropped."""
+        """Send a message to the client that must not be dropped."""
         if not self.is_open:
             return
-        # Check the limit before appending, because a single response, such as a mesh, may exceed the limit.
+        # Check the limit before appending: a single response, such as a mesh, may exceed it.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
@@ -227,14 +227,14 @@ class Connection:
         self._output.schedule()
 
     def answer_file(self, answer: FileAnswer) -> None:
-        """Send a file, which must not be dropped."""
+        """Send a file to the client, which must not be dropped."""
         if self.is_open:
             self.queue.put_file(answer)
             self._count()
             self._output.schedule()
 
     def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None:
-        """Send a message that may be dropped."""
+        """Send a message to the client that may be dropped."""
         if self.is_open:
             self.queue.put(key, pieces, newest_only=newest_only)
             if self._output.is_full:
@@ -244,14 +244,14 @@ class Connection:
             self._output.schedule()
 
     def close_when_sent(self) -> None:
-        """Close the connection when all queued data has been sent."""
+        """Send all queued data, then close the connection."""
         self._close()
         self._output.close_when_sent()
         self._timer.cancel()
         self._timer = self.loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
-        """Send a close frame and close the connection when all queued data has been sent."""
+        """Send all queued data and a close frame, then close the connection."""
         if not self.is_open or not self._websocket.is_open:
             return
         self._websocket.close(code, reason)
@@ -268,10 +268,10 @@ class Connection:
         """Close the connection immediately."""
         self._abort()
 
-    # --- called by the session
+    # --- called by the client's session
 
     def hold(self, *, is_held: bool) -> None:
-        """Stop or continue handling frames while the session processes a message. Unread data stays in the socket's buffer."""
+        """Stop handling frames while the session processes a message, or continue. Unread data stays in the socket's buffer."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()
@@ -282,7 +282,7 @@ class Connection:
             self.site.turns.start(self.turn)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Run ``work`` when it is the client's turn, or immediately if it already is.
+        """Run ``work`` when it is the client's turn, which may be now.
 
         ``work`` uses ``message``, whose bytes are counted until then. If the queued work exceeds the queue's limit, the
         oldest is dropped.
@@ -298,21 +298,21 @@ class Connection:
             self._count()
 
     def hold_jobs(self, *, are_held: bool) -> None:
-        """Stop or continue the queued work for the client. Used while the last piece of work continues in a thread."""
+        """Stop running queued work for the client while the last function continues in a thread, or continue."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
             self.site.turns.start(self.turn)
 
     def session_holds(self, count: int) -> None:
-        """Record how many bytes of memory the session uses for the client."""
+        """Record how many bytes of memory the session uses for the client's messages."""
         self._held = count
         if self._phase is not _Phase.ENDED:
             self._count()
 
-    # --- handling the client's input
+    # --- handling input from the client
 
     def _work(self, end: float) -> bool:
-        """Do work for the client until the time ``end``. Return True if any work is left."""
+        """Do work for the client until the time ``end``. Return True if there is more."""
         self._is_in_turn = True
         try:
             return self._do_jobs(end) or self._handle_frames(end)
@@ -339,7 +339,7 @@ class Connection:
         return False
 
     def _handle_frames(self, end: float) -> bool:
-        """Handle frames until the time ``end``.
+        """Handle frames from the client until the time ``end``.
 
         Return True if frames remain that the client's quota for this second still allows.
         """
@@ -370,8 +370,7 @@ class Connection:
     def framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
-            # Queue at most one ping response, even for a client that does not read.
-            # Only the newest ping needs one (RFC 6455, 5.5.3).
+            # Queue at most one pong, even if the client does not read: only the newest ping needs one (RFC 6455, 5.5.3).
             self.stream(_PONG, (frame_head(_PONG, len(event.data)), event.data), newest_only=True)
         elif event:
             self._deliver(event)
@@ -397,7 +396,7 @@ class Connection:
             self._worked_on = len(data)
 
     def _hold_back(self, seconds: float) -> None:
-        """Stop reading from the client until the next second, because it has used up its frame quota for this one."""
+        """Stop reading from the client until the next second, because its frame quota is used up."""
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
@@ -418,8 +417,7 @@ class Connection:
     def _parse_head(self) -> None:
         try:
             request = self._websocket.next_request()
-            # Refuse the client if its target or Origin is not a URL or its query has a thousand fields.
-            # The exception must not leave it connected.
+            # A ValueError (invalid target or Origin, or a query with a thousand fields) must not leave the client connected.
             found = self._admitted(read_head(request)) if request else None
         except ValueError as error:
             found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")
@@ -464,7 +462,7 @@ class Connection:
         self.session = self._endpoint.open(self.client)
 
     def _select(self, offered: Sequence[str]) -> str | None:
-        """Choose the endpoint; return its sub-protocol. Raise NegotiationError if no endpoint accepts the client."""
+        """Choose the endpoint; return its sub-protocol. Raise NegotiationError if the client fits no endpoint."""
         why = "nothing is served here"
         for endpoint in self.site.endpoints:
             try:
@@ -502,11 +500,11 @@ class Connection:
         self._count()
 
     def _count(self) -> None:
-        """Charge the memory that only this client uses. This may make clients, even this one, release memory."""
+        """Update the memory that only this client uses. This may make clients, even this one, release memory."""
         self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:
-        """Release memory: drop messages if that is allowed, else close the connection."""
+        """Release memory: drop messages if possible; otherwise, close the connection."""
         if self.unfinished > self.queue.size + self.queue.answers + self._jobs.size and not self._held:
             self._refuse_unfinished()
             return
@@ -535,12 +533,12 @@ class Connection:
     # --- time
 
     def _watch(self, check: Callable[[], None]) -> None:
-        """Call ``check`` after the ping interval, replacing the previous check."""
+        """Call ``check`` after the ping interval, in place of the previous check."""
         self._timer.cancel()
         self._timer = self.loop.call_later(self._limits.ping_seconds, check)
 
     def ping(self) -> None:
-        """Ping the client, or disconnect it if it no longer responds."""
+        """Ping the client, or disconnect it if it has stopped responding."""
         output = self._output
         verdict = self.liveness.check(self.loop.time(), output.progressed, is_full=output.is_full)
         if verdict in (Verdict.STUCK, Verdict.SILENT):
@@ -554,7 +552,7 @@ class Connection:
         self._watch(self.ping)
 
     def _watch_progress(self) -> None:
-        """Disconnect the client of a page if it reads nothing."""
+        """Disconnect a page's client if it does not read."""
         output = self._output
         if self.liveness.is_stuck(self.loop.time(), output.progressed, is_full=output.is_full):
             self._abort()

@@ -17,13 +17,13 @@ __all__ = ["PIECE_BYTES", "FileAnswer", "FileSender"]
 
 _log = logging.getLogger(__name__)
 
-# bytes per read: large enough to keep the worker's overhead low, small enough for 256 clients at a time
+# bytes per read: large, so that a worker has little overhead; small enough for 256 clients at the same time
 PIECE_BYTES = 128 * 1024
 
 
 @dataclass(frozen=True)
 class FileAnswer:
-    """A response that ends with a file. The file is opened only when it reaches the front of the queue."""
+    """A response that ends with a file, which is not opened until it reaches the front of the queue."""
 
     open: Callable[[], tuple[BinaryIO, int]]
     """Returns the file and its size. Blocks; raises BridgeError, with the reason, if the file cannot be opened."""
@@ -34,12 +34,12 @@ class FileAnswer:
 
 
 class FileSender:
-    """Sends one file to one client. Runs on the loop."""
+    """Sends a file to a client. Runs on the loop."""
 
     def __init__(
         self, answer: FileAnswer, loop: asyncio.AbstractEventLoop, on_piece: Callable[[], object]
     ) -> None:
-        """Create the sender. ``on_piece`` is called when the next piece has been read, or reading has failed."""
+        """Create the sender. ``on_piece`` is called when the next piece has been read or reading has failed."""
         self.is_done = False
         """True if all pieces have been taken."""
         self.has_failed = False
@@ -55,7 +55,7 @@ class FileSender:
         self._is_closed = False
 
     def take(self) -> bytes | None:
-        """Return the next piece, or None while it is being read."""
+        """Return the next piece of the file, or None while it is being read."""
         piece, self._piece = self._piece, None
         if piece is None:
             self._read()
@@ -65,7 +65,7 @@ class FileSender:
         return piece
 
     def close(self) -> None:
-        """Close the file; if it is being read, close it after the read. Idempotent."""
+        """Close the file, after the read in progress. Idempotent."""
         self._is_closed = True
         if self._file and not self._reading:
             self._file.close()
@@ -77,7 +77,7 @@ class FileSender:
             self._reading.add_done_callback(self._was_read)
 
     def _first(self) -> bytes:
-        """Open the file; return the head and the first piece. Runs in a worker."""
+        """Open the file; return the response's head and the file's first piece. Runs in a worker."""
         try:
             self._file, size = self._answer.open()
         except BridgeError as error:

@@ -13,7 +13,7 @@ __all__ = ["FrameByFrame"]
 
 
 class FrameByFrame(ServerProtocol):
-    """The library's protocol, which parses all received data in one call, modified to stop after each frame."""
+    """The WebSocket library's protocol, except that it parses one frame per call, not all received data."""
 
     reader: _GatedReader
 
@@ -22,32 +22,32 @@ class FrameByFrame(ServerProtocol):
         self.reader.feed_data(data)
 
     def next_request(self) -> Request | None:
-        """Return the request, or None if it is incomplete; if it is not a request, ``handshake_exc`` is set."""
+        """Return the request, or None if it is incomplete. If the data is not a request, set ``handshake_exc``."""
         next(self.parser)
         events = self.events_received()
         return events[0] if events and isinstance(events[0], Request) else None
 
     def next_frame(self) -> Frame | None:
-        """Return the next complete frame, or None if there is none."""
+        """Return the next frame, or None if it is incomplete."""
         self.reader.is_open = True
         next(self.parser)
         event = self.events.pop() if self.events else None
         return event if isinstance(event, Frame) else None
 
     def limit(self, size: int) -> None:
-        """Refuse messages larger than ``size`` from now on."""
-        # The name of the attribute depends on the library's version.
+        """From now on, refuse messages larger than ``size`` bytes."""
+        # The attribute has another name in some versions of the library.
         for name in ("max_message_size", "max_size"):
             if hasattr(self, name):
                 setattr(self, name, size)
 
     def parse(self) -> Generator[None]:
-        """See the library's method. Called once, before any data is read."""
+        """See the library's method. Called once, before any data arrives."""
         self.reader = _GatedReader()
         yield from super().parse()
 
     def recv_frame(self, frame: Frame) -> None:
-        """Process a frame and then stop the parser; the connection responds to pings."""
+        """Process a frame, then stop the parser. The connection itself responds to pings."""
         if frame.opcode is Opcode.PING:
             self.events.append(frame)
         else:
@@ -56,12 +56,12 @@ class FrameByFrame(ServerProtocol):
 
 
 class _GatedReader(StreamReader):
-    """Stops the parser before each frame, unless ``is_open`` is set."""
+    """Stops the parser before each frame unless ``is_open`` is set."""
 
     is_open = False
 
     def at_eof(self) -> Generator[None, None, bool]:
-        """See the library's method, which the parser calls before each frame. The pipe detects the end of the stream."""
+        """See the library's method, called by its parser before each frame. The pipe itself detects the end of the stream."""
         while not (self.is_open and self.buffer):
             yield
         return False

@@ -10,8 +10,8 @@ from minirospy.web.server.account import LARGE_PIECE, Piece, Share
 
 __all__ = ["Jobs"]
 
-_MAX_JOBS = 1000  # maximum jobs of one client, each of which refers to a message that is not encoded yet
-_JOB_BYTES = 500  # bytes of memory per job: 290 were measured, plus the record of the job's message
+_MAX_JOBS = 1000  # maximum number of a client's jobs; each refers to a message not encoded yet
+_JOB_BYTES = 500  # memory per job in bytes: 290 (measured), and the record of the job's message
 
 Work = Callable[[], None]
 
@@ -22,16 +22,16 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """One client's queued jobs, oldest first. Their number and the bytes of the messages they refer to are limited.
+    """A client's queued jobs, oldest first. Limits their number, and the total size of the messages that they refer to.
 
     A large message counts in the client's share of the server's memory, but only once if it is queued for several clients.
     """
 
     def __init__(self, max_bytes: int, share: Share) -> None:
-        self.size = 0  # bytes of memory used only for this client's queued work
+        self.size = 0  # memory in bytes used only for this client's jobs
         self._max_bytes = max_bytes
         self._share = share
-        self._message_bytes = 0  # total bytes of all messages to which the work refers
+        self._message_bytes = 0  # total size in bytes of the messages that the jobs refer to
         self._waiting: deque[_Job] = deque()
 
     def __len__(self) -> int:
@@ -39,7 +39,7 @@ class Jobs:
         return len(self._waiting)
 
     def add(self, work: Work, message: Piece) -> int:
-        """Append work that refers to a message; return the number of older jobs that were dropped."""
+        """Append a job that refers to a message; return how many older jobs were dropped."""
         self._waiting.append(_Job(work, message))
         self._count(message, 1)
         self._share.hold((message,))
@@ -50,14 +50,14 @@ class Jobs:
         return dropped
 
     def pop(self) -> Work:
-        """Remove and return the oldest work."""
+        """Remove and return the oldest job."""
         work, message = self._waiting.popleft()
         self._count(message, -1)
         self._share.release((message,))
         return work
 
     def clear(self) -> int:
-        """Drop all work; return the number of dropped jobs."""
+        """Drop all jobs; return their number."""
         dropped = len(self)
         while self._waiting:
             self.pop()

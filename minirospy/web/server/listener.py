@@ -48,7 +48,7 @@ _TOO_OFTEN = _refusal(429, 1, "too many new connections from this address: wait 
 
 
 class Listener:
-    """Serves endpoints (protocols over WebSocket) and pages (HTTP) on one port."""
+    """Serves pages (HTTP), and endpoints (protocols over WebSocket), on one port."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class Listener:
         on_change: Callable[[int], object] = lambda _: None,
         warn: Callable[[str], object] = lambda _: None,
     ) -> None:
-        """Create the listener. ``pages`` is a dict from path to handler; ``public_pages`` need no token.
+        """Create the listener. ``pages`` maps paths to handlers; ``public_pages`` need no token.
 
         ``on_change`` is called with the number of connections, ``warn`` with a refusal that names an option for the owner.
         """
@@ -92,11 +92,11 @@ class Listener:
 
     @property
     def is_encrypted(self) -> bool:
-        """Return whether clients use wss and https."""
+        """Return whether clients connect with wss and https."""
         return self._tls is not None
 
     async def open(self, host: str, port: int) -> None:
-        """Start listening; port 0 means any free port. Raise BridgeError if the port cannot be opened."""
+        """Start listening, for port 0 on any free port. Raise BridgeError if the port cannot be opened."""
         loop = asyncio.get_running_loop()
         try:
             sock = tcp.bind(host, port)
@@ -144,7 +144,7 @@ class Listener:
     # --- Site
 
     def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal:
-        """Return the rights of a request's sender, or the reason for refusing the request."""
+        """Return the rights of the sender of a request, or the reason for refusing it."""
         found: Grant | Refusal
         if is_page and unquote(urlsplit(credentials.target).path) in self._public_pages:
             found = self._access.check_host(credentials.host) or Grant.READ
@@ -159,7 +159,7 @@ class Listener:
         return self._pages.get(path)
 
     def admit(self, connection: Connection, grant: Grant) -> Refusal | None:
-        """Admit a connection whose request is known, or return the reason for refusing it."""
+        """Admit a connection that has sent its request, or return the reason for refusing it."""
         rank = rank_of(grant)
         served = [each for each in self._open() if each.rank > Rank.SILENT]
         if len(served) >= self.limits.connections:
@@ -200,7 +200,7 @@ class Listener:
             self._connected(sock, str(address[0]))
 
     def _rest(self, listening: socket.socket) -> None:
-        """Stop accepting for a second. The listening socket stays readable, so the loop would spin otherwise."""
+        """Stop accepting connections for one second, because the loop would spin while the listening socket stays readable."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(listening)
 
@@ -226,7 +226,7 @@ class Listener:
         return self._add(Connection(self, pipe, peer, asyncio.get_running_loop()))
 
     def _refusal_of(self, peer: tuple[str, int], here: tuple[str, int]) -> bytes | None:
-        """Return the response for a client that may not connect now, or None if it may.
+        """Return the response that refuses a client, or None if it may connect now.
 
         This user's clients may always connect.
         """
@@ -253,7 +253,7 @@ class Listener:
         now = asyncio.get_running_loop().time()
         while found := displaced(peer, rank, occupants, now):
             if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):
-                found.rank = Rank.OWN  # determined only here, because it is rarely needed
+                found.rank = Rank.OWN  # determined only here, because it is rarely needed and slow
                 continue
             _log.info("%s gives way to %s", found.peer, peer)
             found.give_way()
@@ -261,7 +261,7 @@ class Listener:
         return False
 
     def _is_own(self, connection: Connection) -> bool:
-        """Return whether a client is known to be a program of the user who runs the server."""
+        """Return whether a client is known to be a program of the server's user."""
         peer_port, address, port = connection.endpoints
         return is_own_user((connection.peer, peer_port), (address, port))
 
@@ -283,18 +283,18 @@ def _refuse(sock: socket.socket, answer: bytes) -> None:
         sock.send(answer)
         sock.shutdown(socket.SHUT_WR)
     with contextlib.suppress(OSError):
-        # Read first: closing a socket with unread data resets the connection, and the response would be lost.
+        # Read first: closing a socket with unread data resets the connection, which may lose the response.
         sock.recv(_REQUEST)
     sock.close()
 
 
 class Relay:
-    """Passes on a pipe's events to the connection, which is created after the pipe."""
+    """Forwards the events of a pipe to its connection, which is created later."""
 
     target: Connection
 
     def received(self, data: bytes) -> None:
-        """Pass on received bytes."""
+        """Forward received bytes."""
         self.target.received(data)
 
     def writable(self) -> None:

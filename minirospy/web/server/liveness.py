@@ -8,28 +8,28 @@ __all__ = ["Liveness", "Verdict"]
 
 
 class Verdict(Enum):
-    """The result of a check: what to do with the client."""
+    """What to do with the client, as the result of a check."""
 
     PING = auto()
     """Send a ping."""
     WAIT = auto()
     """Do nothing, because a ping would be queued behind output that the client has not read yet."""
     SILENT = auto()
-    """Disconnect, because the client has not responded to a ping."""
+    """Disconnect, because the client has not responded to the ping."""
     STUCK = auto()
-    """Disconnect, because the client has not read the output."""
+    """Disconnect, because the client does not read the output."""
 
 
 class Liveness:
-    """The time of the last data from a client, and whether it has been pinged since.
+    """Tracks when the last data from a client arrived, and whether the client has been pinged since then.
 
     Times are in seconds, all on the same clock.
     """
 
     def __init__(self, silent_seconds: float, now: float) -> None:
-        self.received = now  # time when the client last sent data
+        self.received = now  # when the last data arrived from the client
         self._silent_seconds = silent_seconds
-        self._is_pinged = False  # True after a ping, until data arrives
+        self._is_pinged = False  # set by a ping, cleared when data arrives
 
     def heard(self, now: float) -> None:
         """Record that data has arrived."""
@@ -37,14 +37,14 @@ class Liveness:
         self._is_pinged = False
 
     def is_stuck(self, now: float, progressed: float, *, is_full: bool) -> bool:
-        """Return whether the client has read nothing for too long. ``progressed`` is the time of the last write of output."""
+        """Return whether the client has not read anything for too long. ``progressed`` is the time of the last output."""
         return is_full and now - progressed > self._silent_seconds
 
     def check(self, now: float, progressed: float, *, is_full: bool) -> Verdict:
-        """Return the action to take now for the client."""
+        """Return what to do with the client now."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
-        # Check that a ping was sent: after a suspension of the machine, the last data is old even if no ping is unanswered.
+        # After a suspension of the machine, the last data is old even if no ping is unanswered, so check for a ping.
         if self._is_pinged and now - self.received > self._silent_seconds:
             return Verdict.SILENT
         if is_full:

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Output"]
 
-_BATCH_BYTES = 256 * 1024  # maximum bytes of small messages to combine into one write
+_BATCH_BYTES = 256 * 1024  # maximum size in bytes of small messages combined into one write
 _BATCH_PIECES = 128
-# maximum bytes to write to a fast-reading client before the loop's next iteration
+# maximum number of bytes written per loop iteration to a client that reads fast
 _PUMP_BYTES = 1024 * 1024
 
 
 class Output:
-    """Writes a client's queued data as fast as its pipe accepts it. Runs on the loop."""
+    """Writes the data queued for a client, as fast as its pipe accepts it. Runs on the loop."""
 
     def __init__(
         self,
@@ -37,26 +37,26 @@ class Output:
         ``on_written`` is called after each write, so that the caller can update the client's memory use.
         """
         self.queue = queue
-        self.progressed = loop.time()  # time when output was last written to the pipe
+        self.progressed = loop.time()  # when output was last written to the pipe
         self._pipe = pipe
         self._share = share
         self._loop = loop
         self._on_written = on_written
         self._file: FileSender | None = None  # the file that is being sent
-        # pieces that the pipe has not sent yet; the client's share counts the large ones
+        # pieces that the pipe has not sent yet; the client's share counts only the large ones
         self._in_pipe: list[Piece] = []
-        self._is_scheduled = False  # True from schedule() until the loop's next iteration
+        self._is_scheduled = False  # set by schedule() until the next iteration of the loop
         self._is_closing = False  # set by close_when_sent()
         self._is_ended = False  # set by end()
 
     @property
     def is_full(self) -> bool:
-        """Return whether the pipe still contains data that the client has not read."""
+        """Return whether the pipe contains data that the client has not read."""
         return self._pipe.is_full
 
     @property
     def size(self) -> int:
-        """Return the number of bytes queued for this client only.
+        """Return the number of queued bytes that are for this client only.
 
         Large pieces are excluded: the client's share counts them.
         """
@@ -67,13 +67,13 @@ class Output:
         return size
 
     def schedule(self) -> None:
-        """Write in the loop's next iteration, so that messages queued until then are written with one call."""
+        """Write in the next iteration of the loop, so that messages queued until then are written together."""
         if not self._is_scheduled and not self._pipe.is_full:
             self._is_scheduled = True
             self._loop.call_soon(self.pump)
 
     def pump(self) -> None:
-        """Write as much as the pipe accepts."""
+        """Write as much queued data as the pipe accepts."""
         self._is_scheduled = False
         if self._is_ended:
             return
@@ -84,12 +84,12 @@ class Output:
             self._on_written()
 
     def close_when_sent(self) -> None:
-        """Close the pipe when the queue is empty."""
+        """Close the pipe as soon as the queue is empty."""
         self._is_closing = True
         self.schedule()
 
     def abort(self) -> None:
-        """Close the pipe, without sending the queued data."""
+        """Close the pipe without sending queued data."""
         self._is_closing = True
         self._pipe.close(flush=False)
 
@@ -125,7 +125,7 @@ class Output:
                 self._share.hold(batch)
 
     def _next_batch(self) -> list[Piece] | None:
-        """Return the pieces to write next, or None if there is nothing to write."""
+        """Return the pieces to write next, or None if there are none."""
         batch: list[Piece] = []
         size = 0
         while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES and not self._file:
@@ -149,7 +149,7 @@ class Output:
         piece = file.take()
         if piece is None:
             if file.has_failed:
-                # Close the pipe: the size has been sent, and the client would mistake any further data for the file.
+                # Close the pipe: the file's size has been sent, so the client would take any other data for the file.
                 self.abort()
             return None
         if file.is_done:

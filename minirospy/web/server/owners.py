@@ -22,7 +22,7 @@ _SOCK_DIAG_BY_FAMILY = 20
 _NLM_F_REQUEST = 1
 _ANY = 0xFFFFFFFF
 _LISTEN = 10
-"""The state of a listening socket, which the kernel returns if no connection matches."""
+"""State of a listening socket, which the kernel returns if there is no matching connection."""
 _MESSAGE = struct.Struct("=IHHII")
 _REQUEST = struct.Struct("=BBBBI")
 _PORTS = struct.Struct("!HH")
@@ -36,12 +36,12 @@ _End = tuple[_Address, int]
 
 
 def is_own_user(peer: tuple[str, int], here: tuple[str, int]) -> bool:
-    """Return whether a connection's peer is known to be a process of this user; ``here`` is the local end."""
+    """Return whether a connection's peer is known to be a process of this user. ``here`` is the connection's local end."""
     return sys.platform == "linux" and owner_of(peer, here) == os.getuid()
 
 
 def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
-    """Return the owner (user) of the local TCP socket from ``end`` to ``other_end``, whatever the socket's state.
+    """Return the user that owns the local TCP socket from ``end`` to ``other_end``, whatever its state.
 
     Return None if there is no such socket, or if no process has it open any more, because the kernel lists it as root's.
     """
@@ -54,12 +54,12 @@ def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
     try:
         return _by_query(*ends)
     except (OSError, AttributeError, struct.error):
-        # The system does not support sock_diag or does not permit it.
+        # The system does not support or permit sock_diag.
         return _by_table(*ends)
 
 
 def _by_query(end: _End, other_end: _End) -> int | None:
-    """Query the kernel for one socket; return its user. Source: sock_diag(7).
+    """Query the kernel for a socket; return the user that owns it. Source: sock_diag(7).
 
     Raise OSError if the query fails.
     """
@@ -74,7 +74,7 @@ def _by_query(end: _End, other_end: _End) -> int | None:
         answer = asking.recv(4096)
     kind = _MESSAGE.unpack_from(answer)[1]
     if kind != _SOCK_DIAG_BY_FAMILY:
-        # The response is an error, which is the same for a missing socket and for a query that the kernel does not support.
+        # The kernel returns the same error for a missing socket and for an unsupported query.
         return _by_table(end, other_end)
     if len(answer) < _ANSWER_SIZE or answer[_MESSAGE.size + 1] == _LISTEN:
         return None
@@ -83,7 +83,7 @@ def _by_query(end: _End, other_end: _End) -> int | None:
 
 
 def _by_table(end: _End, other_end: _End) -> int | None:
-    """Look up the user in the kernel's table of all sockets. Source: proc_net_tcp in the kernel's documentation."""
+    """Find a socket in the kernel's table; return the user. Source: proc_net_tcp in the kernel's documentation."""
     port = f":{end[1]:04X} "
     for table in _TABLES:
         try:
@@ -92,7 +92,7 @@ def _by_table(end: _End, other_end: _End) -> int | None:
             continue
         for line in lines:
             if port not in line:
-                continue  # skip most lines without parsing them; there may be thousands
+                continue  # do not parse irrelevant lines, because there may be thousands
             _, local, remote, _, _, _, _, user, _, inode, *_ = line.split()
             if (_listed(local), _listed(remote)) == (end, other_end) and inode != "0":
                 return int(user)
@@ -100,17 +100,17 @@ def _by_table(end: _End, other_end: _End) -> int | None:
 
 
 def _parsed(end: tuple[str, int]) -> _End:
-    """Parse an address, as the socket API returns it, and its port. Raise ValueError if the address is invalid."""
+    """Parse an (address, port) from the socket API. Raise ValueError if the address is invalid."""
     return _unmapped(ipaddress.ip_address(end[0].partition("%")[0])), end[1]
 
 
 def _listed(text: str) -> _End:
-    """Parse an address and port from the kernel's table: 32-bit words in native byte order."""
+    """Parse an address and port in the kernel's table, which has 32-bit words in native byte order."""
     host, _, port = text.partition(":")
     words = [int(host[at : at + 8], 16).to_bytes(4, sys.byteorder) for at in range(0, len(host), 8)]
     return _unmapped(ipaddress.ip_address(b"".join(words))), int(port, 16)
 
 
 def _unmapped(address: _Address) -> _Address:
-    """Return the IPv4 address in an IPv4-mapped IPv6 address. An IPv6 socket may have an IPv4 connection."""
+    """Return the IPv4 address of an IPv4-mapped IPv6 address, which an IPv6 socket has for an IPv4 connection."""
     return (address.ipv4_mapped or address) if isinstance(address, ipaddress.IPv6Address) else address

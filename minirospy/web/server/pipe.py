@@ -17,15 +17,15 @@ from minirospy.web.server.queue import Piece
 
 __all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
-# bytes per receive: small enough to read from 250 sending clients in one loop iteration
+# bytes per receive: small enough to serve 250 sending clients in one loop iteration
 SMALL_READ = 64 * 1024
-LARGE_READ = 256 * 1024  # bytes per receive for a large message, if no other client is waiting
+LARGE_READ = 256 * 1024  # bytes per receive for a large message while no other client waits
 _MAX_PIECES = 128
-"""Maximum pieces per sendmsg call; systems accept 1024 at most."""
+"""Maximum number of pieces per sendmsg call; systems accept at most 1024."""
 
 
 class Endpoints(NamedTuple):
-    """The peer's port, and the local address and port. Empty if the connection is closed or does not use TCP."""
+    """The peer's port, and the local address and port. Empty if the connection is closed or is not TCP."""
 
     peer_port: int = 0
     address: str = ""
@@ -33,20 +33,20 @@ class Endpoints(NamedTuple):
 
 
 class PipeEvents(Protocol):
-    """The callbacks of a pipe, called on the loop."""
+    """The callbacks for a pipe, which are called on the loop."""
 
     def received(self, data: bytes) -> None:
         """Process received bytes."""
 
     def writable(self) -> None:
-        """Write more, because the kernel has accepted everything that was written before."""
+        """Write more, because the kernel has accepted all written data."""
 
     def ended(self) -> None:
-        """Release all resources: the connection has closed, for whatever reason. Called once."""
+        """Release all resources, because the connection is closed. Called once."""
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: the kernel has not accepted all written data. ``copies``: the unsent rest is a copy.
+    """A connection. ``is_full``: whether the kernel has not accepted all data; ``copies``: whether unsent data is a copy.
 
     ``read_bytes``: the maximum number of bytes per receive, if it can be chosen.
     """
@@ -75,7 +75,7 @@ class Pipe(Protocol):
 
 
 class PlainPipe:
-    """A TCP connection."""
+    """An unencrypted TCP connection."""
 
     copies = False
 
@@ -91,7 +91,7 @@ class PlainPipe:
 
     @property
     def is_full(self) -> bool:
-        """Return whether written data is waiting for the kernel to accept it."""
+        """Return whether the kernel has not accepted all written data."""
         return bool(self._rest)
 
     @property
@@ -105,7 +105,7 @@ class PlainPipe:
         return _endpoints(self._sock)
 
     def write(self, pieces: Sequence[Piece]) -> None:
-        """Send pieces; store what the kernel does not accept yet."""
+        """Send pieces; buffer the data that the kernel does not accept."""
         if self._is_closing:
             return
         was_full = bool(self._rest)
@@ -128,7 +128,7 @@ class PlainPipe:
             self._loop.add_reader(self._sock, self._readable)
 
     def close(self, *, flush: bool = True) -> None:
-        """Close the connection; with ``flush``, first send the written data. Idempotent."""
+        """Close the connection; with ``flush``, send the written data first. Idempotent."""
         self._is_closing = True
         if not flush or not self._rest:
             self._end()
@@ -179,7 +179,7 @@ class PlainPipe:
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         with contextlib.suppress(OSError):
-            # Shut down first: closing a socket with unread data resets the connection, and the peer could lose data sent to it.
+            # Shut down first: closing a socket with unread data resets the connection, which may lose data for the peer.
             self._sock.shutdown(socket.SHUT_WR)
         self._sock.close()
         self._events.ended()
@@ -206,19 +206,19 @@ class TlsPipe(asyncio.Protocol):
     copies = True
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
-        """Create a connection. ``connected(pipe, peer_address)`` returns the object that receives the events.
+        """Create a connection. ``connected(pipe, peer_address)`` returns an object to receive its events.
 
         To refuse the connection, ``connected`` writes a response and returns None.
         """
         self._connected = connected
-        self.read_bytes = LARGE_READ  # asyncio's own receive size
+        self.read_bytes = LARGE_READ  # the size that asyncio uses
         self._events: PipeEvents | None = None
         self._transport: asyncio.Transport | None = None
         self._is_paused = False
 
     @property
     def is_full(self) -> bool:
-        """Return whether the data buffered for sending exceeds asyncio's high-water mark."""
+        """Return whether the buffered data exceeds asyncio's high-water mark."""
         return self._is_paused
 
     @property
@@ -232,7 +232,7 @@ class TlsPipe(asyncio.Protocol):
         return _endpoints(self._transport.get_extra_info("socket")) if self._transport else Endpoints()
 
     def write(self, pieces: Sequence[Piece]) -> None:
-        """Send pieces, or let asyncio store them."""
+        """Send pieces; asyncio buffers them if necessary."""
         if self._transport and not self._transport.is_closing():
             self._transport.writelines(pieces)
 
@@ -255,7 +255,7 @@ class TlsPipe(asyncio.Protocol):
                 self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Start: see asyncio.Protocol."""
+        """See asyncio.Protocol. Starts the connection."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         peer = transport.get_extra_info("peername") or ("?",)
@@ -264,16 +264,16 @@ class TlsPipe(asyncio.Protocol):
             transport.close()
 
     def data_received(self, data: bytes) -> None:
-        """Pass on received bytes."""
+        """Forward received bytes."""
         if self._events:
             self._events.received(data)
 
     def pause_writing(self) -> None:
-        """Stop writing, because asyncio's buffer is full."""
+        """Record that asyncio's buffer is full, so that no more is written."""
         self._is_paused = True
 
     def resume_writing(self) -> None:
-        """Continue writing."""
+        """Continue to write, because asyncio's buffer has room again."""
         self._is_paused = False
         if self._events:
             self._events.writable()
@@ -286,7 +286,7 @@ class TlsPipe(asyncio.Protocol):
 
 
 def tls_context(certificate: str, key: str) -> ssl.SSLContext:
-    """Return a server's TLS context with a certificate and its key, both PEM files.
+    """Return the TLS context of a server, given the PEM files of its certificate and key.
 
     Raise OSError or ssl.SSLError if they cannot be loaded.
     """

@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_LIMIT", "ENTRY_BYTES", "MAX_ANSWERS", "Piece", "SendQueue"]
 
 DEFAULT_LIMIT = 10_000_000
-"""Maximum bytes of messages queued for a client."""
+"""Maximum size in bytes of the messages queued for a client."""
 
 ENTRY_BYTES = 350
-"""Bytes of memory that an entry takes in addition to its pieces; 340 to 360 were measured with Python 3.11."""
+"""Memory in bytes that an entry takes in addition to its pieces: 340 to 360 were measured with Python 3.11."""
 
 MAX_ANSWERS = 64_000_000
-"""Maximum bytes of responses queued for a client that does not read them."""
+"""Maximum size in bytes of the responses queued for a client that does not read them."""
 
 
 _FILE_BYTES = 1000
-"""Memory, in bytes, of a file that is queued but not yet opened, including its queue entry."""
+"""Memory in bytes of a queued file that is not open, including the queue entry."""
 
 
 class _Entry(NamedTuple):
-    """A message, or a response if the key is None; ``size``: bytes of its pieces and of the entry."""
+    """A queued message, or a response if ``key`` is None. ``size`` is the size in bytes of the pieces and the entry."""
 
     key: Hashable | None
     pieces: tuple[Piece, ...] | FileAnswer
@@ -42,7 +42,7 @@ class _Entry(NamedTuple):
 
 
 class _Waiting:
-    """The messages queued under one key."""
+    """The queued messages with the same key."""
 
     __slots__ = ("numbers", "size")
 
@@ -52,7 +52,7 @@ class _Waiting:
 
 
 class SendQueue:
-    """One client's output queue, in the order of arrival."""
+    """The output queue of one client: messages, which may be dropped, and responses, in order of arrival."""
 
     def __init__(
         self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES, share: Share | None = None
@@ -87,11 +87,11 @@ class SendQueue:
 
     @property
     def is_overrun(self) -> bool:
-        """Return whether more responses are queued than is possible for a client that reads them."""
+        """Return whether so many responses are queued that the client cannot be reading them."""
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
-        """Append a message.
+        """Append a message to the queue.
 
         Drop older messages if the limit is exceeded. With ``newest_only`` the message replaces all older messages of its key,
         which do not count as dropped.
@@ -118,7 +118,7 @@ class SendQueue:
         self.size += size
 
     def put_answer(self, pieces: tuple[Piece, ...]) -> None:
-        """Append a response, which is never dropped."""
+        """Append a response, which is never dropped, to the queue."""
         size = sum(map(len, pieces)) + self._entry_bytes
         self._number += 1
         if size >= LARGE_PIECE:
@@ -127,13 +127,13 @@ class SendQueue:
         self.answers += size
 
     def put_file(self, answer: FileAnswer) -> None:
-        """Append a file, which is never dropped, and is not read until it is popped."""
+        """Append a file to the queue. It is never dropped, and is not read until it is popped."""
         self._number += 1
         self._entries[self._number] = _Entry(None, answer, _FILE_BYTES)
         self.answers += _FILE_BYTES
 
     def pop(self) -> tuple[Piece, ...] | FileAnswer | None:
-        """Remove the oldest entry and return its pieces, or a file; return None if the queue is empty."""
+        """Remove the oldest entry; return its pieces or its file, or None if the queue is empty."""
         if not self._entries:
             return None
         _, entry = self._entries.popitem(last=False)
@@ -150,7 +150,7 @@ class SendQueue:
         return entry.pieces
 
     def discard(self, key: Hashable) -> None:
-        """Remove the messages of a key that is no longer used. They do not count as dropped."""
+        """Remove the messages with a key that is no longer used. They do not count as dropped."""
         self.dropped_of.pop(key, None)
         waiting = self._waiting.pop(key, None)
         if waiting:
@@ -204,5 +204,5 @@ class SendQueue:
 
 
 def _large(pieces: tuple[Piece, ...]) -> int:
-    """Return the total bytes of the large pieces among ``pieces``."""
+    """Return the total size in bytes of the large pieces among ``pieces``."""
     return sum(size for size in map(len, pieces) if size >= LARGE_PIECE)

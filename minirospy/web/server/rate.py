@@ -9,7 +9,7 @@ from typing import NamedTuple
 __all__ = ["MAX_ADDRESSES", "ConnectionRate"]
 
 MAX_ADDRESSES = 1000
-"""Maximum number of addresses to store. Above it, the address whose last connection is oldest is forgotten."""
+"""Maximum number of stored addresses; beyond it, the address with the oldest last connection is forgotten."""
 
 
 class _Bucket(NamedTuple):
@@ -18,10 +18,10 @@ class _Bucket(NamedTuple):
 
 
 class ConnectionRate:
-    """The rate limiter for new connections."""
+    """Limits the rate of new connections from each address."""
 
     def __init__(self, a_second: float, burst: int, clock: Callable[[], float]) -> None:
-        """Create the rate limiter.
+        """Create the limiter. It admits ``a_second`` connections per second and address, after an initial burst.
 
         ``burst``: number of connections that an address may open at the same time; ``clock`` returns seconds.
         """

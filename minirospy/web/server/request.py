@@ -22,23 +22,23 @@ __all__ = ["RequestHead", "read_head", "refusal_response"]
 _EXTRA_HEADERS: Mapping[int, Mapping[str, str]] = {
     401: {"WWW-Authenticate": "Bearer"},
     503: {"Retry-After": "5"},
-}  # additional headers of a refusal, keyed by status
+}  # additional headers of a refusal, keyed by its status
 
 
 class RequestHead(NamedTuple):
-    """A request: its target, and its headers, whose names are in lower case."""
+    """The target and headers of a request. The names of the headers are in lower case."""
 
     target: str
     headers: Mapping[str, str]
 
     @property
     def is_page(self) -> bool:
-        """Return whether the request is for a page, as opposed to a WebSocket."""
+        """Return whether the request is for a page, not for a WebSocket."""
         return self.headers.get("upgrade", "").lower() != "websocket"
 
     @property
     def credentials(self) -> Credentials:
-        """Return the fields that determine access. Raise ValueError if Referer is not a URL."""
+        """Return the fields that determine the sender's rights. Raise ValueError if Referer is not a URL."""
         return Credentials(
             self.headers.get("host", ""),
             _origin(self.headers),
@@ -48,7 +48,7 @@ class RequestHead(NamedTuple):
         )
 
     def parsed(self, peer: str, endpoints: Endpoints) -> HttpRequest:
-        """Convert the request to the form that sessions and pages receive.
+        """Convert the request to the type that sessions and pages receive.
 
         Raise ValueError if the target is not a URL, or has too many fields.
         """
@@ -59,12 +59,12 @@ class RequestHead(NamedTuple):
 
 
 def read_head(request: Request) -> RequestHead:
-    """Return a request's target and headers. If a header is repeated, use the last one."""
+    """Return the target and headers of a request. The last of repeated headers counts."""
     return RequestHead(request.path, {name.lower(): value for name, value in request.headers.raw_items()})
 
 
 def refusal_response(refusal: Refusal) -> tuple[bytes, bytes]:
-    """Return the head and body of the response to a refused request."""
+    """Return the head and the body of the response that refuses a request."""
     body = (refusal.text + "\n").encode()
     headers = {
         **PLAIN_HEADERS,
@@ -76,7 +76,7 @@ def refusal_response(refusal: Refusal) -> tuple[bytes, bytes]:
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:
-    """Return the site of the page that sent a request, or None if it was not sent by a page.
+    """Return the site of the page that sent a request, or None if no page sent it.
 
     A browser sends the site in Origin, but not for an image or a frame. For these it sends whether the page is from another
     site, and possibly the page's URL in Referer. Source: https://www.w3.org/TR/fetch-metadata/.

@@ -29,21 +29,21 @@ __all__ = ["FairTurns", "Share", "cpu_meter"]
 
 _log = logging.getLogger(__name__)
 
-TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
-# seconds of work for one client before the next client's turn; with 250 clients, each waits 25 ms
+TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients
+# seconds of work for a client before the next client's turn: with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# number of jobs for which a client counts as new: each is expected to take at least as long as other new clients' jobs
+# number of jobs for which a client is new: each is expected to take at least as long as jobs of other new clients
 NEW_PIECES = 8
-EXPECTED_DECAY = 0.9  # factor by which the expected seconds decay after each job that takes less
-IMMEDIATE_SHARE = 0.5  # fraction of the time for work that starts without being queued
-# Maximum burst length of an interactive client, in slices (1 ms in total).
-# A request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms.
-# A new client starts with one time slice, and gets another with each short burst of work.
-# If 250 new clients flood the server, each gets one slice; after that, its other clients are served first.
+EXPECTED_DECAY = 0.9  # factor by which a client's expected time per job decays after a shorter job
+IMMEDIATE_SHARE = 0.5  # fraction of the time that work may use without being queued
+# Maximum length of an interactive client's burst of work, in slices (1 ms in total).
+# A request takes 0.1 to 0.5 ms to handle; 64 kB of empty frames take 100 ms.
+# A new client starts with one slice, and gets one more after each short burst.
+# Therefore, if 250 new clients flood the server, its other clients are served after one slice for each of them.
 INTERACTIVE_SLICES = 10
-# maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
+# maximum debt of bulk clients, which lets interactive clients use 200 ms before bulk clients get another slice
 MAX_DEBT_TURNS = 10
-# minimum fraction of the time for bulk clients, even while interactive clients use the rest
+# minimum fraction of the time for bulk clients while interactive clients use the rest
 BULK_SHARE = 0.2
 
 Work = Callable[[float], bool]
@@ -51,7 +51,7 @@ Work = Callable[[float], bool]
 
 
 class Share:
-    """One client's use of the loop, in seconds divided by the client's weight."""
+    """The loop time that a client has used, in seconds divided by the client's weight."""
 
     __slots__ = (
         "burst",
@@ -69,22 +69,22 @@ class Share:
 
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
-        self.queue = queue  # the queue that the client is in: interactive or bulk clients
-        # seconds used; at least the tag that the queue was serving when the client last became active
+        self.queue = queue  # the queue that contains the client: interactive or bulk
+        # seconds used, at least the queue's tag when the client last became active
         self.tag = queue.served
-        self.weight = 1.0  # set once the client's rights are known
-        # seconds that the client's next piece of work may take, estimated from earlier pieces
+        self.weight = 1.0  # set when the client's rights are known
+        # expected seconds of the client's next job, estimated from earlier ones
         self.expected = 0.0
-        self.pieces = 0  # number of pieces of work done while the client is new
-        self.burst = 0.0  # seconds used since the client was last idle
+        self.pieces = 0  # number of jobs done while the client is new
+        self.burst = 0.0  # seconds used since the client was idle
         self.last_burst = 0.0  # seconds used in the previous burst
-        self.short_bursts = 0  # number of consecutive short bursts, up to INTERACTIVE_SLICES
+        self.short_bursts = 0  # number of consecutive short bursts, at most INTERACTIVE_SLICES
         self.is_queued = False
         self.is_closed = False
 
 
 class _Entry(NamedTuple):
-    """Queued work. The fields define the order: tag at which the work may end, tie-breaker, number, tag at which it starts."""
+    """A queued job. The fields define the order: tag at the expected end, tie-breaker, number, tag at the start."""
 
     end: float
     used: float
@@ -94,22 +94,22 @@ class _Entry(NamedTuple):
 
 
 class _FairQueue:
-    """The queued work of either the interactive or the bulk clients."""
+    """The queued jobs of either the interactive or the bulk clients."""
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
-        # highest start tag of the work that was run; update() sets it to ``highest`` if the queue is empty
+        # highest start tag of a job that has run; set to ``highest`` by update() if the queue is empty
         self.served = 0.0
-        self.highest = 0.0  # highest tag of a client that was served
+        self.highest = 0.0  # highest tag of a client that has been served
 
     def update(self) -> None:
-        """If no work is queued, set ``served`` to the highest tag, so that all clients that start now have the same tag."""
+        """If the queue is empty, set ``served`` to the highest tag, so that all clients that become active now are equal."""
         if not self.entries:
             self.served = self.highest
 
 
 class FairTurns:
-    """Schedules the work of all clients of a server. Used on one event loop."""
+    """Schedules the work of all clients of a server on one event loop."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class FairTurns:
         turn: float = TURN_SECONDS,
         slice_: float = SLICE_SECONDS,
     ) -> None:
-        """Create the scheduler. ``call_soon`` schedules a call in the next loop iteration; ``clock`` returns seconds.
+        """Create the scheduler. ``call_soon`` schedules a call for the next loop iteration; ``clock`` returns seconds.
 
         ``meter`` returns the seconds used to measure clients' use (default: ``clock``).
         """
@@ -129,37 +129,37 @@ class FairTurns:
         self._meter = meter or clock
         self._turn_seconds = turn
         self._slice = slice_
-        self._credit = turn  # seconds of work that may start without being queued
+        self._credit = turn  # seconds that work may use without being queued
         self._credited = clock()  # when the credit was last updated
-        self._new_expected = slice_  # seconds that a new client's piece of work may take
+        self._new_expected = slice_  # expected seconds of a new client's job
         self._interactive = _FairQueue()
         self._bulk = _FairQueue()
-        self._bulk_credit = 0.0  # seconds owed to bulk clients, which go first while this is at least a slice
+        self._bulk_credit = 0.0  # seconds owed to bulk clients, which go first if this is at least a slice
         self._numbers = itertools.count()
-        self._is_running = False  # True while a client's work is running
+        self._is_running = False  # whether a client's work is running
         self._is_scheduled = False  # True from call_soon() until the callback runs
 
     def __len__(self) -> int:
-        """Return the number of clients whose work is queued."""
+        """Return the number of clients with queued work."""
         queues = self._interactive, self._bulk
         return sum(not entry.share.is_closed for queue in queues for entry in queue.entries)
 
     @property
     def is_busy(self) -> bool:
-        """Return whether a client is waiting for its turn."""
+        """Return whether any client is waiting for its turn."""
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
-        """Add a client; return its share, which gives it no advantage over clients that have been idle."""
+        """Add a client; return its share, which starts with the same tag as the shares of idle clients."""
         self._interactive.update()
         return Share(work, self._interactive)
 
     def leave(self, share: Share) -> None:
-        """Stop running the client's work. Idempotent."""
+        """Stop running the work of a client. Idempotent."""
         share.is_closed = True
 
     def start(self, share: Share) -> bool:
-        """Run a client's work now or when it is its turn; return whether work is left. No effect while the client is queued."""
+        """Run a client's work, now or in its turn; return whether any work is left. No effect if the client is already queued."""
         if share.is_queued or share.is_closed:
             return share.is_queued
         if self._is_running or self.is_busy or not self._may_start_now():
@@ -182,7 +182,7 @@ class FairTurns:
         queue = self._queue_of(share)
         queue.update()
         if queue is not share.queue:
-            # A tag of one queue has no meaning in the other.
+            # The tags of one queue have no meaning in the other.
             share.queue = queue
             share.tag = queue.served
         share.is_queued = True
@@ -200,7 +200,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If several clients would end at the same tag, serve the one that has used the least time first.
+        # If several jobs would end at the same tag, the client that has used the least time comes first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 
@@ -215,7 +215,7 @@ class FairTurns:
             queue = self._next_queue()
             end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
-                # A new client's work is now expected to take longer than when this work was queued, so requeue it.
+                # A new client's job is now expected to take longer than when it was queued, so queue it again.
                 self._push(share, start)
                 continue
             share.is_queued = False
@@ -235,12 +235,12 @@ class FairTurns:
 
     def _update_bulk_credit(self, queue: _FairQueue, seconds: float) -> None:
         change = -seconds * (1 - BULK_SHARE) if queue is self._bulk else seconds * BULK_SHARE
-        # Bound the credit from above and below, so that time used long ago does not count.
+        # Clamp the credit, so that it does not accumulate over time.
         most = self._turn_seconds
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 
     def _run(self, share: Share, start: float) -> bool:
-        """Run some of a client's work, which starts at the tag ``start``. Return whether any is left."""
+        """Run some of a client's work, starting at the tag ``start``. Return whether any work is left."""
         if share.is_closed:
             return False
         end, before = self._clock() + self._slice, self._meter()
@@ -268,7 +268,7 @@ class FairTurns:
 
 
 def cpu_meter() -> Callable[[], float]:
-    """Return the clock of this thread's CPU time, or the monotonic clock if the CPU clock is too coarse (Windows: 16 ms).
+    """Return the clock of this thread's CPU time or, if that is too coarse (16 ms on Windows), the monotonic clock.
 
     By the monotonic clock, a client would also pay for other processes that use the processor during its work.
     """

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FrameRate", "Message", "Ping", "WebSocket"]
 
-_MAX_REASON = 123  # maximum bytes of a close frame's reason, by RFC 6455
+_MAX_REASON = 123  # maximum bytes of the reason in a close frame (RFC 6455)
 
 
 class Message(NamedTuple):
@@ -34,16 +34,16 @@ class Message(NamedTuple):
 
 
 class Ping(NamedTuple):
-    """A ping from the client; ``data`` must be sent back."""
+    """A ping from the client. The response must contain ``data``."""
 
     data: bytes
 
 
 class FrameRate:
-    """The number of frames that a client may send in one second."""
+    """Limits the number of frames per second that a client may send."""
 
     def __init__(self, max_frames: int) -> None:
-        self.count = 0  # frames handled in the current second
+        self.count = 0  # number of frames handled in the current second
         self._max_frames = max_frames
         self._start = 0.0  # start of the current second
 
@@ -53,7 +53,7 @@ class FrameRate:
         return self.count >= self._max_frames
 
     def update(self, now: float) -> None:
-        """Start a new one-second window if the current one has passed."""
+        """Start a new window of one second if the current one has ended."""
         if now - self._start >= 1.0:
             self._start, self.count = now, 0
 
@@ -63,12 +63,12 @@ class FrameRate:
 
 
 class WebSocket:
-    """The protocol state for one client: the handshake, the incomplete message, the close."""
+    """The protocol state of one client: the handshake, an incomplete message, and the close."""
 
     def __init__(
         self, select: Callable[[Sequence[str]], str | None], max_size: int, max_frames_a_second: int
     ) -> None:
-        """Create the state. ``select(offered)`` returns the sub-protocol to use; it raises NegotiationError to refuse all."""
+        """Create the state. ``select(offered)`` returns the sub-protocol to use, or raises NegotiationError to refuse all."""
         self.rate = FrameRate(max_frames_a_second)
         self._frames = FrameByFrame(
             select_subprotocol=lambda _, offered: _select(select, offered),
@@ -85,21 +85,21 @@ class WebSocket:
         self._frames.feed(data)
 
     def next_request(self) -> Request | None:
-        """Return the client's request, or None if it is not complete. Raise ValueError if it is not a request."""
+        """Return the client's request, or None if it is incomplete. Raise ValueError if it is not a request."""
         request = self._frames.next_request()
         if request is None and self._frames.handshake_exc:
             raise ValueError(str(self._frames.handshake_exc.__cause__ or self._frames.handshake_exc))
         return request
 
     def next_frame(self) -> Frame | None:
-        """Return the next complete frame, or None. Each frame counts toward the client's rate."""
+        """Return the next complete frame, or None. Count the frame against the client's quota."""
         frame = self._frames.next_frame()
         if frame is not None:
             self.rate.count += 1
         return frame
 
     def event_of(self, frame: Frame) -> Message | Ping | None:
-        """Return the ping in a frame, or the message that the frame completes, or None for any other frame."""
+        """Return the ping in a frame, the message that the frame completes, or None for any other frame."""
         if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
             self._opcode = frame.opcode
         elif frame.opcode is Opcode.PING:
@@ -118,12 +118,12 @@ class WebSocket:
 
     @property
     def has_unread(self) -> bool:
-        """Return whether there are received bytes that have not been parsed yet."""
+        """Return whether some received bytes have not been parsed yet."""
         return bool(self._frames.reader.buffer)
 
     @property
     def unfinished(self) -> int:
-        """Return the number of bytes in incomplete frames and messages."""
+        """Return the size in bytes of incomplete frames and messages."""
         return len(self._frames.reader.buffer) + len(self._fragments)
 
     def discard_unfinished(self) -> None:
@@ -132,7 +132,7 @@ class WebSocket:
         self._fragments.clear()
 
     def restrict(self, max_size: int) -> None:
-        """Refuse messages larger than ``max_size`` from now on."""
+        """From now on, refuse messages larger than ``max_size`` bytes."""
         self._frames.limit(max_size)
 
     # --- sending
@@ -144,20 +144,20 @@ class WebSocket:
 
     @property
     def is_open(self) -> bool:
-        """Return whether the handshake is done and neither side has sent a close frame."""
+        """Return whether the handshake is complete and neither side has sent a close frame."""
         return self._frames.state is State.OPEN
 
     @property
     def is_closed(self) -> bool:
-        """Return whether a close frame was sent."""
+        """Return whether this side has sent a close frame."""
         return self._frames.state in (State.CLOSING, State.CLOSED)
 
     def response_to(self, request: Request) -> Response:
-        """Return the response to the handshake; its status is 101 if the request is accepted."""
+        """Return the response to a handshake request; its status is 101 if the request is accepted."""
         return self._frames.accept(request)
 
     def accept(self, response: Response) -> None:
-        """Open the WebSocket by sending the response to the handshake."""
+        """Send the response to the handshake request, which opens the WebSocket."""
         self._frames.send_response(response)
 
     def ping(self, data: bytes) -> None:
@@ -165,11 +165,11 @@ class WebSocket:
         self._frames.send_ping(data)
 
     def close(self, code: int, reason: str) -> None:
-        """Queue a close frame; a long reason is truncated."""
+        """Queue a close frame. The reason is truncated if necessary."""
         self._frames.send_close(code, reason.encode()[:_MAX_REASON].decode(errors="ignore"))
 
     def data_to_send(self) -> tuple[bytes, ...]:
-        """Remove and return the bytes that the protocol has queued."""
+        """Remove and return the bytes that are queued for sending."""
         return tuple(piece for piece in self._frames.data_to_send() if piece)
 
 
@@ -180,7 +180,6 @@ def _select(
     return select(names)  # type: ignore[return-value]
 
 
-# The library logs each frame at DEBUG, and headers, which contain tokens.
-# This logger is not part of the logging hierarchy, and drops everything below CRITICAL.
-# Its messages therefore never appear, whatever the logging configuration.
+# The library logs frames, and headers with tokens, at level DEBUG.
+# These must never be logged, so use a separate logger that drops everything below CRITICAL.
 _QUIET = logging.Logger(__name__, logging.CRITICAL)

@@ -18,7 +18,7 @@ _MAX_FRAMES = 1000
 
 
 class FramePair:
-    """A source frame seen from a target frame. The transform is sent if it has changed by more than a threshold (m, rad)."""
+    """A source frame and a target frame. Their transform is sent after it has changed by more than a threshold (m, rad)."""
 
     def __init__(self, source: str, target: str, angle: float, distance: float) -> None:
         self.source = source
@@ -31,7 +31,7 @@ class FramePair:
         self._sent: Transform | None = None
 
     def is_to_be_sent(self, transform: Transform) -> bool:
-        """Return whether a transform differs enough from the last one sent. If so, record it as sent."""
+        """Return whether a transform differs enough from the last one that was sent. If so, record it as sent."""
         if not (
             self._sent is None
             or not self._angle
@@ -45,7 +45,7 @@ class FramePair:
 
 
 def pairs_of(request: TFSubscriptionGoal | RepublishTFsRequest) -> list[FramePair]:
-    """Return the pairs in a request, from its source_frames, target_frame, angular_thres and trans_thres.
+    """Return the frame pairs of a request, from its source_frames, target_frame, angular_thres and trans_thres.
 
     Raise BridgeError if there are too many frames.
     """
@@ -63,7 +63,7 @@ def _distance(one: Vector3, other: Vector3) -> float:
 
 
 def _angle(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle between two quaternions. As in the real node, this is half the angle of rotation."""
+    """Return the angle between two quaternions. As in the real node, it is half the angle of rotation."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)
     if not norm:

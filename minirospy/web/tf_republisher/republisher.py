@@ -32,11 +32,11 @@ _DEFAULT_RATE = 10.0
 _MAX_RATE = 1000.0
 _MAX_REQUESTS = 1000
 _A_TURN = 50
-"""Number of frames to look up before letting other tasks run."""
+"""Number of frames to look up before other tasks may run."""
 
 
 class _Closing(Protocol):
-    """A part that is closed together with the republisher."""
+    """A part of the republisher that must be closed with it."""
 
     async def close(self) -> None: ...
 
@@ -55,7 +55,7 @@ class Republisher:
         self._reporter = ErrorReporter(node.log, "republishing transforms")
 
     async def start(self) -> None:
-        """Start listening to transforms, and offer the action and the service."""
+        """Subscribe to the transforms, and offer the action and the service."""
         await self._buffer.start()
         server = ActionServer(self.node, self._name, TFSubscriptionAction, self._execute, concurrent=True)
         self._closing.append(server)
@@ -87,7 +87,7 @@ class Republisher:
             await self.node.sleep(period)
 
     async def _republish(self, request: RepublishTFsRequest) -> object:
-        """Publish transforms on a separate topic until it has had no subscribers for ``timeout``."""
+        """Publish transforms on a separate topic until it has had no subscribers for a time of ``timeout``."""
         if len(self._requests) >= _MAX_REQUESTS:
             raise ServiceException(f"{_MAX_REQUESTS} requests are served: no more")
         try:
@@ -100,7 +100,7 @@ class Republisher:
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         task.add_done_callback(self._reporter.of_task)
-        # A rosbridge client subscribes without giving a type, so the master must know the topic before the response is sent.
+        # A rosbridge client subscribes without a type, so the master must know the topic before the response is sent.
         await publisher
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}
@@ -129,7 +129,7 @@ class Republisher:
                 await self.node.sleep(period)
 
     async def _changed(self, pairs: list[FramePair]) -> list[TransformStamped]:
-        """Return the transforms that must be sent."""
+        """Return the transforms that have changed enough to be sent."""
         found = []
         for number, pair in enumerate(pairs, 1):
             if not number % _A_TURN:

@@ -11,16 +11,16 @@ __all__ = ["Capacity"]
 
 
 class Capacity:
-    """A limit of ``units`` for concurrent work. Runs on the loop."""
+    """Limits concurrent work to ``units``. Runs on the loop."""
 
     def __init__(self, units: int) -> None:
         self.units = units
-        self.taken_units = 0  # units that running work has acquired
+        self.taken_units = 0  # units in use by running work
         self._waiting: deque[tuple[int, asyncio.Future[None]]] = deque()
 
     @asynccontextmanager
     async def taken(self, units: int) -> AsyncIterator[None]:
-        """Wait until ``units`` are free, and hold them for the block. Work that exceeds the limit runs alone."""
+        """Acquire ``units`` for the duration of the context. Work that exceeds the limit runs alone."""
         units = min(units, self.units)
         if self._waiting or self.taken_units + units > self.units:
             turn = asyncio.get_running_loop().create_future()
@@ -29,7 +29,7 @@ class Capacity:
                 await turn
             except asyncio.CancelledError:
                 if not turn.cancelled():
-                    self.taken_units -= units  # the units were acquired just before the cancellation
+                    self.taken_units -= units  # the units were granted just before the cancellation
                 self._admit()
                 raise
         else:

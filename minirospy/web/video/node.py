@@ -19,7 +19,7 @@ _WITHOUT_EFFECT = ("server_threads", "ros_threads", "publish_rate")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the node until it is shut down; return the exit status."""
+    """Run the node until it shuts down; return the exit status."""
     return exit_status("web_video_server", lambda: run("web_video_server", argv, _start, _announce))
 
 
@@ -29,7 +29,7 @@ async def _start(node: Node) -> Bridge:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options set by a node's private parameters. Raise BridgeError if one is invalid."""
+    """Return the options given by a node's private parameters. Raise BridgeError if one of them is invalid."""
     return BridgeOptions(
         address=address_of(private),
         foxglove_port=None,

@@ -40,14 +40,14 @@ class Picture:
 
 @dataclass(frozen=True)
 class VideoRequest:
-    """A request for a topic's images in one encoding."""
+    """A request for the images on a topic, in one encoding."""
 
     topic: str
     picture: Picture
 
 
 def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoRequest:
-    """Parse a query. Raise BridgeError if the topic is missing, the type is not supported, or a number is invalid."""
+    """Parse a request's query. Raise BridgeError if the topic is missing, the type is unsupported, or a number is invalid."""
     topic = query.get("topic", "")
     if not topic:
         raise BridgeError("the topic is missing: give ?topic=/camera/image_raw")
@@ -69,7 +69,7 @@ def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoR
         _number(query, "height", None, 1, _MAX_PIXELS),
         "invert" in query and query["invert"].lower() not in ("false", "0"),
     )
-    # As in web_video_server, subscribe to the "compressed" subtopic.
+    # As in web_video_server, this type subscribes to the topic's "compressed" subtopic.
     return VideoRequest(f"{topic}/compressed" if type_ == "ros_compressed" else topic, picture)
 
 
@@ -87,7 +87,7 @@ def _number(query: Mapping[str, str], name: str, default: int | None, low: int, 
 
 
 def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
-    """Return the header of an image in a stream. ``data`` and :data:`END` follow it."""
+    """Return the header of one image in a stream; ``data`` and :data:`END` must follow it."""
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
     return (
         f"Content-Type: {content_type}\r\nX-Timestamp: {seconds}.{rest:09d}\r\nContent-Length: {len(data)}\r\n\r\n"
@@ -95,11 +95,11 @@ def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
 
 
 END = b"\r\n" + START
-"""The end of an image, including the next boundary: a browser shows an image only once it has received that boundary."""
+"""The end of an image, with the next boundary: a browser does not show an image before it receives that boundary."""
 
 
 def topics_page(topics: Mapping[str, str], token: str) -> bytes:
-    """Return the page with the image topics and their types; ``token`` is the request's token."""
+    """Return the page that lists the image topics and their types. ``token`` is the token of the request."""
     rows = []
     for topic, type_ in sorted(topics.items()):
         links = " ".join(

@@ -22,9 +22,9 @@ __all__ = ["VideoPages"]
 
 SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
-"""Maximum number of concurrent feeds (one per topic and encoding). Each feed encodes every image."""
+"""Maximum number of concurrent feeds, one per topic and encoding, each of which encodes every image."""
 _MAX_KEPT = 32_000_000
-"""Maximum total bytes of the encoded images that feeds keep for new clients. Images beyond that are not kept."""
+"""Maximum total size in bytes of the encoded images that are stored for new clients; further ones are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -40,7 +40,7 @@ Listener = Callable[[File | BridgeError], None]
 
 
 class _Feed:
-    """A topic's images in one encoding. A worker encodes the newest image, as often as possible."""
+    """Encodes a topic's images in one encoding. A worker always encodes the newest image."""
 
     def __init__(self, graph: SharedGraph, request: VideoRequest, shared: _Shared) -> None:
         self.listeners: list[Listener] = []
@@ -91,7 +91,7 @@ class _Feed:
         self._work = None
 
     def _keep(self, found: File | BridgeError | None) -> None:
-        """Store the last encoded image, unless all feeds together would exceed _MAX_KEPT."""
+        """Store the last encoded image, unless the images of all feeds would then exceed _MAX_KEPT."""
         self._shared.kept -= _size(self.last)
         self.last = found
         if self._shared.kept + _size(found) > _MAX_KEPT:
@@ -105,7 +105,7 @@ def _size(found: File | BridgeError | None) -> int:
 
 @dataclass
 class _Shared:
-    """State that all feeds share: the limit on concurrently processed pixels, and the bytes of stored images."""
+    """State shared by all feeds: the limit of concurrently processed pixels, and the total size of stored images."""
 
     work: Capacity
     kept: int = 0
@@ -203,7 +203,7 @@ class VideoPages:
     # --- internals
 
     async def _look(self, exchange: Exchange) -> Snapshot | None:
-        """Return the graph. If it cannot be read, send an error response and return None."""
+        """Return the graph. If it cannot be read, send an error response, and return None."""
         try:
             found = await fetch(self._graph.node.call_master)
         except (MasterUnreachableError, RpcError) as error:
@@ -215,7 +215,7 @@ class VideoPages:
         self, exchange: Exchange, request: VideoRequest, start: Callable[[], None]
     ) -> None:
         graph = await self._look(exchange)
-        # If the client has disconnected in the meantime, do not start: nothing would end the stream.
+        # If the client has disconnected meanwhile, do not start, because nothing would end the stream.
         if graph is None or not exchange.is_open:
             return
         topic = self._graph.node.resolve(request.topic)
@@ -232,7 +232,7 @@ class VideoPages:
             start()
 
     def _join(self, exchange: Exchange, request: VideoRequest, listener: Listener) -> Callable[[], None]:
-        """Send the images to a client.
+        """Send a topic's images to a client.
 
         Return a function that stops sending, which is also called when the client disconnects.
         """
@@ -260,7 +260,7 @@ class VideoPages:
 
 
 def _nothing() -> None:
-    """Do nothing, for a stream that has not started."""
+    """Do nothing, because the stream has not started."""
 
 
 def _refuse(exchange: Exchange, status: int, why: str) -> None:

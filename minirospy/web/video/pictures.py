@@ -26,21 +26,21 @@ MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarg
 _LENGTH = struct.Struct("<I")
 _DEPTH_HEADER = struct.Struct(
     "<iff"
-)  # header of compressedDepth: an enum, and two floats that convert inverse depths to depths
+)  # header of compressedDepth: an enum, and two floats for converting inverse depths to depths
 _ALIASES = {"uyvy": "yuv422"}  # ROS 2's names for ROS 1 encodings
 _YUYV = ("yuv422_yuy2", "yuyv")
-# cv_bridge shows numbers of three or four channels as colors in OpenCV's order
+# cv_bridge interprets numbers in three or four channels as colours, in OpenCV's order
 _AS_COLORS = {"8UC4": "bgr8", "16UC3": "bgr16", "16UC4": "bgr16"}
-_STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
-# Number of leading bytes of a file in which to search for the image's size; other data, such as a preview, may precede it.
+_STAMPED = 12  # bytes of a header before the length of its frame_id: seq and stamp
+# Number of bytes in which to search for the image's size, which may follow other data, such as a preview.
 _HEAD_BYTES = 100_000
-# number of rows of a numeric image to scale per step; as 64-bit numbers they take eight times the memory
+# number of rows of a numeric image scaled per step, as 64-bit numbers that take eight times the memory
 _ROWS = 256
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Encode a serialized message's image as a file; return the file and its content type.
+    """Encode the image in a serialized message; return the file's bytes and content type.
 
     Raise BridgeError if it cannot be converted.
     """
@@ -69,7 +69,7 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
     except Exception as error:  # image libraries raise many types of exceptions for invalid data
         why: object = error
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
-            # Clients receive this text, so do not include the install command, which contains the interpreter's path.
+            # Clients receive this text, so omit the install command, which contains the interpreter's path.
             why = "it needs OpenCV or Pillow: install minirospy[images] on the server"
         raise BridgeError(f"the image cannot be shown: {why}") from error
 
@@ -79,16 +79,16 @@ def _content_type(data: bytes) -> str:
 
 
 def _is_as_wanted(data: bytes, picture: Picture) -> bool:
-    """Return whether a compressed image can be sent to the client unchanged."""
+    """Return whether a compressed image can be sent to the client without changes."""
     is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
     found = _content_type(data)
     if found == "image/png" and data[24:25] == b"\x10" and picture.format:
-        return False  # browsers show only the upper 8 of the 16 bits per channel
+        return False  # browsers show only the upper 8 of 16 bits per channel
     return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
 
 
 def _decompressed(data: bytes, format_: str) -> Pixels:
-    """Return a compressed image as 8-bit gray or BGR. ``format_`` is the message's, such as ``16UC1; png compressed``.
+    """Decode a compressed image to 8-bit gray or BGR. ``format_`` is the message's field, such as ``16UC1; png compressed``.
 
     Raise ValueError if it is not an image.
     """
@@ -106,7 +106,7 @@ def _decompressed(data: bytes, format_: str) -> Pixels:
 
 
 def _depths(data: bytes, encoding: str) -> Pixels:
-    """Return the depths of a compressed depth image: in millimetres, or in metres if ``encoding`` is 32FC1.
+    """Return the depths in a compressed depth image, in metres if ``encoding`` is 32FC1, otherwise in millimetres.
 
     Raise ValueError if it is not a compressed depth image.
     """
@@ -125,7 +125,7 @@ def _depths(data: bytes, encoding: str) -> Pixels:
 
 
 def _colors(image: Pixels, encoding: str) -> Pixels:
-    """Return an image as 8-bit gray or BGR; a numeric image is scaled to its largest value."""
+    """Convert an image to 8-bit gray or BGR. Scale a numeric image to its largest value."""
     if encoding in ("mono8", "bgr8", "8UC1", "8UC3"):
         return image
     if encoding in _AS_COLORS:
@@ -141,7 +141,7 @@ def _colors(image: Pixels, encoding: str) -> Pixels:
 
 
 def _scaled(image: Pixels) -> Pixels:
-    """Return a numeric image in gray. The largest value becomes white; negative values, infinities and NaN become black."""
+    """Convert a numeric image to gray. The largest value becomes white; negative and non-finite values become black."""
     import numpy as np
 
     def values(start: int) -> Pixels:
@@ -158,7 +158,7 @@ def _scaled(image: Pixels) -> Pixels:
 
 
 def work_of(type_: str, body: bytes | memoryview) -> int:
-    """Return the number of pixels to process for a serialized message, as far as it can be determined in advance."""
+    """Return the number of pixels to process for a serialized message, if it can be determined in advance."""
     if type_ != COMPRESSED:
         return len(body) // 3
     try:
@@ -183,13 +183,13 @@ def _of_bayer(image: Pixels, pattern: str) -> Pixels:
     cv2 = opencv()
     if cv2 is None or min(image.shape) < 3:
         return debayered(image, pattern)
-    # OpenCV names a Bayer pattern by the pixels in its second row and column.
+    # OpenCV names Bayer patterns by the pixels in the second row and column.
     name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[pattern]
     return cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))  # type: ignore[no-any-return]
 
 
 def _changed(image: Pixels, picture: Picture) -> Pixels:
-    """Return an image scaled to the requested size, rotated by 180 degrees if requested."""
+    """Return an image scaled to the requested size and, if requested, rotated by 180 degrees."""
     if picture.is_inverted:
         image = image[::-1, ::-1]
     height, width = image.shape[:2]

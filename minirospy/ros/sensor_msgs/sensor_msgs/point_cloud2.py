@@ -70,7 +70,7 @@ def read_points(
     skip_nans: bool = False,
     uvs: Iterable[tuple[int, int]] = (),
 ) -> Iterator[Point]:
-    """Yield a tuple of values for each point: the values of ``field_names``, in the order of their offsets.
+    """Yield a tuple of values for each point: the values of ``field_names``, ordered by the fields' byte offsets.
 
     ``skip_nans`` omits points with a NaN in one of these fields; ``uvs`` selects the points to yield, as (column, row).
     Raise AssertionError if ``cloud`` is not a PointCloud2, struct.error if the data ends before the last point.
@@ -85,7 +85,7 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # Creating the tuples takes most of the time. zip is fastest: it reuses tuples that the caller has dropped.
+        # Creating the tuples dominates the run time. zip is fastest because it reuses tuples that the caller has dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
 
@@ -106,7 +106,7 @@ def read_points_list(
 
     points = read_points(cloud, field_names, skip_nans, uvs)
     # Convert the first point here, so that a field with more than one value raises TypeError immediately.
-    # One point is enough: all have the same number of values.
+    # One point is enough, because all points have the same number of values.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -149,7 +149,7 @@ def read_points_numpy(
 def create_cloud(
     header: Header, fields: Sequence[PointField], points: Sequence[Iterable[float]] | Values
 ) -> PointCloud2:
-    """Return a cloud of these points.
+    """Return a PointCloud2 with these fields and points.
 
     Each point has one value per field. ``points`` may be an array with one row per point.
 
@@ -191,12 +191,12 @@ def _check_type(cloud: PointCloud2) -> None:
 def _get_struct_fmt(
     is_bigendian: bool, fields: Iterable[PointField], field_names: Collection[str] | None = None
 ) -> str:
-    """Return a point's ``struct`` format. Programs use this function, although it is also private in ROS."""
+    """Return the ``struct`` format of one point. User programs call this function, although it is private in ROS, too."""
     return _format(is_bigendian, _columns(fields, field_names))
 
 
 def _columns(fields: Iterable[PointField], field_names: Collection[str] | None) -> list[Column]:
-    """Return the columns of the named fields. As in ROS, read them in sequence, even if they overlap."""
+    """Return the columns of the named fields. As in ROS, overlapping fields are read one after the other."""
     columns, end = [], 0
     for field in sorted(fields, key=lambda each: each.offset):
         if field_names is not None and field.name not in field_names:
@@ -227,14 +227,14 @@ def _offsets(cloud: PointCloud2) -> Iterator[int]:
 
 
 def _is_whole(cloud: PointCloud2, size: int) -> bool:
-    """Return whether the data is bytes, with ``point_step`` bytes for each point."""
+    """Return whether the cloud's data is a bytes object with ``point_step`` bytes for each point."""
     if not isinstance(cloud.data, bytes | bytearray | memoryview) or not 0 < size <= cloud.point_step:
         return False
     return len(cloud.data) >= (cloud.height - 1) * cloud.row_step + cloud.width * cloud.point_step
 
 
 def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
-    """Yield the byte offset and (rows, columns) of each block of a cloud, in the order of the points."""
+    """Yield the byte offset and the shape (rows, columns) of each block of points in a cloud, in the points' order."""
     height, width = cloud.height, cloud.width
     if cloud.row_step == width * cloud.point_step:
         # If there is no padding between the rows, treat them as a single row.
@@ -249,7 +249,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
 def _values(
     cloud: PointCloud2, columns: Iterable[Column], offset: int, shape: tuple[int, int], *, skip_nans: bool
 ) -> list[memoryview]:
-    """Return the values in a block of a cloud, with one sequence per value of a point."""
+    """Return the values in a block of a cloud: one sequence for each value that a point has."""
     import numpy as np
 
     order = ">" if cloud.is_bigendian else "<"

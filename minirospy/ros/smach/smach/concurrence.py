@@ -39,7 +39,7 @@ class Concurrence(Container):
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
         child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
     ) -> None:
-        """Create the container. ``outcome_map`` maps an outcome to a dict from label to that state's outcome.
+        """Create the container. ``outcome_map`` maps each outcome of the container to a dict {label: outcome of that state}.
 
         ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states).
         If it returns a true value, the other states are preempted.
@@ -57,7 +57,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below. Notified when the states that are still executing have to finish.
+        # Guards the attributes below. Notified when the states that are still executing must finish.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -85,7 +85,7 @@ class Concurrence(Container):
 
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a state to the open container and return the state. ``remapping`` maps the state's keys to the container's keys."""
+        """Add a state to the open container; return the state. ``remapping`` maps the state's keys to the container's keys."""
         concurrence = Concurrence._currently_opened_container()
         concurrence._states[label] = state
         concurrence._remappings[label] = remapping or {}
@@ -109,7 +109,7 @@ class Concurrence(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute all states; return the outcome. Raise InvalidStateError if a state fails."""
+        """Execute all states; return the container's outcome. Raise InvalidStateError if a state fails."""
         if not self._states:
             raise InvalidStateError("No states was added to concurrence")
         self._copy_input_keys(parent_ud, self.userdata)
@@ -187,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the container can finish now that this state has finished."""
+        """Return whether the container can finish now that another state has finished."""
         others_end = False
         if self._child_termination_cb:
             try:
@@ -244,11 +244,11 @@ class Concurrence(Container):
         return outcome
 
     def is_running(self) -> bool:
-        """Return whether the container is executing."""
+        """Return whether this container is executing."""
         return self._is_running
 
     def request_preempt(self) -> None:
-        """Preempt the container and its states."""
+        """Ask the container and its states to stop."""
         with self._done_cond:
             super().request_preempt()
             self._done_cond.notify_all()
@@ -264,7 +264,7 @@ class Concurrence(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add ``userdata`` to the container's userdata; ``initial_states`` has no effect, because all states are started."""
+        """Add ``userdata`` to the container's userdata. ``initial_states`` has no effect: the container starts all states."""
         if 0 < len(initial_states) < len(self._states):
             logwarn(
                 "Attempting to set initial states in Concurrence container, but Concurrence children are always all "
@@ -281,7 +281,7 @@ class Concurrence(Container):
         return [label for label, outcome in self._child_outcomes.items() if outcome is None]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the outcome map as edges: (outcome, label, container outcome)."""
+        """Return the outcome map as edges: (state's outcome, label, container's outcome)."""
         return [
             (outcome, label, target)
             for target, outcomes in self._outcome_map.items()

@@ -27,7 +27,7 @@ Callback = Callable[..., object]
 
 
 class Container(State):
-    """A state that contains states; subclasses execute them.
+    """A state that contains other states. Subclasses define how these are executed.
 
     Callbacks are called when the container starts (userdata, initial states), at each transition (userdata, active states),
     and when it finishes (userdata, the last states, the outcome).
@@ -70,7 +70,7 @@ class Container(State):
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions as (outcome, label of the state, target label or container outcome)."""
+        """Return the transitions as (outcome, label of the state, label of the next state or container's outcome)."""
         raise NotImplementedError
 
     def check_consistency(self) -> None:
@@ -90,15 +90,15 @@ class Container(State):
     # Callbacks.
 
     def register_start_cb(self, start_cb: Callback, cb_args: Sequence[object] = ()) -> None:
-        """Call a function with userdata, initial states and ``cb_args`` when the container starts."""
+        """Register a function to be called with userdata, initial states and ``cb_args`` when the container starts."""
         self._start_cbs.append((start_cb, cb_args))
 
     def register_transition_cb(self, transition_cb: Callback, cb_args: Sequence[object] = ()) -> None:
-        """Call a function with userdata, active states and ``cb_args`` at each transition."""
+        """Register a function to be called with userdata, active states and ``cb_args`` at each transition."""
         self._transition_cbs.append((transition_cb, cb_args))
 
     def register_termination_cb(self, termination_cb: Callback, cb_args: Sequence[object] = ()) -> None:
-        """Call a function with userdata, last states, outcome and ``cb_args`` when the container finishes."""
+        """Register a function to be called with userdata, last states, outcome and ``cb_args`` when the container finishes."""
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
@@ -155,7 +155,7 @@ class Container(State):
             self.close()
 
     def open(self) -> None:
-        """Open the container. Until ``close``, ``add`` adds states to it."""
+        """Open the container: ``add`` then adds states to it until ``close`` is called."""
         Container._construction_lock.acquire()
         Container._construction_stack.append(self)
 
@@ -179,7 +179,7 @@ class Container(State):
         return bool(stack) and stack[-1] is self
 
     def assert_opened(self, msg: str = "") -> None:
-        """Raise InvalidConstructionError if the container is not open."""
+        """Raise InvalidConstructionError with ``msg`` if the container is not open."""
         if not self.is_opened():
             raise InvalidConstructionError(msg)
 

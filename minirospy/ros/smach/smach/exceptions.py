@@ -22,11 +22,11 @@ class SmachError(Exception):
 
 
 class InvalidTransitionError(SmachError):
-    """Raised if a state does not have this outcome, or the transition's target does not exist."""
+    """Raised if a transition is for an outcome that its state does not have, or leads to a missing target."""
 
 
 class InvalidStateError(SmachError):
-    """Raised if a state cannot be added, or a container was not constructed correctly."""
+    """Raised if a state cannot be added, or a container was set up incorrectly."""
 
 
 class InvalidUserCodeError(SmachError):
@@ -34,4 +34,4 @@ class InvalidUserCodeError(SmachError):
 
 
 class InvalidConstructionError(SmachError):
-    """Raised if a container was used before it was opened."""
+    """Raised if ``add`` or a similar function is called while no container is open."""

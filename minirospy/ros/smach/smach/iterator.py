@@ -20,7 +20,7 @@ Items = Iterable[object] | Callable[[], Iterable[object]]
 
 
 class Iterator(Container):
-    """Executes its state with each item in the userdata, until an outcome breaks the loop or no items are left."""
+    """Executes its state once per item, with the item in the userdata, until an outcome breaks the loop or no items are left."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Iterator(Container):
 
     @staticmethod
     def set_iteritems(it: Items, it_label: str = "it_data") -> None:
-        """Set the open iterator's items, or a function that returns them, and the userdata key for the current item."""
+        """Set the open iterator's items, or a function that returns them, and the userdata key that holds the current item."""
         iterator = Iterator._currently_opened_container()
         iterator._items = it
         iterator._items_label = it_label
@@ -64,7 +64,7 @@ class Iterator(Container):
         break_outcomes: Sequence[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
     ) -> None:
-        """Set the state for the open iterator.
+        """Set the open iterator's state.
 
         An outcome in ``break_outcomes`` ends the loop; if ``break_outcomes`` is empty, any outcome that is not in
         ``loop_outcomes`` does. ``final_outcome_map`` maps the state's last outcome to the iterator's outcome.
@@ -90,7 +90,7 @@ class Iterator(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute the state for each item. Return the mapped last outcome, or the exhausted outcome if no items are left."""
+        """Execute the state for each item. Return the last outcome, mapped, or the exhausted outcome if no items are left."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
         self._is_running = True
@@ -145,7 +145,7 @@ class Iterator(Container):
         return self._is_running
 
     def request_preempt(self) -> None:
-        """Preempt the loop and the executing state."""
+        """Ask the loop and its executing state to stop."""
         self._preempt_requested = True
         if self._is_running:
             self._state.request_preempt()
@@ -153,11 +153,11 @@ class Iterator(Container):
     # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
-        """Return the state as ``{label: state}``."""
+        """Return the contained state as a dict {label: state}."""
         return {self._state_label: self._state}
 
     def __getitem__(self, key: str) -> State:
-        """Return the state; log and raise KeyError for any other label."""
+        """Return the contained state; for any other label, log an error and raise KeyError."""
         if key != self._state_label:
             logerr(
                 f"Attempting to get state '{key}' from Iterator container. The only available state is "
@@ -168,7 +168,7 @@ class Iterator(Container):
         return state
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add ``userdata`` to the iterator's userdata; log and raise KeyError for any state except the contained one."""
+        """Add ``userdata`` to the iterator's userdata. For any state but the contained one, log an error and raise KeyError."""
         if len(initial_states) > 1:
             logwarn(
                 "Attempting to set initial state to include more than one state, but Iterator container can only have one "
@@ -183,7 +183,7 @@ class Iterator(Container):
         self.userdata.update(userdata)
 
     def get_initial_states(self) -> list[str]:
-        """Return the label of the state."""
+        """Return a list with the label of the contained state."""
         return [self._state_label]
 
     def get_active_states(self) -> list[str]:
@@ -191,7 +191,7 @@ class Iterator(Container):
         return [self._state_label] if self._is_running else []
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions: to the state itself, to None, or to the iterator's outcome."""
+        """Return the transitions (outcome, label, target); the target is the state itself, the iterator's outcome, or None."""
         loops: list[tuple[str, str, str | None]] = [
             (outcome, self._state_label, self._state_label) for outcome in self._loop_outcomes
         ]

@@ -17,12 +17,12 @@ _loggers: dict[str, Logger] = {
 
 
 def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:
-    """Replace the log functions for the whole process; each is called with one string."""
+    """Replace smach's log functions for the whole process. Each function receives one string."""
     _loggers.update(info=info, warn=warn, debug=debug, error=error)
 
 
 def loginfo(msg: object) -> None:
-    """Log a message about the machine's progress."""
+    """Log a message about the execution of a container."""
     _loggers["info"](str(msg))
 
 

@@ -13,7 +13,7 @@ __all__ = ["Sequence"]
 
 
 class Sequence(StateMachine):
-    """Executes its states in order, as long as they return the connector outcome."""
+    """Executes its states in order until one returns an outcome other than the connector outcome."""
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ __all__ = ["CBState", "State"]
 
 
 class State:
-    """A state: ``execute`` is called with the declared userdata, and returns one of the declared outcomes."""
+    """A state. ``execute`` receives the userdata that the state declared, and returns one of the declared outcomes."""
 
     def __init__(
         self,
@@ -31,11 +31,11 @@ class State:
         raise NotImplementedError
 
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
-        """Add outcomes."""
+        """Declare more outcomes."""
         self._outcomes = self._outcomes.union(new_outcomes)
 
     def get_registered_outcomes(self) -> tuple[str, ...]:
-        """Return the outcomes."""
+        """Return the declared outcomes."""
         return tuple(self._outcomes)
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
@@ -61,11 +61,11 @@ class State:
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:
-        """Preempt the state. Its ``execute`` should check ``preempt_requested`` and return soon."""
+        """Ask the state to stop. Its ``execute`` should check ``preempt_requested`` and return soon."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Acknowledge the preemption by clearing the request."""
+        """Mark the preemption request as handled."""
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:
@@ -73,12 +73,12 @@ class State:
         self._preempt_requested = False
 
     def preempt_requested(self) -> bool:
-        """Return whether the state was preempted."""
+        """Return whether the state was asked to stop."""
         return self._preempt_requested
 
 
 class CBState(State):
-    """A state whose ``execute`` is a function of the userdata."""
+    """A state whose ``execute`` calls a function with the userdata."""
 
     def __init__(
         self,
@@ -97,12 +97,12 @@ class CBState(State):
         adopt_interface(self, cb)
 
     def execute(self, ud: Values) -> str | None:
-        """Call the function."""
+        """Call the function and return its outcome."""
         return self._cb(ud, *self._cb_args, **self._cb_kwargs)
 
 
 def adopt_interface(state: State, cb: object) -> None:
-    """Add the keys and outcomes that a callback declares with ``cb_interface`` to a state."""
+    """Add the keys and outcomes declared by a ``cb_interface`` callback to a state."""
     if has_smach_interface(cb):
         state.register_input_keys(cb.get_registered_input_keys())
         state.register_output_keys(cb.get_registered_output_keys())

@@ -23,7 +23,7 @@ Transitions = Mapping[str, "str | None"]
 
 
 class StateMachine(Container):
-    """A state machine. A state's outcome leads to another state, or to an outcome of the machine.
+    """A state machine: each outcome of a state leads to another state, or becomes the outcome of the machine.
 
     An outcome without a target leads to the machine's outcome of the same name.
     """
@@ -38,16 +38,16 @@ class StateMachine(Container):
         self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
-        # For `add_auto`: the last added state's label, and that state's outcomes that lead to the next state.
+        # For `add_auto`: the label of the state added last, and those of its outcomes that lead to the next state.
         self._last_added_label: str | None = None
         self._connector_outcomes: Sequence[str] = ()
 
         self._is_running = False
         self._current_label: str | None = None
-        # The state that was preempted but may not have handled the preemption yet.
+        # The preempted state, which may not have handled the request yet.
         self._preempted_label: str | None = None
         self._preempted_state: State | None = None
-        # Only released while a state executes, so that a preemption never occurs between two states.
+        # Released only while a state executes, so that a preemption never occurs between two states.
         self._state_transitioning_lock = threading.RLock()
 
     def __getstate__(self) -> dict[str, object]:
@@ -87,7 +87,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Like ``add``, but let the state's ``connector_outcomes`` lead to the next added state."""
+        """Add a state like ``add``, but let its ``connector_outcomes`` lead to the state that is added next."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
@@ -171,7 +171,7 @@ class StateMachine(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute states until one leads to an outcome of the machine, and return that outcome; return None at a shutdown."""
+        """Execute states until one leads to an outcome of the machine. Return that outcome, or None at a shutdown."""
         with self._state_transitioning_lock:
             try:
                 self.check_consistency()
@@ -200,7 +200,7 @@ class StateMachine(Container):
         return outcome
 
     def _step(self) -> str | None:
-        """Execute the current state; return the machine's outcome if the state's outcome leads to one."""
+        """Execute the current state. Return the machine's outcome if the state leads to one, otherwise None."""
         label = self._current_label
         if label is None or label not in self._states:
             raise InvalidStateError(
@@ -231,7 +231,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """If the machine is preempted and the previous state has not handled it, preempt the next state before it executes."""
+        """If the preempted state has not handled the request, preempt the next state before it executes."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")
@@ -294,7 +294,7 @@ class StateMachine(Container):
     # Preemption.
 
     def request_preempt(self) -> None:
-        """Preempt the machine and the executing state."""
+        """Ask the machine and the executing state to stop."""
         with self._state_transitioning_lock:
             self._preempt_requested = True
             if self._current_label is not None:
@@ -318,7 +318,7 @@ class StateMachine(Container):
         return self._states
 
     def __getitem__(self, key: str) -> State:
-        """Return the state with this label; if there is no such state, log and raise KeyError."""
+        """Return the state with this label. If there is no such state, log an error and raise KeyError."""
         if key not in self._states:
             logerr(
                 f"Attempting to get state '{key}' from StateMachine container. The only available states are: "
@@ -341,15 +341,15 @@ class StateMachine(Container):
             self.userdata.update(userdata)
 
     def get_initial_states(self) -> list[str]:
-        """Return the label of the initial state."""
+        """Return a list with the label of the initial state."""
         return [str(self._initial_state_label)]
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the executing state, or "None" if no state is executing."""
+        """Return a list with the label of the executing state, or with "None" if no state is executing."""
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions: (outcome, label, target)."""
+        """Return the transitions as (outcome, label of the state, target)."""
         return [
             (outcome, label, target)
             for label, targets in self._transitions.items()

@@ -23,7 +23,7 @@ class UserData:
         self._data.update(other_userdata._data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return copies of some values under new names. ``remapping`` maps the new names to keys in this object."""
+        """Return a new UserData with copies of the values of ``keys``. ``remapping`` maps their new names to ``keys``."""
         names = {outer: inner for inner, outer in remapping.items()}
         if len(names) != len(remapping):
             logerr(f"SMACH userdata remapping is not one-to-one: {remapping}")
@@ -33,7 +33,7 @@ class UserData:
         return extracted
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Copy some values from another UserData. ``remapping`` maps its keys to this object's keys."""
+        """Copy the values of ``keys`` from another UserData. ``remapping`` maps that object's keys to this object's keys."""
         for key in keys:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 
@@ -66,7 +66,7 @@ class UserData:
 
 
 def get_const(obj: object) -> object:
-    """Return a read-only view of an object that has attributes; return any other object unchanged."""
+    """Return a read-only view of an object if it has attributes; return any other object unchanged."""
     if not hasattr(obj, "__dict__"):
         return obj
     logdebug(f"Making const '{obj}'")
@@ -98,7 +98,7 @@ class Const:
 
 
 class Remapper:
-    """A state's view of a container's userdata. It contains the declared keys, under the state's own names for them.
+    """A state's view of a container's userdata: only the declared keys, under the names that the state uses.
 
     A value whose key is an input key but not an output key is read-only (``get_const``). Writing a key that is not an
     output key is logged and has no effect; reading a key that is not an input key raises InvalidUserCodeError.

@@ -11,7 +11,7 @@ _checks: dict[str, Callable[[], bool]] = {"shutdown": lambda: False}
 
 
 def is_shutdown() -> bool:
-    """Return whether containers must stop after the current state."""
+    """Return whether containers must stop after the state that is executing."""
     return _checks["shutdown"]()
 
 
@@ -21,12 +21,12 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
 
 
 def has_smach_interface(obj: object) -> TypeGuard[CBInterface]:
-    """Return whether an object declares its outcomes, input keys and output keys."""
+    """Return whether an object declares outcomes, input keys and output keys."""
     return all(hasattr(obj, f"get_registered_{name}") for name in ("input_keys", "output_keys", "outcomes"))
 
 
 class CBInterface:
-    """A callback that declares outcomes and userdata keys. They are added to the state that uses the callback."""
+    """A callback that declares outcomes and userdata keys, which are added to the state that uses the callback."""
 
     def __init__(
         self,
@@ -71,5 +71,5 @@ class cb_interface:  # noqa: N801 - ROS's name
         self._interface = outcomes, input_keys, output_keys
 
     def __call__(self, cb: Callable[..., object]) -> CBInterface:
-        """Return the callback with its interface."""
+        """Return the callback, wrapped so that it declares these outcomes and keys."""
         return CBInterface(cb, *self._interface)

@@ -36,7 +36,7 @@ class ActionServerWrapper:
         expand_goal_slots: bool = False,
         pack_result_slots: bool = False,
     ) -> None:
-        """Set the userdata keys: the container reads the goal, and writes feedback and result.
+        """Store the names of the container's userdata keys for the goal, the feedback and the result.
 
         ``goal_slots_map`` and ``result_slots_map`` map fields of the goal and of the result to keys. If
         ``expand_goal_slots`` and ``pack_result_slots``, every field is used under its own name.
@@ -72,13 +72,13 @@ class ActionServerWrapper:
         )
 
     def run_server(self) -> None:
-        """Start the action server; return immediately."""
+        """Start the action server without blocking."""
         self._action_server.register_preempt_callback(self.preempt_cb)
         self._action_server.start()
         rospy.loginfo(f"Started SMACH action server wrapper, advertising as '{self._server_name}'")
 
     def transition_cb(self, userdata: UserData, active_states: list[str]) -> None:
-        """Publish the feedback in the container's userdata."""
+        """Publish the feedback in the container's userdata after a transition."""
         self.publish_feedback(userdata)
 
     def termination_cb(self, userdata: UserData, terminal_states: list[str], container_outcome: str) -> None:

@@ -15,7 +15,7 @@ __all__ = ["StateCallback"]
 
 
 class StateCallback:
-    """A state's callback, which may be None.
+    """A callback that belongs to a state; it may be None.
 
     Its userdata contains the keys that the callback declares with ``cb_interface``, or else those in the state's arguments.
     """
@@ -49,7 +49,7 @@ class StateCallback:
         self._state = state
 
     def adopt(self) -> None:
-        """Add the keys and outcomes that the callback declares to the state."""
+        """Add the keys and outcomes that the callback declares to its state."""
         adopt_interface(self._state, self._callback)
 
     def __bool__(self) -> bool:
@@ -59,7 +59,7 @@ class StateCallback:
         return str(self._callback)
 
     def __call__(self, ud: Values, *values: object) -> tuple[bool, object]:
-        """Call the callback; return (whether it raised no exception, its return value). An exception is logged."""
+        """Call the callback. Return (True, its return value), or (False, None) and log the error if it raises an exception."""
         if self._callback is None:
             return True, None
         seen = Remapper(ud, self._input_keys, self._output_keys)

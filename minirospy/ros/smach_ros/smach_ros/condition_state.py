@@ -14,7 +14,7 @@ __all__ = ["ConditionState"]
 
 
 class ConditionState(State):
-    """Waits until a condition is met.
+    """A state that waits until a condition is met.
 
     Outcomes: "true" when the condition is met, "false" after the last check or the timeout, "preempted".
     """
@@ -41,7 +41,7 @@ class ConditionState(State):
         self._max_checks = max_checks
 
     def execute(self, ud: Values) -> str:
-        """Check the condition until the outcome is known."""
+        """Check the condition until it is met, the checks or the time run out, or the state is preempted; return the outcome."""
         start = rospy.Time.now()
         checks = 0
         while self._max_checks == -1 or checks <= self._max_checks:

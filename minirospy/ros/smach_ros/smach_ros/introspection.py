@@ -34,12 +34,12 @@ STRUCTURE_TOPIC = "/smach/container_structure"
 
 _QUEUE_SIZE = 20
 _CONNECT_SECONDS = 2.0
-"""Seconds for which a command waits for the connection to the server."""
+"""Time in seconds that a command waits for a connection to the server."""
 _RESEND_SECONDS = 0.3
 
 
 class IntrospectionClient:
-    """Finds introspection servers, and sets their containers' initial states."""
+    """Finds introspection servers, and sets the initial states of their containers."""
 
     def get_servers(self) -> list[str]:
         """Return the names of the servers that are publishing."""
@@ -105,7 +105,7 @@ def _is_set(status: SmachContainerStatus, initial_states: Sequence[str], data: d
 
 
 class ContainerProxy:
-    """Publishes one container on a server's topics."""
+    """Publishes the structure and status of one container on a server's topics."""
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ class ContainerProxy:
         path: str,
         update_rate: rospy.Duration = rospy.Duration(2.0),  # noqa: B008 - a Duration does not change
     ) -> None:
-        """Create the proxy. ``update_rate`` is the interval between messages while nothing changes."""
+        """Create the proxy. ``update_rate`` is the interval between status messages while the status does not change."""
         self._path = path
         self._container = container
         self._update_rate = update_rate
@@ -242,5 +242,5 @@ class IntrospectionServer:
         self._proxies.append(proxy)
 
     def clear(self) -> None:
-        """Remove all containers."""
+        """Remove all containers from the server."""
         self._proxies = []

@@ -16,7 +16,7 @@ _SHUTDOWN_CHECK = 0.1  # seconds between checks for a shutdown
 
 
 class MonitorState(State):
-    """Checks the messages on a topic against a condition.
+    """A state that checks the messages on a topic against a condition.
 
     Outcomes: "valid" after ``max_checks`` messages that meet the condition, "invalid" at the first message that does not meet
     it, "preempted".
@@ -46,7 +46,7 @@ class MonitorState(State):
         self._trigger_event = threading.Event()
 
     def execute(self, ud: Values) -> str:
-        """Check the topic's messages until the outcome is known. At a shutdown, the outcome is "preempted"."""
+        """Check messages until the outcome is known; return it. At a shutdown, the outcome is "preempted"."""
         if self.preempt_requested():
             self.service_preempt()
             return "preempted"
@@ -79,6 +79,6 @@ class MonitorState(State):
             self._trigger_event.set()
 
     def request_preempt(self) -> None:
-        """Preempt the state, so that it finishes without waiting for another message."""
+        """Ask the state to stop, without waiting for another message."""
         super().request_preempt()
         self._trigger_event.set()

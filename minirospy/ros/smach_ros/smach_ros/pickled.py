@@ -21,14 +21,14 @@ from minirospy.core.idl.load import get_message_class, get_service_class
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 
 _RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg", "numpy.core": "numpy._core"}
-"""Module names in Python 2 and in older numpy versions, with their current names."""
+"""Maps module names in Python 2 and in older numpy versions to their current names."""
 _MESSAGE = re.compile(r"(\w+)\.(msg|srv)\._(\w+)")
 _TEXTS = "SU"
 _SIMPLE = "biufc" + _TEXTS  # numpy dtype kinds for numbers and strings; other kinds may contain pointers
 
 
 def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
-    """Pickle the values to a string; return it, and the keys of omitted values, which cannot be pickled."""
+    """Pickle userdata values. Return the string, and the keys of the values that were omitted because they cannot be pickled."""
     try:
         return _encoded(dict(data)), []
     except Exception:  # noqa: BLE001 - values of the user's: pickle raises what their classes raise
@@ -45,7 +45,7 @@ def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
 
 
 def unpickle_userdata(text: str) -> dict[str, object]:
-    """Return the values in a string. Raise ValueError if the string is invalid or contains values that are not allowed."""
+    """Return the userdata in a pickled string. Raise ValueError if it is malformed or contains objects that are not allowed."""
     try:
         data = _Unpickler(io.BytesIO(base64.b64decode(text, validate=True))).load()
     except Exception as error:
@@ -63,7 +63,7 @@ _set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
 
 
 class _Unpickler(pickle._Unpickler):
-    """pickle's Python unpickler, used instead of the one in C so that operations can be checked before they run."""
+    """pickle's unpickler in Python, used instead of the one in C so that each operation can be checked before it runs."""
 
     stack: list[Any]
     read: Callable[[int], bytes]
@@ -76,14 +76,14 @@ class _Unpickler(pickle._Unpickler):
         if made := _MAKERS.get(f"{module}.{name}"):
             return made
         if match := _MESSAGE.fullmatch(module):
-            # Find the class by its message type: importing a module named in the data would execute that module.
+            # Find the class by its message type: importing a module named in the data would execute its code.
             for found in _classes(f"{match[1]}/{match[3]}", match[2]):
                 if found.__name__ == name:
                     return found
         raise pickle.UnpicklingError(f"{module}.{name} is not a plain value or a message")
 
     def load_build(self) -> None:
-        """Set an object's state. Refuse classes, which are shared, and numpy dtypes, whose state could corrupt memory."""
+        """Set an object's state. Reject classes, which are shared, and numpy dtypes, because a bad state could corrupt memory."""
         target, state = self.stack[-2:]
         if callable(target):
             raise pickle.UnpicklingError("the state of a class")
@@ -92,7 +92,7 @@ class _Unpickler(pickle._Unpickler):
         _set_state(self)  # type: ignore[arg-type]
 
     def load_bytearray8(self) -> None:
-        """Create a bytearray from the available bytes; pickle would first allocate the size given in the data."""
+        """Create a bytearray from the available bytes; pickle would first allocate the size stated in the data."""
         size = int.from_bytes(self.read(8), "little")
         self.append(bytearray(self.read(size)))
 
@@ -112,8 +112,8 @@ def _classes(name: str, kind: str) -> tuple[Any, ...]:
 
 
 def _check_dtype(target: Any, state: Any) -> None:
-    """Raise UnpicklingError unless the state leaves a numpy dtype unchanged except for its byte order."""
-    # Allow only the values that numpy itself writes: it would accept any string size, even a negative one, and any flags.
+    """Raise UnpicklingError if the state changes anything in a numpy dtype except its byte order."""
+    # Allow only values that numpy writes: numpy itself would accept any string size, even a negative one, and any flags.
     size, alignment = (target.itemsize, target.alignment) if target.kind in _TEXTS else (-1, -1)
     allowed = [(3, order, None, None, None, size, alignment, target.flags) for order in "<>=|"]
     if target.kind not in _SIMPLE or tuple(state) not in allowed:
@@ -121,7 +121,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Wrap a constructor so that it accepts only these argument types. A number, for example, would be taken as a size."""
+    """Wrap a constructor so that it accepts only arguments of these types. A number, for example, could be read as a size."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):
@@ -149,7 +149,7 @@ def _simple_dtype(name: object, *_: object) -> Any:
     found = np.dtype(name if isinstance(name, str) else "O")
     if found.kind not in _SIMPLE:
         raise pickle.UnpicklingError(f"an array of {name}")
-    # Return a copy, because the state that is set afterwards must not change numpy's own dtype.
+    # Return a copy: pickle sets its state next, which must not change numpy's shared dtype.
     return np.dtype(found.str, copy=True)
 
 
@@ -170,7 +170,7 @@ def _scalar(dtype: Any, data: Any) -> object:
 def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    # Reject another array: setting its state afterwards could free its memory.
+    # Reject arrays: setting the state of this result afterwards could free their memory.
     if type(data) not in (bytes, bytearray):
         raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
     return np.frombuffer(data, dtype, count)

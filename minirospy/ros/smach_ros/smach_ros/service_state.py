@@ -15,7 +15,7 @@ __all__ = ["ServiceState"]
 
 
 class ServiceState(State):
-    """Calls a service.
+    """A state that calls a service.
 
     Outcomes: "succeeded", "aborted", "preempted", and the callback's outcomes. The outcome is "aborted" if there is no
     request or no response, or if a callback raises an exception.
@@ -67,7 +67,7 @@ class ServiceState(State):
         self.register_outcomes(outcomes)
 
     def execute(self, ud: Values) -> str:
-        """Call the service."""
+        """Call the service and return the outcome."""
         if self.preempt_requested():
             rospy.loginfo(f"Preempting {self._service_name} before sending request.")
             self.service_preempt()
@@ -86,7 +86,7 @@ class ServiceState(State):
         return self._take_response(ud, response)
 
     def _connect(self) -> str | None:
-        """Wait for the service; return an outcome if the service does not become available."""
+        """Wait for the service. Return an outcome if it does not become available, otherwise None."""
         while self._proxy is None:
             if self.preempt_requested():
                 rospy.loginfo(f"Preempting while waiting for service '{self._service_name}'.")
@@ -106,7 +106,7 @@ class ServiceState(State):
         return None
 
     def _make_request(self, ud: Values) -> str | None:
-        """Build the request; return an outcome if the request cannot be built."""
+        """Build the request. Return an outcome if that fails, otherwise None."""
         if self._request_key is not None:
             if self._request_key not in ud:
                 rospy.logerr(

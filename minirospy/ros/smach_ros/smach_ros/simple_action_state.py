@@ -25,7 +25,7 @@ _MINUTE = rospy.Duration(60.0)
 
 
 class SimpleActionState(State):
-    """Sends a goal and waits for its result.
+    """A state that sends a goal to an action server and waits for the result.
 
     Outcomes: "succeeded", "preempted", "aborted" (in all other cases), and the callback's outcomes.
     """
@@ -130,7 +130,7 @@ class SimpleActionState(State):
             self._action_client.cancel_goal()
 
     def execute(self, ud: Values) -> str:
-        """Send the goal and wait for its result."""
+        """Send the goal, wait for its result and return the outcome."""
         failure = self._connect() or self._make_goal(ud)
         if failure:
             return failure
@@ -145,7 +145,7 @@ class SimpleActionState(State):
         return self._take_result(ud) if is_done else "aborted"
 
     def _connect(self) -> str | None:
-        """Wait for the server; return an outcome if the server does not become available."""
+        """Wait for the action server. Return an outcome if it does not become available, otherwise None."""
         if self._status == SimpleActionState.WAITING_FOR_SERVER:
             rospy.logwarn(f"Still waiting for action server '{self._action_name}' to start... is it running?")
             if self._action_wait_thread.is_alive():
@@ -164,7 +164,7 @@ class SimpleActionState(State):
         return None
 
     def _make_goal(self, ud: Values) -> str | None:
-        """Build the goal; return an outcome if the goal cannot be built."""
+        """Build the goal. Return an outcome if that fails, otherwise None."""
         if self._goal_key is not None:
             self._goal = ud[self._goal_key]
         for key in self._goal_slots:
@@ -177,7 +177,7 @@ class SimpleActionState(State):
         return None
 
     def _wait_for_result(self) -> bool:
-        """Return whether the result has arrived; cancel the goal if the result takes too long."""
+        """Return whether a result has arrived; after the timeout, cancel the goal."""
         cancelled: rospy.Time | None = None
 
         while not self._done.wait(_LOOK):
@@ -192,7 +192,7 @@ class SimpleActionState(State):
                     )
                     return False
             elif self.preempt_requested():
-                # Cancel the goal here, because the preemption may have been requested just before the goal was sent.
+                # Cancel the goal here, too: the preemption may have been requested just before the goal was sent.
                 self._action_client.cancel_goal()
                 cancelled = now
             elif self._exec_timeout and now - self._activate_time > self._exec_timeout:

@@ -14,7 +14,7 @@ __all__ = ["set_preempt_handler"]
 
 
 def set_preempt_handler(sc: StateMachine | Concurrence | Iterator) -> None:
-    """Preempt a container when the node shuts down, and wait until the container has finished.
+    """When the node shuts down, preempt the container and wait until it has finished.
 
     If the container executes in the thread that handles the shutdown, do not wait, because the container could never finish.
     """

@@ -23,7 +23,7 @@ __all__ = ["Sound", "SoundClient"]
 
 
 class Options(TypedDict, total=False):
-    """The additional arguments of every method that plays a sound."""
+    """Optional arguments of all methods that play a sound."""
 
     blocking: bool
     replace: bool
@@ -71,11 +71,11 @@ class SoundClient:
         self.sub = rospy.Subscriber(f"{sound_action}/status", GoalStatusArray, self._action_status_cb)
 
     def voiceSound(self, s: str, volume: float = 1.0) -> Sound:
-        """Return a sound that speaks ``text``."""
+        """Return a sound that speaks the text ``s``."""
         return Sound(self, SoundRequest.SAY, s, volume=volume)
 
     def waveSound(self, sound: str, volume: float = 1.0) -> Sound:
-        """Return a sound that plays a file."""
+        """Return a sound that plays a sound file."""
         return Sound(self, SoundRequest.PLAY_FILE, _place(sound), volume=volume)
 
     def builtinSound(self, id: int, volume: float = 1.0) -> Sound:
@@ -95,35 +95,35 @@ class SoundClient:
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_STOP, text)
 
     def playWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Play a file."""
+        """Play a sound file once."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_ONCE, _place(sound), vol=volume, **kwargs)
 
     def startWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Play a file repeatedly."""
+        """Play a sound file repeatedly."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_START, _place(sound), vol=volume, **kwargs)
 
     def stopWave(self, sound: str) -> None:
-        """Stop playing a file."""
+        """Stop playing a sound file."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_STOP, _place(sound))
 
     def playWaveFromPkg(
         self, package: str, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]
     ) -> None:
-        """Play a file from a package."""
+        """Play a sound file from a package once."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_ONCE, sound, package, volume, **kwargs)
 
     def startWaveFromPkg(
         self, package: str, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]
     ) -> None:
-        """Play a file from a package repeatedly."""
+        """Play a sound file from a package repeatedly."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_START, sound, package, volume, **kwargs)
 
     def stopWaveFromPkg(self, sound: str, package: str) -> None:
-        """Stop playing a file from a package."""
+        """Stop playing a sound file from a package."""
         self.sendMsg(SoundRequest.PLAY_FILE, SoundRequest.PLAY_STOP, sound, package)
 
     def play(self, sound: int, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Play a built-in sound, for example SoundRequest.BACKINGUP."""
+        """Play a built-in sound once, for example SoundRequest.BACKINGUP."""
         self.sendMsg(sound, SoundRequest.PLAY_ONCE, "", vol=volume, **kwargs)
 
     def start(self, sound: int, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
@@ -151,7 +151,7 @@ class SoundClient:
         blocking: bool | None = None,
         **kwargs: object,
     ) -> None:
-        """Send a request. If a timeout is None, wait indefinitely for the server, or for the end of the sound."""
+        """Send a request to soundplay_node. A timeout of None waits indefinitely for the server, or for the sound to end."""
         request = SoundRequest(sound=snd, command=cmd, volume=max(0, min(1, vol)), arg=s, arg2=arg2)
         if not (self._blocking if blocking is None else blocking):
             self.pub.publish(request)
@@ -181,7 +181,7 @@ def _waits(timeout: times.Duration | None) -> bool:
 
 
 def _place(sound: str) -> str:
-    """Return a file's absolute path; a relative path refers to the package's sound folder."""
+    """Return the absolute path of a sound file; a relative path starts in the package's sound folder."""
     if sound.startswith("/") or Path(sound).is_absolute():
         return sound
     return f"{RosPack().get_path('sound_play')}/sounds/{sound}"

@@ -43,11 +43,11 @@ Key = tuple[int, str, str]
 
 
 class SoundError(Exception):
-    """Raised if a sound cannot be played. The message states the reason and a remedy."""
+    """Raised if a sound cannot be played. The message states the reason and a fix."""
 
 
 class PlayingSound:
-    """A program that plays a sound, once or repeatedly. A separate thread controls it."""
+    """A player process that plays a sound once or repeatedly, controlled by a separate thread."""
 
     def __init__(self, command: Command, repeats: bool) -> None:
         self._command = command
@@ -101,10 +101,10 @@ class PlayingSound:
 
 
 class SoundNode:
-    """The node, and the sounds that are playing, keyed by request."""
+    """The sound node. Holds the playing sounds, keyed by request."""
 
     def __init__(self, folder: Path) -> None:
-        """Create the node. ``folder`` is the folder for the package's sound files."""
+        """Create the node. ``folder`` contains the package's sound files."""
         self._folder = folder
         self._default_voice = str(rospy.get_param("~default_voice", "") or "")
         self._device = str(rospy.get_param("~device", "") or "")
@@ -121,7 +121,7 @@ class SoundNode:
         self._server.start()
 
     def handle(self, request: SoundRequest) -> PlayingSound | None:
-        """Play or stop the sound in a request; return the playing sound. Raise SoundError if the sound cannot be played."""
+        """Play or stop the requested sound; return the playing sound. Raise SoundError if the sound cannot be played."""
         with self._lock:
             key = (request.sound, request.arg, request.arg2)
             if request.command == SoundRequest.PLAY_STOP:
@@ -187,7 +187,7 @@ class SoundNode:
             rospy.logerr(str(error))
 
     def _execute(self, goal: SoundRequestGoal) -> None:
-        """Stop all other sounds and play the requested sound, with feedback, until it has ended."""
+        """Stop all other sounds, play the requested sound to its end, and publish feedback meanwhile."""
         self.close()
         start = rospy.Time.now()
         feedback = SoundRequestFeedback()

@@ -13,7 +13,7 @@ Which = Callable[[str], "str | None"]
 
 @dataclass(frozen=True)
 class Command:
-    """A program with its arguments, its input on stdin, and variables to add to its environment."""
+    """A program with its arguments, the text for its stdin, and additions to its environment."""
 
     words: Sequence[str]
     text: str | None = None
@@ -24,7 +24,7 @@ def _powershell(script: str) -> list[str]:
     return ["-NoProfile", "-NonInteractive", "-Command", script]
 
 
-# The file is the last argument, except for PowerShell, whose script contains it.
+# The file is the last argument, except in the PowerShell command, where the script contains it.
 PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
     "paplay": lambda file, volume: [f"--volume={round(volume * 65536)}", file],
     "pw-play": lambda file, volume: [f"--volume={volume:.3f}", file],
@@ -64,13 +64,13 @@ _ON_DEVICE: dict[str, Callable[[str], list[str]]] = {
 }
 """Functions that return a player's option for an output device; other programs read the variables of _variables()."""
 
-_DEFAULTS = ("", "default")  # names of the machine's output device
+_DEFAULTS = ("", "default")  # device names that mean the machine's default output
 _ALSA = re.compile(r"(?:plug|dmix|sysdefault|front|surround\d+|iec958|hdmi)?(?:hw)?:(?:CARD=)?(\w+)")
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
 
 def _espeak(voice: str, volume: float) -> list[str]:
-    # Names like voice_kal_diphone are festival's voices.
+    # Names such as voice_kal_diphone are festival's voices, which espeak does not have.
     names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
     return ["--stdin", "-a", str(round(volume * 100)), *names]
 
@@ -85,11 +85,11 @@ def installable(programs: Iterable[str], platform: str) -> list[str]:
 
 
 def play_command(file: str, volume: float, which: Which, device: str = "") -> Command | None:
-    """Return the command that plays a file, or None if there is no player.
+    """Return the command that plays a file, or None if no player is installed.
 
     ``device`` is an ALSA name, such as ``hw:1``, or a name of the sound server (default: the machine's output device).
     """
-    # Only aplay accepts ALSA names.
+    # Try aplay first, because only aplay accepts ALSA names.
     names = sorted(PLAYERS, key=lambda name: name != "aplay") if _ALSA.match(device) else PLAYERS
     for name in names:
         program = which(name)
@@ -100,7 +100,7 @@ def play_command(file: str, volume: float, which: Which, device: str = "") -> Co
 
 
 def say_command(text: str, voice: str, volume: float, which: Which, device: str = "") -> Command | None:
-    """Return the command that speaks ``text`` on a device, or None if there is no such program."""
+    """Return the command that speaks ``text`` on a device, or None if no such program is installed."""
     for name, make in SPEAKERS.items():
         program = which(name)
         if program:
@@ -110,7 +110,7 @@ def say_command(text: str, voice: str, volume: float, which: Which, device: str 
 
 
 def _variables(device: str) -> dict[str, str]:
-    """Return the variables that name an output device to the libraries of programs without an option for it."""
+    """Return environment variables that select an output device, for programs that have no option for it."""
     if device in _DEFAULTS:
         return {}
     if alsa := _ALSA.match(device):

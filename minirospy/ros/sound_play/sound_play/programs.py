@@ -86,7 +86,7 @@ def playpackage() -> int:
 
 
 def shutup() -> int:
-    """Stop all sounds every 100 ms, until Ctrl-C; return the exit status."""
+    """Send "stop all sounds" every 100 ms until Ctrl-C; return the exit status."""
     rospy.init_node("shutup", anonymous=True)
     client = SoundClient()
     _connect(client)
@@ -102,7 +102,7 @@ def shutup() -> int:
 
 
 def is_speaking() -> int:
-    """Publish whether the action named by ~robotsound is active on ~output/is_speaking; return the exit status."""
+    """Publish on ~output/is_speaking whether the action on ~robotsound has an active goal; return the exit status."""
     rospy.init_node("is_speaking")
     active = {GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
     state = {"is_speaking": False}
@@ -125,7 +125,7 @@ def _play(
     request: Callable[[SoundClient, list[str], float], object],
     is_right: Callable[[str], bool] = lambda word: word != "--help",
 ) -> int:
-    """Send a request with the first ``count`` arguments of the command line and a volume; return the exit status."""
+    """Send a request built from ``count`` command-line arguments and an optional volume; return the exit status."""
     words = rospy.myargv()[1:]
     if not count <= len(words) <= count + 1 or not is_right(words[0]):
         return _usage(usage, text)
@@ -141,7 +141,7 @@ def _request(name: str, request: Callable[[SoundClient], object]) -> int:
     with suppress(rospy.ROSInterruptException):
         _connect(client)
         request(client)
-        # The node exits next, so wait until the message has probably been sent.
+        # The node exits next, so give the message time to be sent.
         rospy.sleep(0.2)
     return 0
 
@@ -153,7 +153,7 @@ def _connect(client: SoundClient) -> None:
 
 
 def _volume(words: list[str]) -> float | None:
-    """Return the volume from the command line; print an error and return None if it is not a number."""
+    """Return the volume argument, or 1.0 if it is missing; print an error and return None if it is not a number."""
     try:
         return float(words[0]) if words else 1.0
     except ValueError:

@@ -26,7 +26,7 @@ BUILTIN: dict[int, tuple[float, ...]] = {
 
 
 def wav_of(notes: tuple[float, ...]) -> bytes:
-    """Return the notes as a WAV file: mono, 16 bits, all notes equally long."""
+    """Return the notes as a mono, 16-bit WAV file; all notes have the same length."""
     count = int(_RATE * _NOTE_SECONDS)
     samples = array.array("h")
     for note in notes:

@@ -13,7 +13,7 @@ __all__ = ["TransformBroadcaster"]
 
 
 class TransformBroadcaster:
-    """Publishes transforms on /tf. ``queue_size`` has no effect, as in real ROS."""
+    """Publishes transforms on /tf. As in real ROS, ``queue_size`` has no effect."""
 
     def __init__(self, queue_size: int = 100) -> None:
         self.tf2_broadcaster = broadcasters.TransformBroadcaster()
@@ -26,7 +26,7 @@ class TransformBroadcaster:
         child: str,
         parent: str,
     ) -> None:
-        """Publish the pose of ``child`` in ``parent``: (x, y, z) and a quaternion (x, y, z, w)."""
+        """Publish the pose of frame ``child`` in frame ``parent``: (x, y, z) and a quaternion (x, y, z, w)."""
         message = TransformStamped(child_frame_id=child)
         message.header.frame_id = parent
         message.header.stamp = time

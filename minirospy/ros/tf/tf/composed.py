@@ -87,7 +87,7 @@ def decompose_matrix(matrix: ArrayLike) -> tuple[Floats, list[float], list[float
         perspective = numpy.dot(m[:, 3], numpy.linalg.inv(affine.T))
     translate = m[3, :3].copy()
 
-    # Use the Gram-Schmidt process: a row's components along earlier rows are the shear.
+    # Gram-Schmidt process: the shear is a row's component along each earlier row.
     rows = m[:3, :3].copy()
     scale, shear = numpy.zeros(3), [0.0, 0.0, 0.0]
     scale[0] = vector_norm(rows[0])
@@ -124,7 +124,7 @@ def compose_matrix(
     translate: ArrayLike | None = None,
     perspective: ArrayLike | None = None,
 ) -> Floats:
-    """Compose a matrix from the values that :func:`decompose_matrix` returns."""
+    """Compose a matrix; the arguments are the values that :func:`decompose_matrix` returns."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -171,7 +171,7 @@ def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> Floats:
 def superimposition_matrix(
     v0: ArrayLike, v1: ArrayLike, scaling: bool = False, usesvd: bool = True
 ) -> Floats:
-    r"""Return the rotation, translation and, if requested, scaling that moves points ``v0`` nearest to ``v1``.
+    r"""Return the matrix that best maps points ``v0`` onto ``v1``: a rotation, a translation and, if requested, a scaling.
 
     Both have the shape (3, \*) or (4, \*), with at least three points. Uses Kabsch's method with singular values (1976), or
     Horn's with quaternions (1987). Raise ValueError if the shapes are different or too small.
@@ -191,7 +191,7 @@ def superimposition_matrix(
         u, _, vh = numpy.linalg.svd(numpy.dot(second, first.T))
         rotation = numpy.dot(u, vh)
         if numpy.linalg.det(rotation) < 0.0:
-            # This is a reflection, so negate the direction of the smallest singular value.
+            # A negative determinant means a reflection, so reverse the direction with the smallest singular value.
             rotation -= numpy.outer(u[:, 2], vh[2, :] * 2.0)
         matrix[:3, :3] = rotation
     else:
@@ -203,7 +203,7 @@ def superimposition_matrix(
 
 
 def _horn(first: Floats, second: Floats) -> Floats:
-    """Return the quaternion of the best rotation: the eigenvector of Horn's matrix with the largest eigenvalue."""
+    """Return the quaternion of the best-fit rotation: the eigenvector of Horn's matrix for its largest eigenvalue."""
     import numpy
 
     s = numpy.dot(first, second.T)
@@ -222,7 +222,7 @@ def _horn(first: Floats, second: Floats) -> Floats:
 
 
 class Arcball:
-    """A virtual trackball: converts mouse movements in a window to rotations. Source: Shoemake, Graphics Gems IV (1994)."""
+    """A virtual trackball that converts mouse movements in a window to rotations. Source: Shoemake, Graphics Gems IV (1994)."""
 
     def __init__(self, initial: ArrayLike | None = None) -> None:
         """Start with the rotation ``initial``, a quaternion or a matrix. Raise ValueError for any other value."""
@@ -256,7 +256,7 @@ class Arcball:
         self._center = numpy.asarray(center, dtype=numpy.float64)[:2]
 
     def setaxes(self, *axes: ArrayLike) -> None:
-        """Set the axes to which rotations can be constrained. Without arguments, remove the constraint."""
+        """Set the axes that rotations can be constrained to. Without arguments, remove the constraint."""
         self._axes = [unit_vector(axis) for axis in axes] if axes else None
 
     def setconstrain(self, constrain: bool) -> None:
@@ -293,19 +293,19 @@ class Arcball:
             self._qnow = quaternion_multiply(turn, self._qdown)
 
     def next(self, acceleration: float = 0.0) -> None:
-        """Continue the rotation of the last drag."""
+        """Continue the last drag's rotation."""
         self._qpre, self._qnow = (
             self._qnow,
             quaternion_slerp(self._qpre, self._qnow, 2.0 + acceleration, 0, False),
         )
 
     def matrix(self) -> Floats:
-        """Return the rotation as a 4x4 matrix."""
+        """Return the current rotation as a 4x4 matrix."""
         return quaternion_matrix(self._qnow)
 
 
 def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) -> Floats:
-    """Map a point in the window to the unit sphere. Outside the ball, return the closest point on its rim."""
+    """Map a point in the window to the unit sphere. For a point outside the ball, return the nearest point on the rim."""
     import numpy
 
     at, centre = numpy.asarray(point), numpy.asarray(center)
@@ -318,7 +318,7 @@ def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) ->
 
 
 def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> Floats:
-    """Return the point on the sphere that is closest to a point and perpendicular to an axis."""
+    """Return the point on the unit sphere that is perpendicular to ``axis`` and closest to ``point``."""
     import numpy
 
     along = numpy.array(axis, dtype=numpy.float64)

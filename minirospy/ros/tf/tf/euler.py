@@ -32,7 +32,7 @@ Axes = str | tuple[int, int, int, int]
 
 
 def _sequences() -> dict[str, tuple[int, int, int, int]]:
-    """Return (first axis, parity, repetition, frame) for each axes string.
+    """Return a dict from each axes string to its (first axis, parity, repetition, frame).
 
     The angles about rotating axes are the angles about static axes in reverse order.
     """
@@ -56,7 +56,7 @@ TUPLE_TO_AXES = {value: key for key, value in AXES_TO_TUPLE.items()}
 
 
 def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix for three rotations in radians; ``axes`` is a string or a tuple.
+    """Return the 4x4 matrix of three rotations in radians; ``axes``, a string or a tuple, gives their order.
 
     Raise KeyError if ``axes`` is unknown.
     """
@@ -84,7 +84,7 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArra
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, float, float]:
-    """Return the angles of a rotation matrix, 3x3 or larger. Several triples are possible; return one of them.
+    """Return three Euler angles for a rotation matrix, 3x3 or larger. If there are several solutions, return one.
 
     Raise KeyError if ``axes`` is unknown.
     """
@@ -97,7 +97,7 @@ def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, fl
 def euler_from_quaternion(
     quaternion: Sequence[float] | NDArray[numpy.float64], axes: Axes = "sxyz"
 ) -> tuple[float, float, float]:
-    """Return the angles of a quaternion [x, y, z, w], which need not be normalized.
+    """Return the three Euler angles of a quaternion [x, y, z, w], which need not be normalized.
 
     Raise KeyError if ``axes`` is unknown, ValueError if the quaternion does not have four numbers.
     """
@@ -105,7 +105,7 @@ def euler_from_quaternion(
 
 
 def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArray[numpy.float64]:
-    """Return the quaternion [x, y, z, w] for three rotations, in radians. Raise KeyError if ``axes`` is unknown."""
+    """Return the quaternion [x, y, z, w] of three rotations in radians. Raise KeyError if ``axes`` is unknown."""
     import numpy
 
     first, parity, repetition, frame = _tuple(axes)
@@ -134,7 +134,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
 
 
 def rotation_rows(quaternion: Sequence[float] | NDArray[numpy.float64]) -> list[list[float]]:
-    """Return the rows of the 3x3 matrix for a quaternion, which need not be normalized; the identity for a zero quaternion."""
+    """Return the rows of the 3x3 matrix for a quaternion of any length; a zero quaternion gives the identity."""
     x, y, z, w = (float(each) for each in quaternion[:4])
     square = x * x + y * y + z * z + w * w
     if square < EPSILON:
@@ -164,7 +164,7 @@ def _angles(m: list[list[float]], axes: Axes) -> tuple[float, float, float]:
     if is_regular:
         ax, az = math.atan2(ends[0], ends[1]), math.atan2(ends[2], ends[3])
     else:
-        # Gimbal lock: two axes coincide, so let the first angle describe the whole rotation.
+        # Gimbal lock: two of the axes coincide, so put the whole rotation into the first angle.
         ax, az = math.atan2(-m[j][k], m[j][j]), 0.0
     if parity:
         ax, middle, az = -ax, -middle, -az

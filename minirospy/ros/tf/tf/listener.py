@@ -55,28 +55,28 @@ def strip_leading_slash(s: str) -> str:
 
 
 class Transformer:
-    """Stores transforms and performs lookups. ``interpolate`` has no effect."""
+    """Stores transforms and looks them up. ``interpolate`` has no effect."""
 
     def __init__(self, interpolate: bool = True, cache_time: Moment | None = None) -> None:
         self._buffer = Buffer(cache_time, debug=False)
         self._using_dedicated_thread = False
 
     def allFramesAsDot(self, current_time: Moment | None = None) -> str:
-        """Return the tree of frames as a graphviz graph."""
+        """Return the frame tree as a graphviz graph."""
         return self._buffer._allFramesAsDot(current_time) if current_time else self._buffer._allFramesAsDot()
 
     def allFramesAsString(self) -> str:
-        """Return a line for each frame that has a parent."""
+        """Return one line of text for each frame that has a parent."""
         return self._buffer.all_frames_as_string()
 
     def setTransform(
         self, transform: geometry_msgs.msg.TransformStamped, authority: str = "default_authority"
     ) -> None:
-        """Insert a transform."""
+        """Insert a transform into the buffer."""
         self._buffer.set_transform(transform, authority)
 
     def canTransform(self, target_frame: str, source_frame: str, time: Moment) -> int | tuple[int, str]:
-        """Return 1 if the transform is available, else 0."""
+        """Return 1 if the transform is available, otherwise 0."""
         return self._buffer.can_transform(
             strip_leading_slash(target_frame), strip_leading_slash(source_frame), time
         )
@@ -84,7 +84,7 @@ class Transformer:
     def canTransformFull(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> int | tuple[int, str]:
-        """Return 1 if the transform between two times is available, else 0."""
+        """Return 1 if the transform between two times is available, otherwise 0."""
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         return self._buffer.can_transform_full(target, target_time, source, source_time, fixed)
 
@@ -96,7 +96,7 @@ class Transformer:
         timeout: Moment,
         polling_sleep_duration: Moment | None = None,
     ) -> None:
-        """Wait up to ``timeout`` for a transform; ``polling_sleep_duration`` has no effect.
+        """Wait for a transform for at most ``timeout``. ``polling_sleep_duration`` has no effect.
 
         Raise tf.Exception if the transform is not available by then.
         """
@@ -130,11 +130,11 @@ class Transformer:
     def chain(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> list[str]:
-        """Return the frames on the path from the source to the target via the fixed frame."""
+        """Return the frames on the path from the source frame to the target frame via the fixed frame."""
         return self._buffer._chain(target_frame, target_time, source_frame, source_time, fixed_frame)
 
     def clear(self) -> None:
-        """Remove all transforms."""
+        """Remove all transforms from the buffer."""
         self._buffer.clear()
 
     def frameExists(self, frame_id: str) -> bool:
@@ -148,7 +148,7 @@ class Transformer:
         return list(yaml.safe_load(self._buffer.all_frames_as_yaml()) or {})
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> rospy.Time:
-        """Return the latest time for which a lookup succeeds. Raise tf.Exception if there is no such time."""
+        """Return the latest time at which the transform can be looked up. Raise tf.Exception if there is no such time."""
         return self._buffer.get_latest_common_time(
             strip_leading_slash(source_frame), strip_leading_slash(dest_frame)
         )
@@ -165,7 +165,7 @@ class Transformer:
     def lookupTransformFull(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> Tuples:
-        """Like :meth:`lookupTransform`, with a separate time for each frame."""
+        """Look up a transform like :meth:`lookupTransform`, with a separate time for each frame."""
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         return _tuples(self._buffer.lookup_transform_full(target, target_time, source, source_time, fixed))
 
@@ -176,7 +176,7 @@ class Transformer:
         time: times.Time,
         averaging_interval: times.Duration,
     ) -> tuple[Vector, Vector]:
-        """Return the linear and angular velocity of ``tracking_frame`` in ``observation_frame``, per second."""
+        """Return the linear (m/s) and angular (rad/s) velocity of ``tracking_frame`` in ``observation_frame``."""
         return self.lookupTwistFull(
             tracking_frame,
             observation_frame,
@@ -220,7 +220,7 @@ class Transformer:
         speed = (numpy.array(end_place) - start_place) / seconds
         spin = axis * angle / seconds
 
-        # Look up the transforms from the tracked frame to the reference frame and to the reference point.
+        # Look up the poses of the tracked frame and of the reference point's frame in the reference frame.
         place, turn = self.lookupTransform(reference_frame, tracking_frame, middle)
         rotation = transformations.quaternion_matrix(turn)[:3, :3]
         angular = numpy.dot(rotation, spin)
@@ -235,11 +235,11 @@ class Transformer:
         return tuple(linear.tolist()), tuple(angular.tolist())
 
     def setUsingDedicatedThread(self, value: bool) -> None:
-        """Set whether another thread inserts transforms; lookups can only wait for a transform if one does."""
+        """Set whether another thread inserts transforms. Only then can a lookup wait for a transform."""
         self._using_dedicated_thread = value
 
     def getTFPrefix(self) -> str:
-        """Return "", because tf2 does not support prefixes."""
+        """Return the empty string, because tf2 does not support prefixes."""
         return ""
 
     def _check_thread(self) -> None:
@@ -254,10 +254,10 @@ class Transformer:
 
 
 class TransformerROS(Transformer):
-    """A transformer for stamped messages."""
+    """A Transformer that also transforms stamped messages."""
 
     def asMatrix(self, target_frame: str, hdr: Header) -> NDArray[numpy.float64]:
-        """Return the 4x4 matrix from a header's frame, at its stamp, to ``target_frame``.
+        """Return the 4x4 matrix that transforms from a header's frame, at its stamp, to ``target_frame``.
 
         Raise the same exceptions as lookupTransform.
         """
@@ -328,7 +328,7 @@ class TransformerROS(Transformer):
 
 
 class TransformListener(TransformerROS):
-    """A transformer that inserts the transforms on /tf and /tf_static.
+    """A TransformerROS that inserts the transforms received on /tf and /tf_static.
 
     The arguments are those of :class:`Transformer`, and the subscribers' ``queue_size``, ``buff_size`` and ``tcp_nodelay``.
     """

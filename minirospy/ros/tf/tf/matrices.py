@@ -99,7 +99,7 @@ def rotation_matrix(angle: float, direction: ArrayLike, point: ArrayLike | None 
 
 
 def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
-    """Return the angle, the axis, and a point on the axis. Raise ValueError if the matrix is not a rotation."""
+    """Return a rotation's angle, axis, and a point on the axis. Raise ValueError if the matrix is not a rotation."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -121,7 +121,7 @@ def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
 def scale_matrix(
     factor: float, origin: ArrayLike | None = None, direction: ArrayLike | None = None
 ) -> Floats:
-    """Return the matrix that scales about ``origin``, in all directions or one. A factor of -1 is a point reflection."""
+    """Return the matrix that scales about ``origin``, uniformly or along ``direction``. A factor of -1 is a point reflection."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -166,7 +166,7 @@ def projection_matrix(
     perspective: ArrayLike | None = None,
     pseudo: bool = False,
 ) -> Floats:
-    """Return the matrix that projects onto a plane: from a perspective point, along a direction, or orthogonally.
+    """Return the matrix that projects onto a plane: from a perspective point, along a direction, or at right angles.
 
     If ``pseudo``, a perspective projection preserves relative depths.
     """
@@ -201,7 +201,7 @@ def projection_matrix(
 def projection_from_matrix(
     matrix: ArrayLike, pseudo: bool = False
 ) -> tuple[Floats, Floats, Floats | None, Floats | None, bool]:
-    """Return the arguments of :func:`projection_matrix` for this matrix. Raise ValueError if the matrix is not a projection."""
+    """Return the :func:`projection_matrix` arguments for a matrix. Raise ValueError if the matrix is not a projection."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -262,7 +262,7 @@ def clip_matrix(
 
 
 def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: ArrayLike) -> Floats:
-    """Return the matrix that shears by ``angle`` (radians) along a direction in a plane.
+    """Return the matrix that shears by ``angle`` (radians) along a direction within a plane.
 
     Raise ValueError if the direction is not in the plane.
     """

@@ -54,7 +54,7 @@ def unit_vector(data: ArrayLike, axis: int | None, out: NDArray[numpy.float64]) 
 def unit_vector(
     data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None
 ) -> NDArray[numpy.float64] | None:
-    """Return vectors divided by their lengths. If ``out`` is given, store the result in it and return None."""
+    """Return the vectors scaled to length 1. If ``out`` is given, store the result in it and return None."""
     import numpy
 
     vectors = numpy.array(data, dtype=numpy.float64)
@@ -125,7 +125,7 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[numpy.float64]:
 
 
 def quaternion_multiply(quaternion1: ArrayLike, quaternion0: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the product of two quaternions, which rotates by ``quaternion0``, then by ``quaternion1``."""
+    """Return the product of two quaternions: a rotation by ``quaternion0``, followed by ``quaternion1``."""
     import numpy
 
     x0, y0, z0, w0 = numpy.asarray(quaternion0).tolist()
@@ -160,7 +160,7 @@ def quaternion_inverse(quaternion: ArrayLike) -> NDArray[numpy.float64]:
 def quaternion_slerp(
     quat0: ArrayLike, quat1: ArrayLike, fraction: float, spin: float = 0, shortestpath: bool = True
 ) -> NDArray[numpy.float64]:
-    """Interpolate between ``quat0`` and ``quat1`` at ``fraction``, with ``spin`` additional half turns."""
+    """Return the quaternion at ``fraction`` between ``quat0`` and ``quat1``, with ``spin`` additional half turns."""
     import numpy
 
     q0: NDArray[numpy.float64] = unit_vector(numpy.asarray(quat0)[:4])
@@ -182,7 +182,7 @@ def quaternion_slerp(
 
 
 def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return a uniformly distributed random rotation, computed from ``rand`` (three numbers between 0 and 1) if given."""
+    """Return a uniformly distributed random unit quaternion, computed from ``rand`` (three numbers in [0, 1]) if given."""
     import numpy
 
     numbers = numpy.random.rand(3) if rand is None else numpy.asarray(rand)
@@ -193,5 +193,5 @@ def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
 
 
 def random_rotation_matrix(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix for a random rotation."""
+    """Return the 4x4 matrix of a random rotation."""
     return quaternion_matrix(random_quaternion(rand))

@@ -41,12 +41,12 @@ _M = TypeVar("_M")
 
 
 def to_msg_msg(msg: _M) -> _M:
-    """Return a message unchanged."""
+    """Return a message unchanged, because it needs no conversion."""
     return msg
 
 
 def from_msg_msg(msg: _M) -> _M:
-    """Return a message unchanged."""
+    """Return a message unchanged, because it needs no conversion."""
     return msg
 
 
@@ -59,18 +59,18 @@ def transform_to_kdl(t: TransformStamped) -> PyKDL.Frame:
 
 
 def do_transform_point(point: PointStamped, transform: TransformStamped) -> PointStamped:
-    """Return the transformed point, with the transform's header."""
+    """Return the point transformed into another frame, with the transform's header."""
     moved = transform_to_kdl(transform) * PyKDL.Vector(point.point.x, point.point.y, point.point.z)
     return PointStamped(transform.header, Point(moved[0], moved[1], moved[2]))
 
 
 def do_transform_vector3(vector3: Vector3Stamped, transform: TransformStamped) -> Vector3Stamped:
-    """Return the rotated vector, with the transform's header."""
+    """Return the vector rotated into another frame, with the transform's header."""
     return Vector3Stamped(transform.header, _turned(vector3.vector, transform))
 
 
 def do_transform_pose(pose: PoseStamped, transform: TransformStamped) -> PoseStamped:
-    """Return the transformed pose, with the transform's header."""
+    """Return the pose transformed into another frame, with the transform's header."""
     position, orientation = pose.pose.position, pose.pose.orientation
     frame = transform_to_kdl(transform) * PyKDL.Frame(
         PyKDL.Rotation.Quaternion(orientation.x, orientation.y, orientation.z, orientation.w),
@@ -83,7 +83,7 @@ def do_transform_pose(pose: PoseStamped, transform: TransformStamped) -> PoseSta
 
 
 def do_transform_wrench(wrench: WrenchStamped, transform: TransformStamped) -> WrenchStamped:
-    """Return the rotated force and torque, with the transform's header; the reference point is not changed."""
+    """Return the force and torque rotated into another frame, with the transform's header; their reference point is unchanged."""
     force, torque = (_turned(each, transform) for each in (wrench.wrench.force, wrench.wrench.torque))
     return WrenchStamped(transform.header, Wrench(force, torque))
 

@@ -30,7 +30,7 @@ _G = TypeVar("_G", PyKDL.Vector, PyKDL.Frame, PyKDL.Twist, PyKDL.Wrench)
 
 
 class _StampedVector(Protocol):
-    """The return type of tf2_ros.Stamped for a Vector."""
+    """The type of a PyKDL.Vector returned by tf2_ros.Stamped."""
 
     header: Header
 
@@ -38,22 +38,22 @@ class _StampedVector(Protocol):
 
 
 def do_transform_vector(vector: PyKDL.Vector, transform: TransformStamped) -> PyKDL.Vector:
-    """Return the transformed point, with the transform's header."""
+    """Return the point transformed into another frame, with the transform's header."""
     return _moved(vector, transform)
 
 
 def do_transform_frame(frame: PyKDL.Frame, transform: TransformStamped) -> PyKDL.Frame:
-    """Return the transformed pose, with the transform's header."""
+    """Return the pose transformed into another frame, with the transform's header."""
     return _moved(frame, transform)
 
 
 def do_transform_twist(twist: PyKDL.Twist, transform: TransformStamped) -> PyKDL.Twist:
-    """Return the twist in the transform's target frame, with the transform's header."""
+    """Return the twist transformed into another frame, with the transform's header."""
     return _moved(twist, transform)
 
 
 def do_transform_wrench(wrench: PyKDL.Wrench, transform: TransformStamped) -> PyKDL.Wrench:
-    """Return the wrench in the transform's target frame, with the transform's header."""
+    """Return the wrench transformed into another frame, with the transform's header."""
     return _moved(wrench, transform)
 
 

@@ -40,12 +40,12 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-# maximum number of messages queued while the program is busy; older ones are dropped
+# maximum number of queued messages; if the program is busy, older ones are dropped
 _MAX_WAITING = 1000
 
 
 class Buffer:
-    """The frames published on /tf and /tf_static over the last ``cache_time`` seconds.
+    """The transforms received on /tf and /tf_static in the last ``cache_time`` seconds.
 
     The buffer receives transforms inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms
     are removed.
@@ -107,7 +107,7 @@ class Buffer:
         *,
         timeout: float | None = 0.0,
     ) -> TransformStamped:
-        """Return the pose of ``source`` at ``source_time``, relative to ``target`` at ``target_time``.
+        """Return the pose of ``source`` at ``source_time``, relative to ``target`` at ``target_time``, via the frame ``fixed``.
 
         The frame ``fixed`` is assumed not to move between the two times. Wait and raise exceptions like :meth:`lookup`.
         """
@@ -125,7 +125,7 @@ class Buffer:
             return str(error)
 
     async def changes(self, target: str, source: str) -> AsyncIterator[TransformStamped]:
-        """Yield the latest pose of ``source`` in ``target``, then the pose after each change; skip poses if the program is busy.
+        """Yield the latest pose of ``source`` in ``target``, then each new pose; a busy program misses intermediate poses.
 
         Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
@@ -218,7 +218,7 @@ class Broadcaster:
         await self.moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
-        """Publish transforms on /tf_static, latched, together with all earlier ones.
+        """Publish transforms on the latched topic /tf_static, together with all earlier ones.
 
         A transform replaces earlier ones for its child frame.
         """
@@ -246,6 +246,6 @@ async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
 
 
 async def _quietly(pause: Coroutine[object, object, None]) -> None:
-    """Wait until ``pause`` ends, the node shuts down, or the node's time jumps."""
+    """Await ``pause``; return early, without an error, if the node shuts down or its time jumps."""
     with contextlib.suppress(ROSInterruptException):
         await pause

@@ -25,12 +25,12 @@ class TransformBroadcaster:
         self.pub_tf = rospy.Publisher("/tf", TFMessage, queue_size=100)
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:
-        """Publish a transform, or several in one message."""
+        """Publish one or more transforms in a single message."""
         self.pub_tf.publish(TFMessage(_listed(transform)))
 
 
 class StaticTransformBroadcaster:
-    """Publishes static transforms on /tf_static, latched, so that later listeners receive all of them.
+    """Publishes static transforms on the latched topic /tf_static, so that later subscribers receive all of them.
 
     A transform replaces an earlier one for the same child frame. The broadcasters of a process share their transforms,
     because a node has only one latched message per topic; in real ROS, that message contains only the last broadcaster's
@@ -50,10 +50,10 @@ class StaticTransformBroadcaster:
         return TFMessage(list(self._sent.get(self.pub_tf.impl, {}).values()))
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:
-        """Publish a transform, or several, together with all earlier ones."""
+        """Publish one or more transforms, together with all earlier ones."""
         with self._lock:
             sent = self._sent.setdefault(self.pub_tf.impl, {})
-            # Copy them, because a program may reuse its message object.
+            # Copy the transforms, because a program may reuse its message objects.
             sent |= {each.child_frame_id: copy.deepcopy(each) for each in _listed(transform)}
             self.pub_tf.publish(self.net_message)
 

@@ -21,7 +21,7 @@ DEFAULT_CAN_TRANSFORM_POLLING_SCALE = 0.01
 
 
 class Buffer(BufferCore, BufferInterface):
-    """The frames over the last ``cache_time`` (a Duration; 10 s), with lookups that can wait for their data.
+    """The transforms of the last ``cache_time`` (a Duration; default: 10 s), with lookups that can wait for their data.
 
     If ``debug``, offer the service ``~tf2_frames``, which lists the frames, unless this node already offers it. A wait
     returns after the insertion that makes the lookup possible. A wait raises an exception if simulated time jumps back by
@@ -82,7 +82,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Wait up to ``timeout`` for a transform; return 1 if it is available, else 0.
+        """Wait for a transform for at most ``timeout``. Return 1 if it is available, otherwise 0.
 
         If ``return_debug_tuple``, return a tuple of this result and the reason.
 
@@ -104,7 +104,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Like :meth:`can_transform`, for a transform between two times."""
+        """Wait for a transform between two times, like :meth:`can_transform`."""
 
         def possible() -> tuple[int, str]:
             return self.can_transform_full_core(

@@ -33,7 +33,7 @@ _ERRORS: dict[int, type[TransformException]] = {
 
 
 class BufferClient(BufferInterface):
-    """Looks up transforms at the buffer server in the namespace ``ns``, so that this node need not subscribe to /tf.
+    """Looks up transforms on the buffer server in namespace ``ns``, so that this node need not subscribe to /tf.
 
     ``timeout_padding`` (a Duration) is added to a lookup's own timeout. ``check_frequency`` has no effect.
     """
@@ -48,7 +48,7 @@ class BufferClient(BufferInterface):
             rospy.logwarn("Argument check_frequency is deprecated and should not be used.")
 
     def wait_for_server(self, timeout: times.Duration = NO_WAIT) -> bool:
-        """Wait for the server; return False if it is not connected within ``timeout`` (zero: no limit)."""
+        """Wait for the buffer server. Return False if it is not available within ``timeout`` (zero: no limit)."""
         return self.client.wait_for_server(timeout)
 
     def lookup_transform(
@@ -94,7 +94,7 @@ class BufferClient(BufferInterface):
     def can_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> bool:
-        """Return whether the server has the transform."""
+        """Return whether the server can look up the transform within ``timeout``."""
         try:
             self.lookup_transform(target_frame, source_frame, time, timeout)
         except TransformException:
@@ -110,7 +110,7 @@ class BufferClient(BufferInterface):
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> bool:
-        """Return whether the server has the transform between two times."""
+        """Return whether the server can look up the transform between two times within ``timeout``."""
         try:
             self.lookup_transform_full(
                 target_frame, target_time, source_frame, source_time, fixed_frame, timeout

@@ -28,7 +28,7 @@ def _write(text: str, is_error: bool) -> None:
 
 
 class BufferCore:
-    """The tree of frames over the last ``cache_time`` (a Duration; 10 s).
+    """The tree of frames, with the transforms of the last ``cache_time`` (a Duration; default: 10 s).
 
     Stamps are exact; the real tf2_py rounds them to the precision of a float in seconds (about 0.2 us today).
     Rejected transforms are logged with a count, at most once a second per frame and error.
@@ -46,7 +46,7 @@ class BufferCore:
     # --- inserting transforms
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
-        """Insert a transform from the node ``authority``."""
+        """Insert a transform that the node ``authority`` published."""
         self._insert(transform, authority, False)
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
@@ -54,7 +54,7 @@ class BufferCore:
         self._insert(transform, authority, True)
 
     def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
-        """Insert a serialized TFMessage. If its layout equals that of earlier messages, decode the message only when needed.
+        """Insert a serialized TFMessage. If earlier messages had the same layout, decode it only when a lookup needs it.
 
         The real tf2_py has no such method. Raise DeserializationError if the bytes are invalid.
         """
@@ -116,7 +116,7 @@ class BufferCore:
         )
 
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
-        """Return the latest time for which a lookup succeeds; zero if all transforms between the frames are static.
+        """Return the latest time at which a lookup succeeds, or zero if all transforms between the frames are static.
 
         Raise LookupException if a frame is unknown, InvalidArgumentException if a frame name is invalid, TransformException if
         the frames are not connected.
@@ -133,12 +133,12 @@ class BufferCore:
             return frames_as_yaml(self._tree)
 
     def all_frames_as_string(self) -> str:
-        """Return a line for each frame that has a parent."""
+        """Return one line of text for each frame that has a parent."""
         with self._lock:
             return self._tree.frames_as_string()
 
     def _allFramesAsDot(self, time: Moment = _NO_TIME) -> str:
-        """Return the tree of frames as a graphviz graph, with each frame's age if a time is given."""
+        """Return the frame tree as a graphviz graph. If a time is given, include the age of each frame."""
         stamp = nanoseconds(time)
         with self._lock:
             return frames_as_dot(self._tree, stamp)
@@ -161,7 +161,7 @@ class BufferCore:
     # --- internal
 
     def on_change(self, function: Callable[[], object]) -> Callable[[], None]:
-        """Call ``function`` after each insertion, in the inserting thread; return a function that stops these calls."""
+        """Call ``function`` after each insertion, in the inserting thread. Return a function that unregisters it."""
         with self._lock:
             self._changed = (*self._changed, function)
 
@@ -209,7 +209,7 @@ class BufferCore:
         return int(why is None), why or ""
 
     def _report(self) -> None:
-        """Log rejected transforms without the lock held, because a log handler may look up transforms."""
+        """Log rejected transforms. Do not hold the lock meanwhile, because a log handler may look up transforms."""
         with self._lock:
             refused = self._refused[:]
             del self._refused[: len(refused)]

@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """Raised if no conversion is registered for a type. The program has to import the package that registers it."""
+    """Raised if no conversion is registered for a type. To register it, the program imports the type's package."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)
@@ -42,7 +42,7 @@ class TypeException(Exception):
 
 
 class NotImplementedException(Exception):
-    """Raised if a subclass of BufferInterface does not implement this method."""
+    """Raised if a subclass of BufferInterface does not implement a method that was called."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -63,7 +63,7 @@ class _Registry:
 
 
 class TransformRegistration:
-    """Functions ``(object, TransformStamped) -> object`` that transform objects of a type. All instances share them."""
+    """The functions ``(object, TransformStamped) -> object`` that transform objects of each type, shared by all instances."""
 
     _registry = _Registry()
 
@@ -81,7 +81,7 @@ class TransformRegistration:
 
 
 class ConvertRegistration:
-    """Functions that convert between types, directly or through a message. All instances share them."""
+    """The functions that convert between types, directly or through a message, shared by all instances."""
 
     _to_msg = _Registry()
     _from_msg = _Registry()
@@ -96,7 +96,7 @@ class ConvertRegistration:
         self._to_msg.functions[key] = callback
 
     def add_convert(self, key: tuple[type[_A], type[_T]], callback: Callable[[_A], _T]) -> None:
-        """Register a direct conversion for a pair (from, to)."""
+        """Register a direct conversion for a pair of types (from, to)."""
         self._convert.functions[key] = callback
 
     def get_from_msg(self, key: type[_T]) -> Callable[..., _T]:
@@ -108,12 +108,12 @@ class ConvertRegistration:
         return self._to_msg.get(key)
 
     def get_convert(self, key: tuple[type[_A], type[_T]]) -> Callable[[_A], _T]:
-        """Return the direct conversion for a pair (from, to). Raise TypeException if none is registered."""
+        """Return the direct conversion for a pair of types (from, to). Raise TypeException if none is registered."""
         return self._convert.get(key)
 
 
 def convert(a: object, b_type: type[_T]) -> _T:
-    """Convert ``a`` to a type: directly, by copying it, or through a message.
+    """Convert ``a`` to the type ``b_type``: directly, by copying it, or through a message.
 
     Raise TypeException if no conversion is registered.
     """
@@ -129,13 +129,13 @@ def convert(a: object, b_type: type[_T]) -> _T:
 
 
 def Stamped(obj: _T, stamp: times.Time, frame_id: str) -> _T:
-    """Set an object's ``header`` to a stamp and frame, and return the object."""
+    """Set the stamp and frame in an object's ``header``; return the object."""
     obj.header = Header(frame_id=frame_id, stamp=stamp)  # type: ignore[attr-defined]
     return obj
 
 
 class BufferInterface:
-    """Declares the lookup methods, for subclasses to implement, and implements the methods that use them."""
+    """Declares the lookup methods, which subclasses implement, and implements the methods that use them."""
 
     def __init__(self) -> None:
         self.registration = TransformRegistration()
@@ -159,7 +159,7 @@ class BufferInterface:
         timeout: Moment = NO_WAIT,
         new_type: type | None = None,
     ) -> object:
-        """Transform a stamped object to ``target_frame``, at its own stamp. Convert it to ``new_type`` if given.
+        """Transform a stamped object to ``target_frame`` at the object's stamp. If ``new_type`` is given, convert the result.
 
         Raise TypeException if a type is not registered, and the exceptions that :meth:`lookup_transform` raises.
         """

@@ -18,7 +18,7 @@ __all__ = ["TransformListener"]
 
 
 class TransformSink(Protocol):
-    """The object that receives a listener's transforms: a Buffer, or the program's own object."""
+    """The object that receives a listener's transforms: a Buffer, or an object that the program defines."""
 
     def set_transform(self, transform: TransformStamped, authority: str, /) -> object:
         """Insert a transform."""
@@ -55,18 +55,18 @@ class TransformListener:
         )
 
     def __del__(self) -> None:
-        # Suppress all errors: the constructor may have failed, or the interpreter may be exiting.
+        # Suppress all errors: the constructor may have failed halfway, or the interpreter may be exiting.
         with contextlib.suppress(Exception):
             self.unregister()
 
     def unregister(self) -> None:
-        """Stop listening."""
+        """Unsubscribe from /tf and /tf_static."""
         self.tf_sub.unregister()
         self.tf_static_sub.unregister()
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time with the lock held: otherwise a thread overtaken by another one would detect a false jump.
+        # Hold the lock while reading the time: a thread that is overtaken by another would otherwise detect a false jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now
@@ -107,7 +107,7 @@ class TransformListener:
 
 
 def _takes_bytes(buffer: TransformSink) -> bool:
-    """Return whether a buffer accepts undecoded messages, as a BufferCore does unless it overrides set_transform."""
+    """Return whether a buffer accepts undecoded messages: true for a BufferCore that does not override set_transform."""
     kind = type(buffer)
     return (
         issubclass(kind, BufferCore)

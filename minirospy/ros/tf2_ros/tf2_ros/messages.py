@@ -40,8 +40,8 @@ def nanoseconds(time: Moment) -> int:
 
 
 def transform_stamped(target: str, source: str, found: StampedTransform) -> TransformStamped:
-    """Convert a lookup's result to a message."""
-    # Create the message without calling constructors, which would take longer than the lookup.
+    """Convert the result of a lookup to a message."""
+    # Create the message without its constructors, which would take longer than the lookup.
     message: TransformStamped = _new(TransformStamped)
     message.header = header = _new(Header)
     header.seq = 0
@@ -58,7 +58,7 @@ def transform_stamped(target: str, source: str, found: StampedTransform) -> Tran
 
 
 class LazyTFMessage(TFMessage):
-    """A TFMessage that stores its bytes (``raw``) for the buffer. It is decoded only if ``transforms`` is read."""
+    """A TFMessage that keeps its serialized bytes in ``raw`` and is decoded only if ``transforms`` is read."""
 
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types

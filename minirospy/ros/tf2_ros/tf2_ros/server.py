@@ -35,7 +35,7 @@ _CODES: list[tuple[type[TransformException], int]] = [
 
 
 class BufferServer:
-    """Serves the action ``ns`` (tf2_msgs/LookupTransform): looks up each goal in ``buffer`` as soon as possible.
+    """An action server named ``ns`` (tf2_msgs/LookupTransform) that completes each goal as soon as ``buffer`` can look it up.
 
     A goal stays pending until an insertion makes its lookup possible, or its timeout expires and the result contains the
     error. ``check_period`` (a Duration) is the interval at which simulated time is checked. Real ROS has this class only
@@ -88,7 +88,7 @@ class BufferServer:
             handle.set_canceled()
 
     def _work(self) -> None:
-        """Complete due goals after each insertion and at each timeout."""
+        """Complete the goals that are due, after each inserted transform and at each goal's timeout."""
         with rospy.interrupting(self._news.set):
             while not rospy.is_down():
                 self._news.clear()
@@ -97,7 +97,7 @@ class BufferServer:
                 wait_for_event(self._news, self._next_look())
 
     def _due(self) -> list[actionlib.ServerGoalHandle]:
-        """Remove and return the goals whose transform can be looked up now, or that have timed out."""
+        """Remove and return the goals whose transform is available or whose timeout has passed."""
         now = rospy.get_rostime()
         with self._lock:
             waiting, self._pending = self._pending, []

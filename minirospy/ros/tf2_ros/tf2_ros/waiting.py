@@ -14,13 +14,13 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)  # how far the wall clock may be set back without aborting a wait
-# seconds between checks in simulated time, whose changes do not wake a blocked thread
+_JUMP = times.Duration(3)  # a wait continues if the wall clock is set back by at most this duration
+# seconds between checks in simulated time: a change of that time does not wake a blocked thread
 _SIMULATED_SLICE = 0.01
 
 
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
-    """Wait until ``is_possible()`` is true or ``timeout`` has passed in ROS time. Check whenever a transform is inserted.
+    """Wait until ``is_possible()`` is true, or ``timeout`` in ROS time has passed. Check whenever a transform is inserted.
 
     ``step`` is the fraction of the timeout that the real implementation sleeps between checks. Raise
     ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep, ROSInterruptException

@@ -12,7 +12,7 @@ _SMALL = 4 * 2.0**-52
 
 
 def rpy_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw as tf_echo prints them. The yaw is 0 if the pitch is +/-90 degrees."""
+    """Return roll, pitch and yaw, computed like tf_echo's output: the yaw is 0 if the pitch is +/-90 degrees."""
     (xx, xy, xz), (yx, _, _), (zx, zy, zz) = _matrix(rotation)
     if zx <= -1:
         return math.atan2(xy, xz), math.pi / 2, 0.0
@@ -24,7 +24,7 @@ def rpy_of_matrix(rotation: Quaternion) -> Vector:
 
 
 def euler_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw as tf2_tools' echo.py prints them."""
+    """Return roll, pitch and yaw, computed like the output of tf2_tools' echo.py."""
     (xx, _, _), (yx, yy, yz), (zx, zy, zz) = _matrix(rotation)
     cosine = math.sqrt(xx * xx + yx * yx)
     if cosine > _SMALL:

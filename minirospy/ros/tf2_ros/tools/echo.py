@@ -93,7 +93,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
     buffer = Buffer(rospy.Duration.from_sec(options.cache_time) if options.cache_time else None)
     TransformListener(buffer)
-    # The original program uses a timer, so its first lookup happens after one period.
+    # The original program uses a timer, so it looks up the first transform after one period.
     rospy.sleep(1 / options.rate)
     looks = 0
 
@@ -127,7 +127,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _repeat(rate: float, echo: Callable[[], bool]) -> None:
-    """Call ``echo`` at the given rate until it returns False or the node is shut down."""
+    """Call ``echo`` at the given rate until it returns False or the node shuts down."""
     rhythm = rospy.Rate(rate)
     while not rospy.is_shutdown() and echo():
         try:
@@ -152,7 +152,7 @@ def _pose(found: TransformStamped, precision: int, angles: Callable[[Quaternion]
 
 
 def _rounded(nanoseconds: int, digits: int) -> str:
-    """Return a time in seconds with ``digits`` decimals, without float rounding errors."""
+    """Format a time as seconds with ``digits`` decimals, without float rounding errors."""
     if digits > 6:
         return f"{nanoseconds / 1e9:.{digits}f}"
     scaled = round(nanoseconds / 10 ** (9 - digits))

@@ -24,20 +24,20 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000  # number of recent delays to average, and of recent messages to compute a rate from
+_KEPT = 1000  # number of recent delays to average, and of recent messages to compute the rate from
 _STEP = 0.01
-_STEPS = 20  # number of measurements per report of the delay between two frames
+_STEPS = 20  # number of measurements between two reports of the delay between two frames
 _SMOOTHING = 0.01
 _MIN_PERIOD = 1e-8
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run tf_monitor, for all frames or for those between two frames; return the exit status."""
+    """Run tf_monitor for all frames, or for the frames between two given ones; return the exit status."""
     return run_program(_run, words)
 
 
 class Delays:
-    """The delays of each frame and each node. Pure: the caller passes the times, in seconds."""
+    """The delays of all frames and nodes. Performs no I/O: the caller passes the times, in seconds."""
 
     def __init__(self) -> None:
         self._sender: dict[str, str] = {}
@@ -46,7 +46,7 @@ class Delays:
         self._node_times: dict[str, deque[float]] = {}
 
     def add(self, sender: str, frames: Sequence[tuple[str, float]], now: float, *, is_static: bool) -> None:
-        """Record a message: its child frames with their stamps. Static transforms count as having no delay."""
+        """Record a message from ``sender``: its child frames and their stamps. Static transforms have a delay of zero."""
         sender = sender + "(static)" * is_static
         late = [(child, 0.0 if is_static else now - stamp) for child, stamp in frames]
         for child, delay in late:
@@ -57,7 +57,7 @@ class Delays:
         self._node_times.setdefault(sender, deque(maxlen=_KEPT)).append(now)
 
     def frame_lines(self, chain: Sequence[str] | None = None) -> Iterator[str]:
-        """Yield a line for each frame; if ``chain`` is given, only for the frames in it."""
+        """Yield a line for each frame, or only for the frames in ``chain`` if it is given."""
         for child in sorted(self._delays):
             if chain is None or child in chain:
                 average, most = _average_and_most(self._delays[child])
@@ -65,7 +65,7 @@ class Delays:
                 yield f"Frame: {child} published by {sender} Average Delay: {average:g} Max Delay: {most:g}"
 
     def node_lines(self) -> Iterator[str]:
-        """Yield a line for each node that sends transforms."""
+        """Yield a line for each node that publishes transforms."""
         for sender in sorted(self._node_delays):
             average, most = _average_and_most(self._node_delays[sender])
             times = self._node_times[sender]
@@ -136,7 +136,7 @@ def _wait_for_chain(buffer: Buffer, source: str, target: str) -> None:
 
 
 class _Net:
-    """The delay between two frames: its moving average and its maximum."""
+    """The moving average and the maximum of the delay between two frames."""
 
     def __init__(self) -> None:
         self.chain: list[str] = []

@@ -12,7 +12,7 @@ from minirospy.base.escape import escaped
 
 __all__ = ["USAGE_STATUS", "ToolError", "report", "run_program"]
 
-# exit status after a usage error; ROS's programs return -1, which the shell reports as this status
+# exit status after a usage error: ROS's programs return -1, which the shell reports as 255
 USAGE_STATUS = 255
 
 
@@ -34,7 +34,7 @@ class ToolError(MinirospyError):
 
 
 def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str] | None) -> int:
-    """Run a program with its arguments; return its exit status. Ctrl-C or a closed stdout is not an error."""
+    """Run a program with its arguments; return its exit status. Ctrl-C and a closed stdout are not errors."""
     arguments = rospy.myargv(sys.argv)[1:] if words is None else words
     try:
         return body(arguments) or 0
@@ -47,13 +47,13 @@ def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str
     except (rospy.ROSInterruptException, KeyboardInterrupt):
         return 0
     except BrokenPipeError:
-        # Discard the buffered text, because it cannot be written.
+        # Discard the buffered output, because it cannot be written.
         sys.stdout = None
         return 0
 
 
 def report(line: str, level: str = "ERROR") -> None:
-    """Print a line in the format of ROS's console, even if there is no node yet; if ``level`` is empty, print it unchanged.
+    """Print a line in ROS's console format; this works without a node. If ``level`` is empty, print the line unchanged.
 
     The level INFO is printed to stdout, all others to stderr.
     """

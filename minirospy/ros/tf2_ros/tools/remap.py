@@ -28,7 +28,7 @@ def _run(words: Sequence[str]) -> None:
         raise ToolError(f"~mappings is [{mappings}]: it is a list as [{{old: a, new: b}}]", status=1)
     names = {str(each["old"]): str(each["new"]) for each in mappings if {"old", "new"} <= each.keys()}
     print("Applying the following mappings to incoming tf frame ids", names, flush=True)
-    # The queue is long enough to forward every message even if several arrive at the same time.
+    # The queue is long enough to forward a burst of messages without dropping any.
     publisher = rospy.Publisher("/tf", TFMessage, queue_size=100)
 
     def rename(message: TFMessage) -> None:

@@ -41,18 +41,18 @@ Usage: {_NAME} /param_name
 {_ABOUT}"""  # noqa: W291
 
 _MIN_PERIOD = 0.001
-"""Minimum period in seconds; a period of 0 would keep this process and all listeners busy."""
+"""Minimum period in seconds: a period of 0 would overload this process and all listeners."""
 _TOLERANCE = 0.01
-"""Maximum deviation of a quaternion's squared length from 1. Every listener rejects a transform that exceeds it."""
+"""Maximum deviation of a quaternion's squared length from 1: listeners reject a transform that exceeds it."""
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf's program: x y z yaw pitch roll FRAME CHILD PERIOD_MS, or with a quaternion; return the exit status."""
+    """Run tf's program: x y z and a yaw pitch roll or a quaternion, then FRAME CHILD PERIOD_MS; return the exit status."""
     return run_program(_run_tf, words)
 
 
 def main_tf2(words: Sequence[str] | None = None) -> int:
-    """Run tf2_ros's program: the same arguments without the period, or the name of a parameter; return the exit status."""
+    """Run tf2_ros's program: the arguments of tf's without the period, or a parameter's name; return the exit status."""
     return run_program(_run_tf2, words)
 
 
@@ -65,7 +65,7 @@ def _run_tf(words: Sequence[str]) -> None:
 
     rospy.init_node(_NAME, anonymous=True)
     broadcaster = TransformBroadcaster()
-    # Stamp the transform in the future, so that the frame is known until the next message.
+    # Stamp the transform in the future, so that it stays valid until the next message.
     ahead = rospy.Duration.from_sec(seconds)
     broadcaster.pub_tf.wait_for_subscribers(timeout=seconds)
     while not rospy.is_shutdown():
@@ -96,7 +96,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _transform(numbers: Sequence[str], parent: str, child: str) -> TransformStamped:
-    """Return the transform given by x y z yaw pitch roll, or x y z qx qy qz qw.
+    """Return the transform for the numbers x y z yaw pitch roll, or x y z qx qy qz qw.
 
     Raise ToolError if the arguments are invalid.
     """
@@ -129,7 +129,7 @@ def _number(text: str, what: str) -> float:
 def _checked(transform: TransformStamped) -> TransformStamped:
     """Return the transform unchanged. Raise ToolError if listeners would reject it."""
     parent, child = transform.header.frame_id, transform.child_frame_id
-    # Listeners ignore a leading slash.
+    # Compare without leading slashes, which listeners ignore.
     if parent.removeprefix("/") == child.removeprefix("/"):
         why = f"target_frame and source frame are the same ({parent}, {child}) this cannot work"
         raise ToolError(why, level="FATAL", status=1)
@@ -144,7 +144,7 @@ def _checked(transform: TransformStamped) -> TransformStamped:
 
 
 def _transform_of_parameter(name: str) -> TransformStamped:
-    """Return the transform in a parameter, which has the fields of a TransformStamped.
+    """Return the transform stored in a parameter with the fields of a TransformStamped.
 
     Raise ToolError if the parameter is not set or invalid.
     """

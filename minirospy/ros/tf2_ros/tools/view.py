@@ -35,7 +35,7 @@ _VERSION = re.compile(r"version (\d+\.?\d*)")
 
 
 class FrameRecord(NamedTuple):
-    """One frame in a listing; values are strings, as printed."""
+    """One frame in a buffer's listing; the values are strings, as printed."""
 
     name: str
     parent: str
@@ -47,7 +47,7 @@ class FrameRecord(NamedTuple):
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf's view_frames, for the received transforms or (--node) a node's buffer; return the exit status."""
+    """Run tf's view_frames, for the received transforms or, with --node, for a node's buffer; return the exit status."""
     return run_program(_run_tf, words)
 
 
@@ -120,7 +120,7 @@ def _listen() -> None:
 
 
 def _graph_of_node(name: str) -> str:
-    """Wait for the service of a tf or tf2 node; return the graph that it provides.
+    """Wait for the frame service of a tf or tf2 node; return the graph that it provides.
 
     Raise ToolError if the call fails.
     """
@@ -186,7 +186,7 @@ def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
 
 
 def read_edges(dot: str) -> Iterator[Edge]:
-    """Yield the edges in a graph that either program wrote."""
+    """Yield the edges of a graph written by tf's or tf2's view_frames."""
     for parent, child, label in _EDGE.findall(dot):
         lines = [line.strip() for line in label.split("\\n") if line.strip()]
         yield Edge(_unquoted(parent), _unquoted(child), tuple(lines))
@@ -211,7 +211,7 @@ def _draw_svg(dot: str) -> None:
 
 
 def _save(name: str, text: str) -> None:
-    """Write a file into the current folder. Raise ToolError if the file cannot be written."""
+    """Write a file in the current folder. Raise ToolError if it cannot be written."""
     try:
         Path(name).write_text(text, encoding="utf-8")
     except OSError as error:

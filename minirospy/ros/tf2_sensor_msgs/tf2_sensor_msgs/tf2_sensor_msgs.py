@@ -37,7 +37,7 @@ _FORMATS = {
 
 
 def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> PointCloud2:
-    """Return a cloud with x, y and z transformed, and with the transform's header.
+    """Return the cloud with its x, y and z transformed into another frame, with the transform's header.
 
     As in real ROS, the result has one row, little-endian numbers, zeros between a point's fields and nothing after the
     last one, and is not marked as dense. Other fields, and points with NaN coordinates, are kept. x, y and z are the
@@ -61,7 +61,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
     frame = transform_to_kdl(transform)
     rotation = numpy.array(frame.M._m).reshape(3, 3)
     places = numpy.stack([points[name].astype(numpy.float64) for name in "xyz"], axis=-1)
-    # Coordinates may be infinite, or may overflow in the calculation.
+    # Ignore warnings: coordinates may be infinite, or may overflow in the calculation.
     with numpy.errstate(invalid="ignore", over="ignore"):
         moved = places @ rotation.T + numpy.array(frame.p._v)
         for column, name in enumerate("xyz"):
@@ -94,7 +94,7 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
 
 
 def _layout(fields: Sequence[PointField], order: str, step: int | None = None) -> numpy.dtype[numpy.void]:
-    """Return the layout of a point with ``step`` bytes, by default up to its last field.
+    """Return the dtype of a point with ``step`` bytes (default: up to the end of the last field).
 
     Raise ValueError if the fields do not fit.
     """

@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     class _OpenCV(Protocol):
-        """The old OpenCV module cv."""
+        """The interface of OpenCV's old module cv."""
 
         def Rodrigues2(self, src: NDArray[numpy.floating], dst: NDArray[numpy.floating]) -> object: ...
 
@@ -144,13 +144,13 @@ Tuples = tuple[Sequence[float], Sequence[float]]
 
 
 def fromTf(tf: Tuples) -> Frame:
-    """Convert the result of lookupTransform, (x, y, z) and (x, y, z, w), to a Frame."""
+    """Convert a result of lookupTransform, the tuples (x, y, z) and (x, y, z, w), to a Frame."""
     (x, y, z), (qx, qy, qz, qw) = tf
     return Frame(Rotation.Quaternion(qx, qy, qz, qw), Vector(x, y, z))
 
 
 def toTf(f: Frame) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """Convert a Frame to (x, y, z) and (x, y, z, w)."""
+    """Convert a Frame to the tuples (x, y, z) and (x, y, z, w)."""
     return (f.p[0], f.p[1], f.p[2]), f.M.GetQuaternion()
 
 

@@ -2,6 +2,6 @@
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# This package's modules import ROS 1 messages.
-# If ROS 2 is sourced, the ROS 2 packages with the same names would be found first.
+# The modules in this package import ROS 1 messages.
+# Otherwise, if ROS 2 is sourced, Python would first find the ROS 2 message packages with the same names.
 prefer_ros1()

@@ -34,7 +34,7 @@ _VERBS = {
 
 
 def main(program: str) -> int:
-    """Run a program, such as mux_select; return its exit status."""
+    """Run a service-calling program, such as mux_select; return its exit status."""
     kind, _, word = program.partition("_")
     verb = _VERBS[word]
     words = rospy.myargv()[1:]

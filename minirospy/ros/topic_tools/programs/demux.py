@@ -32,11 +32,11 @@ __all__ = ["Demux", "main"]
 
 _USAGE = "\nusage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 [...]]\n"
 _FIRST_SUBSCRIBER = 0.5
-"""Maximum seconds for which an output's first message waits for a subscriber after the topic is advertised."""
+"""Maximum time in seconds that an output's first message waits for a subscriber after its topic is advertised."""
 
 
 def main() -> int:
-    """Run the program; return its exit status."""
+    """Run demux; return its exit status."""
     return run_node(
         _USAGE,
         lambda words: f"{base_name(words[0])}_demux",
@@ -51,7 +51,7 @@ def _prepare(words: Sequence[str]) -> Callable[[], Demux]:
 
 
 class Demux:
-    """Forwards a topic's messages unchanged to the selected output."""
+    """Forwards the messages on a topic, unchanged, to the selected output."""
 
     def __init__(self, source: str, targets: Sequence[str]) -> None:
         self._lock = threading.RLock()

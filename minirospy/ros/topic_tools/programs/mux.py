@@ -44,7 +44,7 @@ _USAGE = "\nusage: mux OUT_TOPIC IN_TOPIC1 [IN_TOPIC2 [...]]\n"
 
 
 def main() -> int:
-    """Run the program; return its exit status."""
+    """Run mux; return its exit status."""
     return run_node(
         _USAGE,
         lambda words: f"{base_name(words[0])}_mux",
@@ -59,7 +59,7 @@ def _prepare(words: Sequence[str]) -> Callable[[], Mux]:
 
 
 class Mux:
-    """Forwards the selected topic's messages unchanged."""
+    """Forwards the messages on the selected topic, unchanged."""
 
     def __init__(self, target: str, sources: Sequence[str], *, is_lazy: bool, latch: bool) -> None:
         self._is_lazy = is_lazy

@@ -13,7 +13,7 @@ from minirospy.client.topics import AnyMsg, SubscribeListener
 
 __all__ = ["NONE", "Input", "Output", "base_name", "checked_topic", "flag", "run_node"]
 
-NONE = "__none"  # the name that selects no topic in a mux or demux
+NONE = "__none"  # the name that selects no topic in mux and demux
 _QUEUE_SIZE = 10
 
 
@@ -29,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic with the type of the first forwarded message. It is latched if the input is latched, unless ``latch`` is given."""
+    """A topic with the type of the first forwarded message. Latched if ``latch`` is true, or if it is None and the input is."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class Output:
         return self._publisher is not None and self._publisher.get_num_connections() > 0
 
     def advertise(self, message: AnyMsg) -> None:
-        """Advertise the topic with a message's type; later calls have no effect."""
+        """Advertise the topic with the type of a message; later calls have no effect."""
         with self._lock:
             if self._publisher is not None:
                 return
@@ -86,7 +86,7 @@ class Output:
                 self._publisher.unregister()
 
     def publish(self, message: AnyMsg) -> None:
-        """Publish a message after ``advertise``; drop a message of another type with a warning."""
+        """Publish a message after ``advertise``. If its type differs from the topic's, drop the message with a warning."""
         assert self._publisher is not None
         header = message._connection_header
         if header["md5sum"] not in ("*", self._publisher.md5sum):
@@ -129,7 +129,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, which becomes part of the node's name. Raise ValueError if that part is empty."""
+    """Return the last part of a topic's name, for use in a node's name. Raise ValueError if that part is empty."""
     name = checked_topic(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -137,7 +137,7 @@ def base_name(topic: str) -> str:
 
 
 def checked_topic(topic: str) -> str:
-    """Return a topic's name. Raise ValueError if the name is invalid."""
+    """Return the topic name unchanged. Raise ValueError if it is invalid."""
     if not is_legal_name(topic):
         raise ValueError(f"[{topic}] is not the name of a topic")
     return topic
@@ -166,7 +166,7 @@ def run_node(
             raise ValueError("")
         start = prepare(words)
         rospy.init_node(name(words), anonymous=True)
-        # Keep a reference, because otherwise the subscription or the services would be deleted.
+        # Keep a reference, so that the subscriptions and services are not deleted.
         running = start()
         rospy.spin()
         del running

@@ -22,7 +22,7 @@ _USAGE = "\nusage: relay IN_TOPIC [OUT_TOPIC]\n"
 
 
 def main() -> int:
-    """Run the program; return its exit status."""
+    """Run relay; return its exit status."""
     return run_node(_USAGE, lambda words: f"{base_name(words[0])}_relay", _prepare, range(1, 3))
 
 
@@ -41,19 +41,19 @@ def _start(source: str, target: str) -> Relay:
 
 
 class Relay:
-    """Forwards messages unchanged."""
+    """Forwards messages from one topic to another, unchanged."""
 
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
-        # Guards opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
+        # Guards opening and closing the input, so that it is reopened if a subscriber arrives while it is being closed.
         self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)
         self._input.open()
 
     def monitor(self, topic: str, period: float) -> None:
-        """Subscribe only while another node subscribes to the output; check this every ``period`` seconds."""
+        """Subscribe to the input only while the output has subscribers; check this every ``period`` seconds."""
         self._is_stealthy = True
         self._master = MasterProxy(Environment.read().master_uri, rospy.get_name())
         self._timer = rospy.Timer(rospy.Duration.from_sec(period), lambda _event: self._look_for(topic))

@@ -98,14 +98,14 @@ def _count(word: str) -> int:
 
 
 class MessageLimit:
-    """Lets a message pass if more than ``period`` seconds have elapsed since the last message that passed."""
+    """Lets a message pass if the last one passed more than ``period`` seconds ago."""
 
     def __init__(self, period: float) -> None:
         self._period = period
         self._last = 0.0
 
     def __call__(self, now: float, size: int) -> bool:
-        """Return whether a message passes."""
+        """Return whether a message with ``size`` bytes at time ``now`` passes."""
         if self._last > now:
             rospy.logwarn("Detected jump back in time, resetting throttle period to now for.")
             self._last = now
@@ -124,7 +124,7 @@ class ByteLimit:
         self._sent: deque[tuple[float, int]] = deque()
 
     def __call__(self, now: float, size: int) -> bool:
-        """Return whether a message passes."""
+        """Return whether a message with ``size`` bytes at time ``now`` passes."""
         while self._sent and self._sent[0][0] < now - self._window:
             self._sent.popleft()
         if sum(size for _, size in self._sent) >= self._limit:
@@ -148,7 +148,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Forwards the messages that a function selects, without changing them."""
+    """Forwards the messages that a function selects, unchanged."""
 
     def __init__(
         self,
@@ -163,7 +163,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # Guards opening and closing, so that the input is reopened if a subscriber arrives while it is being closed.
+        # Guards opening and closing the input, so that it is reopened if a subscriber arrives while it is being closed.
         self._lock = threading.Lock()
 
         self._output = Output(

@@ -18,7 +18,7 @@ _WARN_SECONDS = 5
 
 
 class MetaLazyTransport(type):
-    """Calls ``_post_init`` after the constructors of all subclasses, so that their publishers already exist."""
+    """A metaclass that calls ``_post_init`` after the constructors of all subclasses have created their publishers."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
@@ -27,7 +27,7 @@ class MetaLazyTransport(type):
 
 
 class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
-    """The base class of nodes that subscribe only while their own topics have subscribers.
+    """A base class for nodes that subscribe to their inputs only while their own topics have subscribers.
 
     Subclass it, create publishers with ``advertise``, and implement ``subscribe`` and ``unsubscribe``. If the parameter
     ``~lazy`` is false, the node subscribes when the object is created, and stays subscribed.
@@ -61,12 +61,12 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         raise NotImplementedError("Please overwrite this method")
 
     def peer_subscribe(self, *args: object, **kwargs: object) -> None:
-        """Subscribe when one of the node's topics gets a subscriber."""
+        """Subscribe to the inputs when one of the node's topics gets a subscriber."""
         rospy.logdebug(f"[{args[0]}] is subscribed")
         self._subscribe_once()
 
     def peer_unsubscribe(self, *args: object, **kwargs: object) -> None:
-        """Unsubscribe when none of the node's topics has any subscribers left."""
+        """Unsubscribe from the inputs when none of the node's topics has a subscriber any more."""
         rospy.logdebug(f"[{args[0]}] is unsubscribed")
         if not rospy.get_param("~lazy", True):
             return
@@ -77,7 +77,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
                 self._connection_status = False
 
     def advertise(self, *args: Any, **kwargs: Any) -> Publisher[Message]:
-        """Return a publisher. The arguments are those of ``rospy.Publisher`` except ``subscriber_listener``."""
+        """Return a publisher. Takes the arguments of ``rospy.Publisher`` except ``subscriber_listener``."""
         assert len(args) < 3 or args[2] is None, "subscriber_listener is this object"
         assert kwargs.get("subscriber_listener") is None, "subscriber_listener is this object"
         if len(args) < 3:
@@ -90,7 +90,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         return publisher
 
     def _subscribe_once(self) -> None:
-        # The constructor's thread and the listener's thread may both get here at the same time.
+        # The constructor's thread and the listener's thread may reach this at the same time.
         with self._changing:
             if self._connection_status is not True:
                 self.subscribe()

@@ -77,7 +77,7 @@ def _run(
     parser: argparse.ArgumentParser,
     prepare: Callable[[argparse.Namespace], _Start],
 ) -> int:
-    """Check the arguments without a master, then run the node until it shuts down. Return the exit status."""
+    """Check the arguments before contacting a master, then run the node until it shuts down. Return the exit status."""
     try:
         start = prepare(parser.parse_args(rospy.myargv()[1:]))
         rospy.init_node(name, anonymous=True)
@@ -96,7 +96,7 @@ def _transform(options: argparse.Namespace) -> _Start:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
-            # Store the top-level module: an expression that uses tf.transformations needs the name tf.
+            # Store the top-level module: an expression such as tf.transformations.X needs the name tf.
             modules[name.partition(".")[0]] = importlib.import_module(name.partition(".")[0])
             importlib.import_module(name)
         except ImportError as error:
@@ -144,7 +144,7 @@ def _relay(options: argparse.Namespace) -> _Start:
 
 
 def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Message]:
-    """Call a function with each message, or with the given field. Raise MinirospyError if the topic does not exist."""
+    """Call a function with each message, or with the chosen field. Raise MinirospyError if the topic does not exist."""
     name = rospy.resolve_name(options.input)
     cls, topic, field = rostopic.get_topic_class(name, blocking=options.wait_for_start)
     if cls is None or topic is None:
@@ -167,7 +167,7 @@ def _compiled(expression: str) -> CodeType:
 
 
 def _evaluated(template: dict[str, object], value: object) -> dict[str, object]:
-    """Evaluate the strings in a template's fields. Leave a string that is not a valid expression unchanged."""
+    """Evaluate the strings in a template as expressions. Leave strings that are not valid expressions unchanged."""
     found: dict[str, object] = {}
     for name, each in template.items():
         if isinstance(each, dict):

@@ -21,7 +21,7 @@ def main() -> None:
         try:
             (x, y, _), _ = listener.lookupTransform("/turtle2", "/turtle1", rospy.Time(0))
         except (tf.LookupException, tf.ConnectivityException, tf.ExtrapolationException):
-            # Some frames have not been received yet.
+            # Some frames have not been received yet, so try again later.
             pass
         else:
             twist = Twist()

@@ -24,7 +24,7 @@ def main() -> None:
         try:
             target = frames.lookup_transform(name, "turtle1", rospy.Time()).transform.translation
         except tf2_ros.TransformException:
-            # Some frames have not been received yet.
+            # Some frames have not been received yet, so try again later.
             pass
         else:
             twist = Twist()

@@ -89,7 +89,7 @@ def _graph(file: str | None, output: str | None) -> None:
         print(_NO_OUTPUT + _USAGE, file=sys.stderr)
     robot = _read(file)
     name = robot.name if output is None else output
-    # The file may be untrusted, so do not let the robot's name determine where files are written.
+    # The file may be untrusted, so the robot's name must not determine where files are written.
     if output is None and (not name or name != Path(name).name or name.startswith(".") or "\\" in name):
         raise UsageError(f"the robot's name [{name}] is not a file's name: name the OUTPUT")
 
@@ -113,13 +113,13 @@ def _picture(robot: Robot) -> str:
         x, y, z = joint.origin.xyz
         roll, pitch, yaw = rpy_from_quaternion(quaternion_from_rpy(*joint.origin.rpy))
         pose = (f"xyz: {x:g} {y:g} {z:g}", f"rpy: {roll:g} {pitch:g} {yaw:g}")
-        # Put spaces around the joint's name, because a joint and a link may have the same one.
+        # Put spaces around the joint's name, because a joint and a link may have the same name.
         edges += [Edge(joint.parent, f" {name} ", pose), Edge(f" {name} ", joint.child)]
     return tree_svg(edges, robot.name, alone=[robot.root], round_=[f" {name} " for name in robot.joints])
 
 
 def _read(file: str) -> Robot:
-    """Read the robot from a file and print its problems. Raise WordedError if the file cannot be read or parsed."""
+    """Read a robot description from a file and print its problems. Raise WordedError if it cannot be read or parsed."""
     from minirospy.core.urdf.read import read_robot
 
     try:

@@ -39,7 +39,7 @@ class JointDynamics(Object):
 
 
 class JointCalibration(Object):
-    """The positions where a joint's reference sensor changes its signal."""
+    """The joint positions at which a reference sensor's signal changes."""
 
     TAG = "calibration"
     FIELDS = (Attribute("rising", _NUMBER, False, 0), Attribute("falling", _NUMBER, False, 0))
@@ -74,7 +74,7 @@ class JointLimit(Object):
 
 
 class JointMimic(Object):
-    """The joint whose position this joint follows."""
+    """The joint that this joint mimics."""
 
     TAG = "mimic"
     FIELDS = (
@@ -92,7 +92,7 @@ class JointMimic(Object):
 
 
 class SafetyController(Object):
-    """The limits that a safety controller enforces."""
+    """The limits that a joint's safety controller enforces."""
 
     TAG = "safety_controller"
     FIELDS = (
@@ -162,13 +162,13 @@ class Joint(Object):
         self.mimic = mimic
 
     def check_valid(self) -> None:
-        """Raise AssertionError if the type is unknown."""
+        """Raise AssertionError if the joint's type is unknown."""
         if self.type not in self.TYPES:
             raise AssertionError(f"Invalid joint type: {self.type}")
 
     @property
     def joint_type(self) -> str | None:
-        """Return ``type``; this is its former name."""
+        """Return ``type``; ``joint_type`` is its former name."""
         return self.type
 
     @joint_type.setter
@@ -177,7 +177,7 @@ class Joint(Object):
 
 
 class PR2Transmission(Object):
-    """A PR2 transmission."""
+    """A transmission in the PR2's format."""
 
     TAG = "pr2_transmission"
     FIELDS = (
@@ -204,7 +204,7 @@ class PR2Transmission(Object):
 
 
 class Actuator(Object):
-    """A transmission's actuator."""
+    """An actuator in a transmission."""
 
     TAG = "actuator"
     FIELDS = (_NAME, Element("mechanicalReduction", _NUMBER, False))
@@ -215,7 +215,7 @@ class Actuator(Object):
 
 
 class TransmissionJoint(Object):
-    """A transmission's joint."""
+    """A joint in a transmission."""
 
     TAG = "joint"
     FIELDS = (_NAME, Many("hardwareInterface", _TEXT))

@@ -48,7 +48,7 @@ class Pose(Object):
 
     @property
     def rotation(self) -> Sequence[float] | None:
-        """Return ``rpy``; this is its former name."""
+        """Return ``rpy``; ``rotation`` is its former name."""
         return self.rpy
 
     @rotation.setter
@@ -57,7 +57,7 @@ class Pose(Object):
 
     @property
     def position(self) -> Sequence[float] | None:
-        """Return ``xyz``; this is its former name."""
+        """Return ``xyz``; ``position`` is its former name."""
         return self.xyz
 
     @position.setter
@@ -69,7 +69,7 @@ _ORIGIN = Element("origin", ObjectOf(Pose), False)
 
 
 class Color(Object):
-    """A colour: red, green, blue and opacity from 0 to 1, as three or four numbers or as one list."""
+    """A colour (red, green, blue and opacity, from 0 to 1), given as three or four numbers or as one list."""
 
     TAG = "color"
     FIELDS = (Attribute("rgba", VectorOf(4)),)
@@ -126,12 +126,12 @@ class Mesh(Object):
 
 
 class GeometricType(Codec[Object]):
-    """A codec for the single shape in a ``<geometry>``."""
+    """A codec for the single shape in a ``<geometry>`` element."""
 
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
-        """Return the shape. Raise AssertionError unless the element contains exactly one shape."""
+        """Return the shape in the element. Raise AssertionError unless the element contains exactly one shape."""
         if len(node) != 1:
             raise AssertionError("One element only for geometric")
         kind = self._KINDS.get(node[0].tag)
@@ -140,7 +140,7 @@ class GeometricType(Codec[Object]):
         return kind.from_xml(node[0], path)
 
     def write_xml(self, node: ET.Element, value: Object) -> None:
-        """Write the shape."""
+        """Write the shape into the element."""
         if type(value) not in self._KINDS.values():
             raise Exception(f"Invalid geometric type: {type(value)}")
         value.write_xml(ET.SubElement(node, value.TAG))
@@ -161,7 +161,7 @@ class Collision(Object):
 
 
 class Texture(Object):
-    """An image on a shape."""
+    """An image that covers a shape."""
 
     TAG = "texture"
     FIELDS = (Attribute("filename", _TEXT),)
@@ -190,7 +190,7 @@ class Material(Object):
 
 
 class LinkMaterial(Material):
-    """A shape's material, which may have only a name."""
+    """A shape's material. Unlike a robot's material, it may have only a name."""
 
     def check_valid(self) -> None:
         """Accept a material that has only a name."""
@@ -265,7 +265,7 @@ class Inertial(Object):
 
 
 class Link(Object):
-    """A link; ``visual`` and ``collision`` are the first shape of each kind."""
+    """A link. ``visual`` and ``collision`` are its first visual and its first collision shape."""
 
     TAG = "link"
     FIELDS = (

@@ -80,7 +80,7 @@ class _Transmissions(Codec[Object]):
 
 
 class Robot(Object):
-    """A robot. Its parts are in lists, and keyed by name in ``joint_map`` and ``link_map``.
+    """A robot. Its parts are available in lists and, keyed by name, in ``joint_map`` and ``link_map``.
 
     ``parent_map`` maps a link to (joint, parent link), ``child_map`` a link to [(joint, child link), ...].
     """
@@ -114,7 +114,7 @@ class Robot(Object):
 
     @classmethod
     def from_parameter_server(cls, key: str = "robot_description") -> Robot:
-        """Build the robot from the description in a parameter.
+        """Build the robot from the description stored in a parameter.
 
         Raise KeyError if the parameter is not set, and the exceptions of from_xml_string if the description is invalid.
         """
@@ -123,7 +123,7 @@ class Robot(Object):
         return cls.from_xml_string(rospy.get_param(key))
 
     def add_aggregate(self, xml_var: str, obj: Any) -> None:
-        """Add a part to the robot."""
+        """Add a part to the robot under the tag ``xml_var``."""
         super().add_aggregate(xml_var, obj)
         if xml_var == "joint":
             self.joint_map[obj.name] = obj
@@ -143,7 +143,7 @@ class Robot(Object):
     def get_chain(
         self, root: str, tip: str, joints: bool = True, links: bool = True, fixed: bool = True
     ) -> list[str]:
-        """Return the names of joints (including ``fixed`` ones) and links from the link ``root`` down to ``tip``.
+        """Return the names on the path from link ``root`` to link ``tip``: joints (optionally ``fixed`` ones), links, or both.
 
         Raise KeyError if ``tip`` is not below ``root``.
         """
@@ -170,7 +170,7 @@ class Robot(Object):
         return roots[0]
 
     def post_read_xml(self) -> None:
-        """Raise ValueError if the version is not supported."""
+        """Raise ValueError if the description's version is not supported."""
         if self.version is None:
             self.version = "1.0"
         numbers = self.version.split(".")

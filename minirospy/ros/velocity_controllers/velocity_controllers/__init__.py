@@ -18,13 +18,13 @@ __all__ = ["JointGroupVelocityController", "JointPositionController", "JointVelo
 
 
 class JointVelocityController(ForwardCommandController):
-    """Forwards velocity commands to a joint."""
+    """Forwards velocity commands to one joint."""
 
     interfaces = (Interface.VELOCITY,)
 
 
 class JointPositionController(PidJointPositionController):
-    """Controls a joint's position through its velocity."""
+    """Controls a joint's position by commanding its velocity."""
 
     interfaces = (Interface.VELOCITY,)
 

@@ -21,7 +21,7 @@ from minirospy.command.command import run
 __all__ = ["main"]
 
 _ALWAYS = {"--xacro-ns", "--check-order"}
-"""Options for behaviour that has always been enabled since ROS Melodic."""
+"""Options that ROS accepts without effect: their behaviour has always been enabled since Melodic."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _xacro(words: Sequence[str]) -> int:
-    # Import this module here: the package xacro uses it in an `except` clause without importing it.
+    # Import this module because the package xacro uses it in an `except` clause without importing it.
     import xml.parsers.expat  # noqa: F401
 
     try:
@@ -42,12 +42,12 @@ def _xacro(words: Sequence[str]) -> int:
         ) from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
-        # Write UTF-8 regardless of the system's code page: a robot description is UTF-8, and roslaunch reads it as such.
+        # Write UTF-8 regardless of the system's code page, because roslaunch reads a robot description as UTF-8.
         sys.stdout.reconfigure(encoding="utf-8")
     evaluate = xacro.eval_extension
 
     def eval_extension(text: str) -> object:
-        """Evaluate `$(...)`. Shorten the error for a missing package, which xacro would print twice and with a class name."""
+        """Evaluate `$(...)`. Shorten the error about a missing package, which xacro would print twice, with a class name."""
         try:
             return evaluate(text)
         except xacro.XacroException as error:

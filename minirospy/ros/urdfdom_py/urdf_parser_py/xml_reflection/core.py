@@ -22,7 +22,7 @@ _V = TypeVar("_V")
 
 
 def on_error_stderr(message: str) -> None:
-    """Print an error about an unknown or invalid part of a description."""
+    """Print an error about an unknown or invalid part of a description to stderr."""
     sys.stderr.write(message + "\n")
 
 
@@ -31,7 +31,7 @@ on_error: Callable[[str], object] = on_error_stderr
 
 
 def report(message: str) -> None:
-    """Call the program's replacement for on_error or, if there is none, on_error itself."""
+    """Report an error through on_error, which a program may have replaced."""
     module = sys.modules.get("urdf_parser_py.xml_reflection.core")
     replaced = getattr(module, "on_error", on_error_stderr)
     (on_error if replaced is on_error_stderr else replaced)(message)
@@ -51,7 +51,7 @@ class Path:
 
 
 class ParseError(Exception):
-    """Raised if a description cannot be read. ``e`` is the error, ``path`` the element's path."""
+    """Raised if a description cannot be parsed. ``e`` is the cause, ``path`` the path to the element."""
 
     def __init__(self, e: Exception, path: Path) -> None:
         self.e = e
@@ -60,7 +60,7 @@ class ParseError(Exception):
 
 
 class Codec(Generic[_V]):
-    """Converts between a value and an element or an attribute's string."""
+    """Converts a value to and from an element, or an attribute's string."""
 
     def from_string(self, text: str) -> _V:
         """Convert a string to a value. Raise ValueError if the string is invalid."""
@@ -96,13 +96,13 @@ class Number(Codec[float]):
 
 
 class VectorOf(Codec[Iterable[float]]):
-    """A codec for a list of numbers with a fixed length."""
+    """A codec for a list that contains a fixed number of numbers."""
 
     def __init__(self, count: int) -> None:
         self._count = count
 
     def from_string(self, text: str) -> list[float]:
-        """Convert a string to numbers. Raise AssertionError if their count is wrong, ValueError if a number is invalid."""
+        """Convert a string to numbers. Raise AssertionError if their number is wrong, ValueError if one is invalid."""
         words = text.split()
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")
@@ -117,7 +117,7 @@ class VectorOf(Codec[Iterable[float]]):
 
 
 class NamedAttribute(Codec[_V]):
-    """A codec for an element whose value is one attribute, such as ``<parent link="base"/>``."""
+    """A codec for an element whose value is a single attribute, such as ``<parent link="base"/>``."""
 
     def __init__(self, attribute: str, codec: Codec[_V]) -> None:
         self._attribute = attribute
@@ -131,7 +131,7 @@ class NamedAttribute(Codec[_V]):
         return self._codec.from_string(text)
 
     def write_xml(self, node: ET.Element, value: _V) -> None:
-        """Write the attribute."""
+        """Write the value as an attribute."""
         node.set(self._attribute, self._codec.to_string(value))
 
 
@@ -150,25 +150,25 @@ class Raw(Codec[ET.Element]):
 
 
 class ObjectOf(Codec["Object"]):
-    """A codec for an element represented by an object of a given class."""
+    """A codec for an element that an object of a given class represents."""
 
     def __init__(self, kind: type[Object]) -> None:
         self.kind = kind
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
-        """Return the object."""
+        """Return the object for an element."""
         found = self.kind()
         found.read_xml(node, path)
         return found
 
     def write_xml(self, node: ET.Element, value: Object) -> None:
-        """Write the object."""
+        """Write the object into an element."""
         value.write_xml(node)
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """An attribute of an element, stored as an attribute of its object."""
+    """An attribute of an XML element, stored as an attribute of the Python object."""
 
     name: str
     codec: Codec[Any]
@@ -190,14 +190,14 @@ class Element:
 
 @dataclass(frozen=True)
 class Many:
-    """Child elements that occur any number of times, stored as a list in the attribute ``name`` + "s"."""
+    """Child elements that may occur any number of times, stored as a list in the attribute ``name`` + "s"."""
 
     name: str
     codec: Codec[Any]
 
 
 class Object:
-    """An element as an object: ``TAG`` is the element's tag, ``FIELDS`` describes its attributes and children."""
+    """An XML element as an object. ``TAG`` is the element's tag; ``FIELDS`` describes its attributes and children."""
 
     TAG: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[Attribute | Element | Many, ...]] = ()
@@ -228,12 +228,12 @@ class Object:
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML string into this object and return the object. Raise the same exceptions as from_xml_string."""
+        """Parse an XML string into this object; return the object. Raise the same exceptions as from_xml_string."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
     def read_xml(self, node: ET.Element, path: Path) -> None:
-        """Read an element into this object. Raise ParseError if the element is invalid."""
+        """Parse an element into this object. Raise ParseError if the element is invalid."""
         self._read_attributes(node, path)
         self._read_elements(node, path)
         attributes = {each.name for each in self.FIELDS if isinstance(each, Attribute)}
@@ -294,13 +294,13 @@ class Object:
         setattr(self, field.name, [*default] if isinstance(default, list) else default)
 
     def post_read_xml(self) -> None:
-        """Do nothing; subclasses in programs override it to run code after reading."""
+        """Do nothing; user subclasses override this method to run code after reading."""
 
     def check_valid(self) -> None:
         """Raise an exception if the object is invalid."""
 
     def pre_write_xml(self) -> None:
-        """Do nothing; subclasses in programs override it to prepare for writing."""
+        """Do nothing; user subclasses override this method to run code before writing."""
 
     # --- writing XML
 
@@ -337,31 +337,31 @@ class Object:
         for name, value in self._aggregates() if codecs else ():
             codecs[name].write_xml(ET.SubElement(node, name), value)
 
-    # --- lists of elements, in the order in which they were added
+    # --- lists of child elements, in the order in which they were added
 
     def aggregate_init(self) -> None:
-        """Reset the lists of elements."""
+        """Create the empty lists of child elements."""
         self.aggregate_order: list[object] = []
         self.aggregate_type: dict[object, str] = {}
 
     def get_aggregate_list(self, xml_var: str) -> list[object]:
-        """Return the list of elements with this tag."""
+        """Return the list of child elements with this tag."""
         found: list[object] = getattr(self, f"{xml_var}s")
         return found
 
     def add_aggregate(self, xml_var: str, obj: object) -> None:
-        """Add an element with this tag."""
+        """Add a child element with this tag."""
         self.get_aggregate_list(xml_var).append(obj)
         self.aggregate_order.append(obj)
         self.aggregate_type[obj] = xml_var
 
     def remove_aggregate(self, obj: object) -> None:
-        """Remove an element."""
+        """Remove a child element."""
         self.aggregate_order.remove(obj)
         self.get_aggregate_list(self.aggregate_type.pop(obj)).remove(obj)
 
     def lump_aggregates(self) -> None:
-        """Group the elements by tag."""
+        """Reorder the child elements, so that those with the same tag are adjacent."""
         self.aggregate_init()
         for field in self.FIELDS:
             if isinstance(field, Many):
