@@ -55,7 +55,7 @@ test: $(READY)
 interop: $(READY)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pip install -q foxglove-sdk || echo "foxglove-sdk cannot be installed: its server is not compared"
-	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop --ignore=tests/interop/test_interop_ros2.py
+	@$(BIN)/python -m pytest -n 3 --dist worksteal tests/interop --ignore=tests/interop/test_interop_ros2.py
 	@$(BIN)/python -m pip install -q tree-sitter tree-sitter-powershell || echo "the grammar of PowerShell cannot be installed"
 	@$(BIN)/python -m pytest -n 2 -k "zsh or fish or shellcheck or grammar" tests/workspace
 
