@@ -74,7 +74,7 @@ class ForkedCommand:
     """A started command, with those methods of subprocess.Popen that its tests use."""
 
     def __init__(self, stdin: int, stdout: int, stderr: int, state: int) -> None:
-        self._stdin, self.stdout, self._stderr = os.fdopen(stdin, "w"), os.fdopen(stdout), os.fdopen(stderr)
+        self._stdin, self.stdout, self.stderr = os.fdopen(stdin, "w"), os.fdopen(stdout), os.fdopen(stderr)
         self._state = os.fdopen(state)
         self._readers: list[threading.Thread] = []
         self._texts = ["", ""]
@@ -111,7 +111,7 @@ class ForkedCommand:
         return self._texts[0], self._texts[1]
 
     def _read(self, index: int) -> None:
-        with (self.stdout, self._stderr)[index] as stream:
+        with (self.stdout, self.stderr)[index] as stream:
             self._texts[index] = stream.read()
 
 
