@@ -128,7 +128,7 @@ $(PROGRAMS): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py 
 # minirospy[dev] is the installed one: only the packages of the extra are added.
 $(STAMP): $(PROGRAMS)
 	@echo "Installing what the tests and checks need into $(VENV) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "minirospy[dev]"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile "minirospy[dev]"
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
 
 # Written again when a module that programs import changes what it offers.

@@ -82,7 +82,8 @@ def make_environment(python: str, label: str) -> Path:
     stamp = folder / ".installed"
     if not stamp.exists() or stamp.stat().st_mtime < (ROOT / "pyproject.toml").stat().st_mtime:
         subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=True)
-        pip = [str(inner), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+        # Modules are compiled when they are first imported: most of them never are.
+        pip = [str(inner), "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
         subprocess.run([*pip, "--editable", f"{ROOT}[dev]"], check=True)
         stamp.touch()
     return inner
