@@ -69,7 +69,7 @@ windows: $(READY)
 	@$(BIN)/python -m pytest tests/windows
 	@$(BIN)/python tests/windows/windows.py test $(WINDOWS_TESTS)
 
-# Without the tests of the sources' structure, whose result is that of `make test` on any Python.
+# The tests of the sources' structure are left out: their result does not depend on the Python.
 pythons: $(READY)
 	@$(BIN)/python tools/pythons.py $(PYTHONS) -- $(filter-out tests/test_architecture.py tests/test_layers.py,$(CHECKED))
 

@@ -1,4 +1,4 @@
-"""Run commands of real ROS in forks of a process that has imported the command's module, which takes most of their time.
+"""Run commands of real ROS in forks of a process that has imported the command's module: imports take most of their time.
 
 The command's code, arguments, environment, folder and streams are those of a separate start. Debian's Python runs this file
 as the server of one command: ``forked_commands.py /usr/bin/rostopic rostopic SOCKET``.
@@ -71,7 +71,7 @@ class Server:
 
 
 class ForkedCommand:
-    """A started command, with those methods of subprocess.Popen that its tests use."""
+    """A started command, with the methods of subprocess.Popen that the tests use."""
 
     def __init__(self, stdin: int, stdout: int, stderr: int, state: int) -> None:
         self._stdin, self.stdout, self.stderr = os.fdopen(stdin, "w"), os.fdopen(stdout), os.fdopen(stderr)
