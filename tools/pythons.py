@@ -3,6 +3,7 @@
 Each version gets an environment in build/pythons, and runs the tests with `-X dev`, so that a test fails if it leaves a
 socket or file open. Arguments select versions (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`), or name an
 interpreter's path. Arguments after `--` are passed to pytest. The exit status is 1 if a test failed on any version.
+With `--install`, it only creates the environments.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ FOLDER = ROOT / "build" / "pythons"
 def main(words: Sequence[str]) -> int:
     """Run the tests; return the exit status."""
     split = list(words).index("--") if "--" in words else len(words)
-    chosen, arguments = words[:split], list(words[split + 1 :])
+    chosen, arguments = [word for word in words[:split] if word != "--install"], list(words[split + 1 :])
     pythons = [word for word in chosen if os.sep in word]
     names = [word for word in chosen if os.sep not in word]
     found = find_pythons() if names or not chosen else {}
@@ -33,11 +34,15 @@ def main(words: Sequence[str]) -> int:
     except LookupError as error:
         sys.exit(error.args[0])
 
+    if "--install" in words[:split]:
+        for python in pythons:
+            make_environment(python, _version(python))
+        return 0
     failed = []
     for python in pythons:
         label = _version(python)
         start = time.monotonic()
-        passed = _run_tests(_environment(python, label), arguments)
+        passed = _run_tests(make_environment(python, label), arguments)
         print(
             f"Python {label}: {'passed' if passed else 'FAILED'} in {time.monotonic() - start:.0f} s",
             flush=True,
@@ -67,7 +72,7 @@ def _version(python: str) -> str:
     return subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 
 
-def _environment(python: str, label: str) -> Path:
+def make_environment(python: str, label: str) -> Path:
     """Return the interpreter of an environment with this checkout and its test dependencies.
 
     The environment is created once.
@@ -77,7 +82,8 @@ def _environment(python: str, label: str) -> Path:
     stamp = folder / ".installed"
     if not stamp.exists() or stamp.stat().st_mtime < (ROOT / "pyproject.toml").stat().st_mtime:
         subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=True)
-        pip = [str(inner), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+        # Modules are compiled when they are first imported: most of them never are.
+        pip = [str(inner), "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-compile"]
         subprocess.run([*pip, "--editable", f"{ROOT}[dev]"], check=True)
         stamp.touch()
     return inner

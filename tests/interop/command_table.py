@@ -18,10 +18,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
 from tests.interop.conftest import PATIENCE
+from tests.interop.forked_commands import MODULES, ForkedCommand, Server, can_fork
 
 PAGE = Path(__file__).parents[2] / "docs" / "compatibility" / "commands.md"
 REAL = Path("/usr/bin")
@@ -678,17 +680,32 @@ def compare(
     With ``prepare``, run all lines with one tool, then with the other, and call ``prepare()`` before each of the two runs.
     """
     lines = [line for line in text.strip().splitlines() if line]
+    with ExitStack() as running:
+        forked = {
+            name: running.enter_context(Server(REAL / name)) for name in MODULES if name in text.split()
+        }
+        return _compare(lines, uri, folder, forked, streaming, prepare)
+
+
+def _compare(
+    lines: list[str],
+    uri: str,
+    folder: Path,
+    forked: dict[str, Server],
+    streaming: bool,
+    prepare: Callable[[], object] | None,
+) -> list[Row]:
     if prepare:
         sides: list[list[Ended]] = [[], []]
         for side, tools in zip(sides, (REAL, OURS), strict=True):
             for line in lines:
                 prepare()
-                side.append(_run(line, tools, uri, folder, streaming))
+                side.append(_run(line, tools, uri, folder, forked, streaming))
         real, ours = sides
     else:
         with ThreadPoolExecutor(6) as pool:
             jobs = [
-                [pool.submit(_run, line, tools, uri, folder, streaming) for tools in (REAL, OURS)]
+                [pool.submit(_run, line, tools, uri, folder, forked, streaming) for tools in (REAL, OURS)]
                 for line in lines
             ]
             real, ours = ([job[side].result() for job in jobs] for side in (0, 1))
@@ -703,7 +720,7 @@ def compare(
             row = rows[index]
             if row.equal != bool(row.why):
                 break
-            both = [_run(line, tools, uri, folder, streaming) for tools in (REAL, OURS)]
+            both = [_run(line, tools, uri, folder, forked, streaming) for tools in (REAL, OURS)]
             rows[index] = row._replace(real=both[0], ours=both[1])
     return rows
 
@@ -791,23 +808,14 @@ def _typed(line: str, streaming: bool) -> str:
     return typed.partition(" ")[2] + " (then Ctrl-C)" if streaming else typed
 
 
-def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> Ended:
+def _run(line: str, tools: Path, uri: str, folder: Path, forked: dict[str, Server], streaming: bool) -> Ended:
     typed = line.partition(" ## ")[0]
     count = 0
     if streaming:
         number, _, typed = typed.partition(" ")
         count = int(number)
     typed, _, text = typed.partition(" <<< ")
-    words = shlex.split(typed)
-    program = subprocess.Popen(
-        [str(tools / words[0]), *words[1:]],
-        env={**os.environ, "ROS_MASTER_URI": uri, "PYTHONUNBUFFERED": "1"},
-        cwd=folder,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    program = _started(shlex.split(typed), tools, uri, folder, forked)
     if streaming:
         return _interrupted(program, count)
 
@@ -830,7 +838,24 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
     return Ended(status, *(_steady(part, folder) for part in (out, err)))
 
 
-def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
+def _started(
+    words: list[str], tools: Path, uri: str, folder: Path, forked: dict[str, Server]
+) -> subprocess.Popen[str] | ForkedCommand:
+    environment = {**os.environ, "ROS_MASTER_URI": uri, "PYTHONUNBUFFERED": "1"}
+    if tools == REAL and words[0] in forked and can_fork(words):
+        return forked[words[0]].start(words[1:], environment, folder)
+    return subprocess.Popen(
+        [str(tools / words[0]), *words[1:]],
+        env=environment,
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _interrupted(program: subprocess.Popen[str] | ForkedCommand, count: int) -> Ended:
     assert program.stdout
     lines = "".join(_until_filled(program.stdout, count))
     program.send_signal(signal.SIGINT)

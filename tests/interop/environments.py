@@ -43,7 +43,8 @@ class PeerEnvironment:
         """Create the venv and install the packages; return whether pip succeeded."""
         print("Installing", self.packages[0].partition("==")[0], "and more from PyPI into", self.folder)
         subprocess.run([sys.executable, "-m", "venv", "--clear", str(self.folder)], check=True)
-        options = ["-q", "--disable-pip-version-check", "--prefer-binary"]
+        # Modules are compiled when they are first imported: most of them never are.
+        options = ["-q", "--disable-pip-version-check", "--prefer-binary", "--no-compile"]
         command = [str(self.python), "-m", "pip", "install", *options, *self.packages]
         return subprocess.run(command, capture_output=True, check=False).returncode == 0
 

@@ -255,9 +255,16 @@ def repeated(values: list[Any], length: int) -> list[Any]:
     return (values * length)[:length]
 
 
-def field_values(type_: FieldType, lookup: Lookup) -> st.SearchStrategy[Any]:
-    """Return a strategy for a field's values."""
-    one = PRIMITIVES[type_.base] if type_.is_primitive else message_values(lookup(type_.base), lookup)
+def field_values(type_: FieldType, lookup: Lookup, *, is_nested: bool) -> st.SearchStrategy[Any]:
+    """Return a strategy for a field's values.
+
+    Printing many strings takes long, so ``is_nested``, for a field of a nested message, excludes long arrays of them.
+    """
+    one = (
+        PRIMITIVES[type_.base]
+        if type_.is_primitive
+        else message_values(lookup(type_.base), lookup, is_nested=True)
+    )
     if not type_.is_array:
         return one
     length = type_.length
@@ -270,15 +277,18 @@ def field_values(type_: FieldType, lookup: Lookup) -> st.SearchStrategy[Any]:
     short = st.lists(one, max_size=3 if type_.is_primitive else 2)
     return (
         short | st.lists(one, min_size=1, max_size=2).map(lambda values: repeated(values, 300))
-        if type_.is_primitive
+        if type_.is_primitive and not (is_nested and type_.base == "string")
         else short
     )
 
 
-def message_values(spec: MessageSpec, lookup: Lookup) -> st.SearchStrategy[Plain]:
+def message_values(spec: MessageSpec, lookup: Lookup, *, is_nested: bool = False) -> st.SearchStrategy[Plain]:
     """Return a strategy for a message's values."""
     return st.fixed_dictionaries(
-        {python_name(field.name): field_values(field.type, lookup) for field in spec.fields}
+        {
+            python_name(field.name): field_values(field.type, lookup, is_nested=is_nested)
+            for field in spec.fields
+        }
     )
 
 
