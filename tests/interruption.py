@@ -10,18 +10,22 @@ from types import FrameType
 __all__ = ["ends_elsewhere", "interrupt_in_lock"]
 
 
-def interrupt_in_lock(call: Callable[[], object]) -> None:
+def interrupt_in_lock(call: Callable[[], object], number: int = 1) -> None:
     """Call a function; raise KeyboardInterrupt in it between the acquisition of a lock and the start of its ``with`` block.
 
-    This affects only locks that Python code acquires, such as those of Event, Condition and Queue. If the function
-    acquires none of them, it runs to its end.
+    Only locks that Python code acquires count, such as those of Event, Condition and Queue; the interrupt comes at lock
+    ``number``. If the function acquires fewer of them, it runs to its end.
     """
+    count = 0
 
     def interrupt(frame: FrameType, event: str, _: object) -> None:
+        nonlocal count
         code = frame.f_code
         if event == "return" and code.co_name == "__enter__" and code.co_filename == threading.__file__:
-            sys.setprofile(None)
-            raise KeyboardInterrupt
+            count += 1
+            if count == number:
+                sys.setprofile(None)
+                raise KeyboardInterrupt
 
     sys.setprofile(interrupt)
     try:
