@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import queue
+import re
 import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -186,6 +188,33 @@ def test_interrupted_thread_leaves_the_others_free(
             assert ends_elsewhere(call), f"the other thread waits forever, step {step}"
         step += 1
     assert step > 5
+
+
+UNSAFE = re.compile(r"\bthreading\.Event\(\)|=threading\.Event\)|\bqueue\.(?:Lifo|Priority)?Queue\(")
+CONDITION = re.compile(r"(\S+)(?:: \S+)? = threading\.Condition\((.*)\)$", re.MULTILINE)
+SOURCES = Path(clock_module.__file__).parents[1]
+
+
+def unsafe_waits(text: str) -> list[str]:
+    found = UNSAFE.findall(text)
+    for name, lock in CONDITION.findall(text):
+        if not lock or f"with {name}:" in text:
+            found.append(name)
+    return found
+
+
+def test_no_module_waits_where_ctrl_c_would_leave_a_lock_locked() -> None:
+    """Use SignalSafeEvent and SignalSafeQueue. Enter a Condition's lock, which is written in C, not the Condition."""
+    assert unsafe_waits("self.a = threading.Event()\nself.b = queue.Queue(3)\nc: C = threading.Condition()\n")
+    assert unsafe_waits("self.a = threading.Condition(self.b)\nwith self.a:\n    pass\n") == ["self.a"]
+    assert not unsafe_waits("self.a = threading.Condition(self.b)\nwith self.b:\n    self.a.wait()\n")
+    found = {
+        path.relative_to(SOURCES).as_posix(): unsafe
+        for path in SOURCES.rglob("*.py")
+        if (unsafe := unsafe_waits(path.read_text(encoding="utf-8")))
+    }
+    # ROS's API has this condition. The clock is set by threads that no signal interrupts.
+    assert not found.keys() - {"base/clock.py", "client/session.py"}, found
 
 
 def test_condition_wakes_each_thread_whose_predicate_becomes_true() -> None:
