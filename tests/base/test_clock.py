@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import queue
 import re
 import sys
@@ -143,6 +144,9 @@ def interrupted_at(step: int, call: Callable[[], object]) -> bool:
             raise KeyboardInterrupt
         return trace
 
+    frame = inspect.currentframe()
+    assert frame
+    frame.f_trace_opcodes = True  # Python 3.12 needs it before settrace(), too
     try:
         sys.settrace(trace)
         call()
@@ -197,7 +201,7 @@ SOURCES = Path(clock_module.__file__).parents[1]
 
 def unsafe_waits(text: str) -> list[str]:
     found = UNSAFE.findall(text)
-    for name, lock in CONDITION.findall(text):
+    for name, lock in CONDITION.findall(text) if "threading.Condition(" in text else ():
         if not lock or f"with {name}:" in text:
             found.append(name)
     return found
