@@ -85,3 +85,14 @@ def test_command_uses_ros1_messages_with_ros2_sourced(sourced: dict[str, str], m
     environ = {**sourced, "ROS_MASTER_URI": master}
     done = subprocess.run(words, env=environ, capture_output=True, text=True, timeout=100, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_program_with_the_name_of_a_package_of_both_imports_that_of_ros1(
+    sourced: dict[str, str], tmp_path: Path
+) -> None:
+    program = tmp_path / "geometry_msgs.py"
+    program.write_text("import rospy\nfrom geometry_msgs.msg import Twist\nprint(Twist._type)\n")
+    done = subprocess.run(
+        [sys.executable, str(program)], env=sourced, capture_output=True, text=True, timeout=100, check=False
+    )
+    assert (done.stdout, done.returncode) == ("geometry_msgs/Twist\n", 0), done.stderr

@@ -2,17 +2,22 @@
 
 There is a wall clock, and a simulated clock that other code sets (http://wiki.ros.org/Clock). Times are
 nanoseconds since the epoch.
+
+The main thread uses SignalSafeEvent, SignalSafeCondition and SignalSafeQueue instead of the classes of threading and queue.
+Those are written in Python: an exception from a signal handler, such as KeyboardInterrupt, can interrupt them after they have
+acquired their lock and before the block that releases it. The lock then stays locked, and other threads wait forever.
 """
 
 from __future__ import annotations
 
 import contextlib
+import queue
 import struct
 import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 from minirospy.base.errors import ROSTimeMovedBackwardsException
 
@@ -20,13 +25,16 @@ __all__ = [
     "SILENT_CLOCK",
     "Clock",
     "FirstTimeWait",
+    "SignalSafeCondition",
     "SignalSafeEvent",
+    "SignalSafeQueue",
     "SimulatedClock",
     "WallClock",
     "time_of_clock_message",
     "wait_for_event",
 ]
 
+_T = TypeVar("_T")
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
 """Seconds per wait in the main thread, the thread that receives signals.
@@ -89,6 +97,64 @@ class SignalSafeEvent(threading.Event):
             return lock.acquire(timeout=-1 if timeout is None else max(0.0, timeout)) or self._is_set
         finally:
             self._waiting.remove(lock)
+
+
+class SignalSafeCondition:
+    """A condition that any thread may wait for or notify, whichever code a signal interrupts. It has no lock."""
+
+    def __init__(self) -> None:
+        self._waiting: list[SignalSafeEvent] = []
+
+    def notify_all(self) -> None:
+        """Let the waiting threads call their predicates again. Call this after each change that may affect one."""
+        for event in self._waiting.copy():
+            event.set()
+
+    def wait_for(self, predicate: Callable[[], object], timeout: float | None = None) -> bool:
+        """Wait for at most ``timeout`` seconds until ``predicate()`` is true; return whether it is true.
+
+        A signal can interrupt the wait on every OS.
+        """
+        end = None if timeout is None else time.monotonic() + timeout
+        event = SignalSafeEvent()
+        self._waiting.append(event)
+        try:
+            while True:
+                # Clear the event before the call: a change after the call sets it again.
+                event.clear()
+                if predicate():
+                    return True
+                rest = None if end is None else end - time.monotonic()
+                if rest is not None and rest <= 0:
+                    return False
+                wait_for_event(event, rest)
+        finally:
+            self._waiting.remove(event)
+
+
+class SignalSafeQueue(Generic[_T]):
+    """A queue for at most ``size`` items, which any thread may use, whichever code a signal interrupts."""
+
+    def __init__(self, size: int) -> None:
+        # SimpleQueue is written in C: a signal handler runs only before or after its calls.
+        self._items: queue.SimpleQueue[_T] = queue.SimpleQueue()
+        self._free: queue.SimpleQueue[None] = queue.SimpleQueue()  # one item per free place
+        for _ in range(size):
+            self._free.put(None)
+
+    def put(self, item: _T, timeout: float | None = None) -> None:
+        """Append an item. Raise queue.Full if the queue is still full after ``timeout`` seconds."""
+        try:
+            self._free.get(timeout=timeout)
+        except queue.Empty:
+            raise queue.Full from None
+        self._items.put(item)
+
+    def get(self, timeout: float | None = None) -> _T:
+        """Remove and return the first item. Raise queue.Empty if there is none after ``timeout`` seconds."""
+        item = self._items.get(timeout=timeout)
+        self._free.put(None)
+        return item
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 
-__all__ = ["is_of_ros2", "prefer_ros1"]
+__all__ = ["find_ros1", "is_of_ros2", "prefer_ros1"]
 
 _OVERLAY = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "overlay")
 _SUITABLE = frozenset(
@@ -66,6 +66,15 @@ def prefer_ros1() -> None:
     sys.meta_path.insert(0, finder)
 
 
+def find_ros1(name: str, path: Sequence[str]) -> ModuleSpec | None:
+    """Return the spec of the first top-level package on ``path`` that is not ROS 2's, or None if there is none."""
+    for entry in path:
+        found = PathFinder.find_spec(name, [entry])
+        if found is not None and not is_of_ros2(found):
+            return found
+    return None
+
+
 def is_of_ros2(spec: ModuleSpec) -> bool:
     """Return whether a top-level package belongs to ROS 2."""
     for folder in spec.submodule_search_locations or ():
@@ -94,11 +103,7 @@ class _Finder:
         found = PathFinder.find_spec(fullname)
         if found is None or not is_of_ros2(found):
             return None
-        for entry in sys.path:
-            found = PathFinder.find_spec(fullname, [entry])
-            if found is not None and not is_of_ros2(found):
-                return found
-        return None
+        return find_ros1(fullname, sys.path)
 
 
 @functools.lru_cache(maxsize=1)

@@ -13,6 +13,8 @@ from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import spec_from_file_location
 from types import ModuleType
 
+from minirospy.base.ros1_imports import find_ros1, is_of_ros2
+
 __all__ = ["find_packages_named_like_scripts"]
 
 
@@ -59,6 +61,8 @@ class _Finder:
 
         others = [entry for entry in sys.path if entry != self._folder]
         package = PathFinder.find_spec(fullname, others)
+        if package is not None and is_of_ros2(package):
+            package = find_ros1(fullname, others) or package
         if package is None or package.submodule_search_locations is None or package.loader is None:
             return None
         if f"{fullname}.py" == self._program:

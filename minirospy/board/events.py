@@ -12,6 +12,8 @@ import traceback
 from collections.abc import Callable
 from enum import IntEnum
 
+from minirospy.base.clock import SignalSafeEvent
+
 __all__ = ["Callback", "CallbackThread", "Detector", "Slope"]
 
 Callback = Callable[[int], object]
@@ -38,7 +40,7 @@ class Detector:
         self.active = True
         self._bouncetime = bouncetime
         self._last: float | None = None
-        self._occurred = threading.Event()
+        self._occurred = SignalSafeEvent()
 
     def see(self, level: int, now: float) -> bool:
         """Return whether to report an edge to ``level`` at ``now`` (seconds on a monotonic clock); if so, record the edge."""

@@ -83,7 +83,8 @@ class Link:
         self._directory = directory
         self._on_edge = on_edge
         # Use a reentrant lock: a signal handler, such as a node's shutdown hook, may set pins while its thread holds the lock.
-        self._news = threading.Condition(threading.RLock())
+        self._lock = threading.RLock()
+        self._news = threading.Condition(self._lock)
         self._number = 0
         self._acknowledged = 0
         self._unacknowledged: deque[tuple[int, bytes]] = deque()
@@ -105,7 +106,7 @@ class Link:
         If it is None, only wait for the operations sent earlier. Raise BoardError if the board refuses, or does not
         respond within ``timeout`` seconds.
         """
-        with self._news:
+        with self._lock:
             number = self._send(operation)
             if isinstance(operation, Setup):
                 self._mine.add(operation.pin)
@@ -119,7 +120,7 @@ class Link:
 
     def write(self, levels: Sequence[tuple[int, int]]) -> None:
         """Set output pins' latches, in order, without waiting; the mirror shows the levels immediately."""
-        with self._news:
+        with self._lock:
             if len(self._unacknowledged) >= MAX_UNACKNOWLEDGED:
                 self.call(None)
             number = self._send(Write(levels))
@@ -134,7 +135,7 @@ class Link:
             return
         with contextlib.suppress(BoardError):
             self.call(None, CLOSE_PATIENCE)
-        with self._news:
+        with self._lock:
             self._closed = True
             if self._connection is not None:
                 self._connection.hang_up()
@@ -157,7 +158,7 @@ class Link:
         connection = self._connection
         while connection is not None:
             for messages in connection.incoming():
-                with self._news:
+                with self._lock:
                     edges = [edge for message in messages if (edge := self._take(message))]
                     self._news.notify_all()
                 self._report(edges)
@@ -165,7 +166,7 @@ class Link:
             connection = self._reconnect()
 
     def _reconnect(self) -> _Connection | None:
-        with self._news:
+        with self._lock:
             self._connection = None
         if self._closed:
             return None
@@ -173,12 +174,12 @@ class Link:
         try:
             connection = _reach(self._directory, lambda: self._closed)
         except BoardError as error:
-            with self._news:
+            with self._lock:
                 self._failure = error
                 self._news.notify_all()
             return None
 
-        with self._news:
+        with self._lock:
             if self._closed:
                 connection.hang_up()
                 return None

@@ -6,6 +6,7 @@ import contextlib
 import threading
 from typing import Protocol
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
@@ -34,7 +35,7 @@ class Wave:
         self._gpio = gpio
         self._frequency = frequency
         self._duty = 0.0
-        self._changed = threading.Event()
+        self._changed = SignalSafeEvent()
         self._stopping = False
         self._thread: threading.Thread | None = None
         gpio.register_wave(self)

@@ -239,11 +239,7 @@ class ServiceProxy(Generic[_S_co]):
             is_kept = self.persistent
             raise
         except TransportException as error:
-            if current_session().is_shutdown():
-                raise current_session().lifecycle.interrupted(
-                    "node shutdown interrupted service call"
-                ) from error
-            raise ServiceException(f"transport error completing service call: {error}") from error
+            raise _broken_call(error) from error
         finally:
             if not is_kept:
                 self._drop_transport(transport)
@@ -364,11 +360,7 @@ class ServiceProxy(Generic[_S_co]):
                 f"service [{self.resolved_name}] responded with an error: {error.text!r}"
             ) from None
         except (OSError, WireError) as error:
-            if current_session().is_shutdown():
-                raise current_session().lifecycle.interrupted(
-                    "node shutdown interrupted service call"
-                ) from error
-            raise ServiceException(f"transport error completing service call: {error}") from error
+            raise _broken_call(error) from error
         finally:
             if not keeping:
                 self._drop_client(client)
@@ -437,3 +429,11 @@ def _probe(name: str, timeout: float) -> str | None:
     except (OSError, WireError):
         return _NO_CONTACT
     return None
+
+
+def _broken_call(error: Exception) -> Exception:
+    """Return the exception for a call whose connection failed: because of the node's shutdown, or of ``error``."""
+    session = current_session()
+    if session.is_shutdown():
+        return session.lifecycle.interrupted("node shutdown interrupted service call")
+    return ServiceException(f"transport error completing service call: {error}")

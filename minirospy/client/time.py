@@ -287,7 +287,7 @@ def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
     lifecycle = session.lifecycle
     lifecycle.deferral.poll()
     lifecycle.has_waited = True
-    end = stop or (threading.Event() if lifecycle.is_notified else lifecycle.shutting_down)
+    end = stop or (SignalSafeEvent() if lifecycle.is_notified else lifecycle.shutting_down)
 
     try:
         is_over = session.clock.sleep(nanoseconds, end)

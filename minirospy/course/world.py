@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from minirospy.base.child_lifetime import guard_children
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.environment import LOOPBACK, Environment
 from minirospy.board.board import Board
 from minirospy.course.programs import Program, find_command
@@ -72,7 +73,7 @@ class _Repeat:
     """A thread that publishes a message repeatedly."""
 
     def __init__(self, publisher: TopicPublisher, message: Message, rate: float) -> None:
-        self._ended = threading.Event()
+        self._ended = SignalSafeEvent()
 
         def repeat() -> None:
             while not self._ended.wait(1 / rate):

@@ -33,13 +33,14 @@ class _Worker:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._condition = threading.Condition()
+        self._lock = threading.RLock()
+        self._condition = threading.Condition(self._lock)
         self._thread: threading.Thread | None = None
         self._is_closed = False
 
     def close(self) -> None:
         """Stop the thread. Do not wait for it, because it may be blocked in Zenoh. Idempotent."""
-        with self._condition:
+        with self._lock:
             self._is_closed = True
             self._condition.notify_all()
         if self._thread:
@@ -110,14 +111,14 @@ class _PriorityWorker(_Worker):
         self._ended: list[Outflow] = []
 
     def add(self, outflow: Outflow, key: str, message: bytes) -> None:
-        with self._condition:
+        with self._lock:
             if not self._is_closed:
                 self._owners[outflow._flow] = outflow
                 self._queue.add(outflow._flow, (key, message), len(message))
                 self._wake()
 
     def end(self, outflow: Outflow) -> None:
-        with self._condition:
+        with self._lock:
             self._queue.forget(outflow._flow)
             if self._owners.pop(outflow._flow, None):
                 self._ended.append(outflow)
@@ -125,7 +126,7 @@ class _PriorityWorker(_Worker):
 
     def _run(self) -> None:
         while True:
-            with self._condition:
+            with self._lock:
                 while not (self._is_closed or self._queue or self._ended):
                     self._condition.wait()
                 if self._is_closed:
@@ -235,14 +236,14 @@ class Receiver(_Worker):
         attachment: bytes,
     ) -> None:
         """Queue a call of ``deliver(message, attachment)`` in the receiver's thread."""
-        with self._condition:
+        with self._lock:
             if not self._is_closed:
                 self._queue.add(flow, (deliver, message, attachment), len(message))
                 self._wake()
 
     def _run(self) -> None:
         while True:
-            with self._condition:
+            with self._lock:
                 while not (self._is_closed or self._queue):
                     self._condition.wait()
                 if self._is_closed:

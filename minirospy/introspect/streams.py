@@ -13,7 +13,14 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from minirospy.base.clock import Clock, SignalSafeEvent, SimulatedClock, WallClock, time_of_clock_message
+from minirospy.base.clock import (
+    Clock,
+    SignalSafeEvent,
+    SignalSafeQueue,
+    SimulatedClock,
+    WallClock,
+    time_of_clock_message,
+)
 from minirospy.base.errors import MessageException, MinirospyError, RpcRefused
 from minirospy.core.idl.protocols import is_stamped
 from minirospy.core.wire.framing import Frame, serialize_frame
@@ -59,7 +66,6 @@ class ToolNode:
     ) -> None:
         name = name or f"{tool}_{os.getpid()}_{time.time_ns() // 1_000_000}"
         self.name = f"{environment.namespace.rstrip('/')}/{name}"
-        # Ctrl-C may interrupt wait() anywhere, which would leave a threading.Event locked, and close() would block forever.
         self.ended = SignalSafeEvent()
         self.classes = MessageClasses()
         self.clock: Clock = WallClock()
@@ -224,8 +230,8 @@ class Inbox:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._messages: queue.Queue[Received | None] = queue.Queue(_WAITING)
-        self._closed = threading.Event()
+        self._messages: SignalSafeQueue[Received | None] = SignalSafeQueue(_WAITING)
+        self._closed = SignalSafeEvent()
 
     def put(self, body: Frame, header: Header) -> None:
         """Queue a message; block while the queue is full."""
@@ -242,7 +248,7 @@ class Inbox:
         if not self._closed.is_set():
             self._closed.set()
             try:
-                self._messages.put_nowait(None)
+                self._messages.put(None, timeout=0)
             except queue.Full:
                 pass  # the queue is full, so the reader checks the flag after reading the queued messages
 

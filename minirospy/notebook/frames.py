@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped,import-not-found,unused-ignore]
     import polars  # type: ignore[import-not-found,unused-ignore]
 
+    from minirospy.base.times import Time
     from minirospy.ros.rosbag.rosbag.bag import Bag
 
 __all__ = ["frame"]
@@ -22,8 +23,8 @@ def frame(
     bag: str | os.PathLike[str] | Bag,
     topic: str,
     *,
-    start: Any = None,
-    end: Any = None,
+    start: Time | None = None,
+    end: Time | None = None,
     library: Literal["pandas", "polars"] = "pandas",
 ) -> pandas.DataFrame | polars.DataFrame:
     """Return the messages on a topic of a bag or MCAP file as a data frame with one row per message.
@@ -51,7 +52,7 @@ def frame(
         raise MinirospyError(f"a data frame needs {library}: {install_command(library)}") from error
 
 
-def _read(bag: Bag, topic: str, start: Any, end: Any) -> tuple[list[int], list[Column]]:
+def _read(bag: Bag, topic: str, start: Time | None, end: Time | None) -> tuple[list[int], list[Column]]:
     topics = bag.get_type_and_topic_info().topics
     name = topic if topic in topics else f"/{topic}"
     if name not in topics:

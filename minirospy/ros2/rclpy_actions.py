@@ -14,6 +14,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, InvalidStateError
 from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.ros2.action_links import send_goal_service
 from minirospy.ros2.rclpy_calls import Calls, Message, MessageClass, RclpyFuture
@@ -336,7 +337,7 @@ class ActionServer:
 
     def close(self) -> None:
         """Send known results and rejections, then close the action. Must not be called in the executor's thread."""
-        sent = threading.Event()
+        sent = SignalSafeEvent()
         self._calls.end(functools.partial(self._wait_until_sent, sent))
         sent.wait(CLOSE_SECONDS)
         self._is_closed = True

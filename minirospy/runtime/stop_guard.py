@@ -28,7 +28,8 @@ class StopGuard:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Create the guard; ``clock`` returns seconds."""
         self._clock = clock
-        self._changed = threading.Condition()
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
         self.deadlines: dict[Stop, float] = {}
         self.thread: threading.Thread | None = None
         self._next = 0.0
@@ -39,7 +40,7 @@ class StopGuard:
 
         Raise BridgeError if the thread cannot be started.
         """
-        with self._changed:
+        with self._lock:
             self.deadlines[stop] = deadline
             if self.thread is None:
                 self.thread = threading.Thread(target=self._run, name="stop-guard", daemon=True)
@@ -56,7 +57,7 @@ class StopGuard:
 
     def disarm(self, stop: Stop) -> None:
         """Remove the deadline of ``stop``. Idempotent."""
-        with self._changed:
+        with self._lock:
             self.deadlines.pop(stop, None)
 
     def _run(self) -> None:
@@ -69,7 +70,7 @@ class StopGuard:
 
     def _wait(self) -> list[Stop]:
         """Wait until any deadlines have passed; return their functions, or [] if there are no deadlines."""
-        with self._changed:
+        with self._lock:
             while self.deadlines:
                 now = self._clock()
                 due = [stop for stop, deadline in self.deadlines.items() if deadline <= now]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
+import queue
+import re
 import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -13,13 +17,16 @@ import pytest
 
 from minirospy.base import clock as clock_module
 from minirospy.base.clock import (
+    SignalSafeCondition,
     SignalSafeEvent,
+    SignalSafeQueue,
     SimulatedClock,
     WallClock,
     time_of_clock_message,
     wait_for_event,
 )
 from minirospy.base.errors import ROSTimeMovedBackwardsException
+from tests.interruption import ends_elsewhere
 
 SECOND = 10**9
 
@@ -123,6 +130,138 @@ def test_event_wakes_every_thread_that_waits() -> None:
     assert not event.is_set()
     assert not event.wait(0)
     assert not event.wait(-1)
+
+
+def interrupted_at(step: int, call: Callable[[], object]) -> bool:
+    """Call a function and raise KeyboardInterrupt in it before bytecode number ``step``. Return whether it had that many."""
+    steps = 0
+
+    def trace(frame: FrameType, kind: str, _: Any) -> Any:
+        nonlocal steps
+        frame.f_trace_opcodes = True
+        steps += kind == "opcode"
+        if steps == step:
+            raise KeyboardInterrupt
+        return trace
+
+    frame = inspect.currentframe()
+    assert frame
+    frame.f_trace_opcodes = True  # Python 3.12 needs it before settrace(), too
+    try:
+        sys.settrace(trace)
+        call()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        sys.settrace(None)
+    return steps >= step
+
+
+def of_event() -> tuple[list[Callable[[], object]], list[Callable[[], object]]]:
+    event = SignalSafeEvent()
+    return [lambda: event.wait(0.0001), event.set], [event.set, event.wait]
+
+
+def of_condition() -> tuple[list[Callable[[], object]], list[Callable[[], object]]]:
+    condition = SignalSafeCondition()
+    waits: list[Callable[[], object]] = [
+        lambda: condition.wait_for(lambda: False, 0.0001),
+        condition.notify_all,
+    ]
+    return waits, [condition.notify_all, lambda: condition.wait_for(lambda: True)]
+
+
+def of_queue() -> tuple[list[Callable[[], object]], list[Callable[[], object]]]:
+    items: SignalSafeQueue[int] = SignalSafeQueue(4)
+    items.put(1)
+    return [lambda: items.get(1), lambda: items.put(2, 1)], [lambda: items.put(3), items.get]
+
+
+@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("make", [of_event, of_condition, of_queue])
+def test_interrupted_thread_leaves_the_others_free(
+    make: Callable[[], tuple[list[Callable[[], object]], list[Callable[[], object]]]], number: int
+) -> None:
+    """Interrupt each method at every bytecode, as Ctrl-C could; other threads can then use the object."""
+    step = 1
+    while True:
+        interrupted, afterwards = make()
+        if not interrupted_at(step, interrupted[number]):
+            break
+        for call in afterwards:
+            assert ends_elsewhere(call), f"the other thread waits forever, step {step}"
+        step += 1
+    assert step > 5
+
+
+UNSAFE = re.compile(r"\bthreading\.Event\(\)|=threading\.Event\)|\bqueue\.(?:Lifo|Priority)?Queue\(")
+CONDITION = re.compile(r"(\S+)(?:: \S+)? = threading\.Condition\((.*)\)$", re.MULTILINE)
+SOURCES = Path(clock_module.__file__).parents[1]
+
+
+def unsafe_waits(text: str) -> list[str]:
+    found = UNSAFE.findall(text)
+    for name, lock in CONDITION.findall(text) if "threading.Condition(" in text else ():
+        if not lock or f"with {name}:" in text:
+            found.append(name)
+    return found
+
+
+def test_no_module_waits_where_ctrl_c_would_leave_a_lock_locked() -> None:
+    """Use SignalSafeEvent and SignalSafeQueue. Enter a Condition's lock, which is written in C, not the Condition."""
+    assert unsafe_waits("self.a = threading.Event()\nself.b = queue.Queue(3)\nc: C = threading.Condition()\n")
+    assert unsafe_waits("self.a = threading.Condition(self.b)\nwith self.a:\n    pass\n") == ["self.a"]
+    assert not unsafe_waits("self.a = threading.Condition(self.b)\nwith self.b:\n    self.a.wait()\n")
+    found = {
+        path.relative_to(SOURCES).as_posix(): unsafe
+        for path in SOURCES.rglob("*.py")
+        if (unsafe := unsafe_waits(path.read_text(encoding="utf-8")))
+    }
+    # ROS's API has this condition. The clock is set by threads that no signal interrupts.
+    assert not found.keys() - {"base/clock.py", "client/session.py"}, found
+
+
+def test_condition_wakes_each_thread_whose_predicate_becomes_true() -> None:
+    condition = SignalSafeCondition()
+    reached = 0
+    woken: list[int] = []
+
+    def wait(number: int) -> None:
+        assert condition.wait_for(lambda: reached >= number, 30)
+        woken.append(number)
+
+    threads = [threading.Thread(target=wait, args=(number,), daemon=True) for number in (1, 1, 2)]
+    for thread in threads:
+        thread.start()
+    reached = 1
+    condition.notify_all()
+    for thread in threads[:2]:
+        thread.join(30)
+    assert woken == [1, 1]
+    reached = 2
+    condition.notify_all()
+    threads[2].join(30)
+    assert woken == [1, 1, 2]
+    assert not condition.wait_for(lambda: False, 0)
+    assert not condition.wait_for(lambda: False, -1)
+    assert condition.wait_for(lambda: 1, 0) is True
+
+
+def test_queue_keeps_the_order_and_its_size() -> None:
+    items: SignalSafeQueue[int] = SignalSafeQueue(2)
+    with pytest.raises(queue.Empty):
+        items.get(0)
+    items.put(1)
+    items.put(2)
+    with pytest.raises(queue.Full):
+        items.put(3, 0)
+    assert items.get() == 1
+    items.put(3, 0)
+    assert [items.get(0), items.get(0)] == [2, 3]
+    putting = threading.Thread(target=lambda: [items.put(number) for number in range(20)], daemon=True)
+    putting.start()
+    assert [items.get(30) for _ in range(20)] == list(range(20))
+    putting.join(30)
 
 
 def test_wall_clock_returns_the_time() -> None:

@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from minirospy.board.events import CallbackThread, Detector, Slope
+from tests.interruption import ends_elsewhere, interrupt_in_lock
 
 
 @pytest.mark.parametrize(
@@ -73,3 +74,10 @@ def test_a_removed_detector_does_not_run() -> None:
     thread.schedule(detector)
     thread.close()
     assert ran == []
+
+
+def test_ctrl_c_at_any_point_of_waiting_for_an_edge_leaves_the_detector_usable() -> None:
+    detector = Detector(11, Slope.BOTH, None)
+    interrupt_in_lock(lambda: detector.wait(0.001))
+    assert ends_elsewhere(lambda: detector.see(1, 0.0))
+    assert detector.take()

@@ -15,14 +15,16 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
+from minirospy.base.clock import WallClock
 from minirospy.base.environment import Environment
 from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
 from minirospy.introspect.doctor.own_node import DoctorNode
-from minirospy.introspect.streams import ToolNode
+from minirospy.introspect.streams import Inbox, ToolNode
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
+from tests.interruption import ends_elsewhere, interrupt_in_lock
 
 
 @pytest.fixture
@@ -127,3 +129,11 @@ node.close()
 
 def test_ctrl_c_at_any_point_of_a_wait_does_not_hang_the_close(master: str) -> None:
     subprocess.run([sys.executable, "-c", INTERRUPTED], check=True, timeout=100)
+
+
+def test_ctrl_c_at_any_point_of_reading_an_inbox_does_not_hang_its_writer() -> None:
+    inbox = Inbox(WallClock())
+    inbox.put(b"first", {})
+    interrupt_in_lock(lambda: next(iter(inbox)))
+    assert ends_elsewhere(lambda: inbox.put(b"second", {}))
+    assert ends_elsewhere(inbox.close)

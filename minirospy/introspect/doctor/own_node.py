@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterator
 from types import TracebackType
 
 from minirospy.base import names
+from minirospy.base.clock import SignalSafeCondition, SignalSafeEvent
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError
 from minirospy.core.idl.load import message_class, service_class
@@ -53,11 +54,11 @@ class DoctorNode:
         self.environment = environment
         self.name = names.anonymous_name(PREFIX)
         self.letter = self.name + "/letter"
-        self.told_by_master = threading.Event()
+        self.told_by_master = SignalSafeEvent()
         """Set once the master has called this node."""
         self._loop = LoopThread("minirospy-doctor")
         self.node = _NotifiedNode(self.name, environment, self.told_by_master)
-        self._log_links = threading.Condition()
+        self._log_links = SignalSafeCondition()
         self._listeners: set[str] = set()
 
     def __enter__(self) -> DoctorNode:
@@ -103,9 +104,8 @@ class DoctorNode:
 
     def wait_for_log_listeners(self, wanted: Collection[str], timeout: float) -> set[str]:
         """Wait up to ``timeout`` seconds; return the nodes in ``wanted`` that have not connected to this node's /rosout."""
-        with self._log_links:
-            self._log_links.wait_for(lambda: self._listeners.issuperset(wanted), timeout)
-            return set(wanted) - self._listeners
+        self._log_links.wait_for(lambda: self._listeners.issuperset(wanted), timeout)
+        return set(wanted) - self._listeners
 
     async def _register(self) -> None:
         # Subscribe before advertising, so that the master must send this node a publisherUpdate about itself.
@@ -131,9 +131,8 @@ class DoctorNode:
 
     def _link_changed(self, link: OutLink, is_up: bool) -> None:
         if is_up:
-            with self._log_links:
-                self._listeners.add(link.peer)
-                self._log_links.notify_all()
+            self._listeners.add(link.peer)
+            self._log_links.notify_all()
 
 
 class _NotifiedNode(Node):

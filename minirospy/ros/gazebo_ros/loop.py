@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, TypeVar
 
+from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.base.errors import MinirospyError
 
 if TYPE_CHECKING:
@@ -49,7 +50,8 @@ class SimulationLoop:
         self._rate = simulation.physics.update_rate
         self._tick_rate = tick_rate or DEFAULT_TICK_HZ
         self._jobs: deque[tuple[Callable[[], object], Future[object]]] = deque()
-        self._wake = threading.Condition()
+        self._lock = threading.RLock()
+        self._wake = threading.Condition(self._lock)
         self._is_closed = False
         self._deadline = wall.monotonic()
         self._measured = (wall.monotonic(), 0)
@@ -63,7 +65,7 @@ class SimulationLoop:
 
     def close(self) -> None:
         """Stop the thread and wait for it. Pending jobs raise LoopClosed."""
-        with self._wake:
+        with self._lock:
             self._is_closed = True
             self._wake.notify_all()
         if threading.current_thread() is not self._thread and self._thread.is_alive():
@@ -73,16 +75,20 @@ class SimulationLoop:
         """Run a function in the loop's thread between two steps; return its result. Raise LoopClosed if the loop has ended."""
         if threading.current_thread() is self._thread:
             return function()
-        return self._submit(function).result()
-
-    def _submit(self, function: Callable[[], _T]) -> Future[_T]:
         future: Future[_T] = Future()
-        with self._wake:
+        has_ended = SignalSafeEvent()
+        future.add_done_callback(lambda _: has_ended.set())
+        self._submit(function, future)
+        # Do not wait in result(): the loop's thread would wait for the future's lock if a signal interrupted that.
+        wait_for_event(has_ended, None)
+        return future.result()
+
+    def _submit(self, function: Callable[[], _T], future: Future[_T]) -> None:
+        with self._lock:
             if self._is_closed:
                 raise LoopClosed("the simulation has ended")
             self._jobs.append((function, future))  # type: ignore[arg-type]
             self._wake.notify_all()
-        return future
 
     @property
     def is_paused(self) -> bool:
@@ -127,7 +133,7 @@ class SimulationLoop:
         except Exception as error:  # noqa: BLE001 - the services would wait for this thread for ever
             self.failure = error
             self.on_failure(error)
-        with self._wake:
+        with self._lock:
             self._is_closed = True
             while self._jobs:
                 self._jobs.popleft()[1].set_exception(LoopClosed("the simulation has ended"))
@@ -175,7 +181,7 @@ class SimulationLoop:
 
     def _must_wait(self) -> bool:
         """Wait while paused or until the next steps are due. Return whether to check for jobs again."""
-        with self._wake:
+        with self._lock:
             if self._jobs or self._is_closed:
                 return True
             now = wall.monotonic()

@@ -39,6 +39,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.core.sdf.model import Pose, World
 from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
 from minirospy.ros.gazebo_ros.markers import has_moved, marker_of, model_markers
@@ -88,7 +89,7 @@ class Window:
         self._moving: list[tuple[str, int]] = []  # the moving links' scoped names and pose rows
         self._generation = -1  # engine generation for which the pose rows are valid
         self._last: NDArray[np.float64] = np.zeros((0, 7))  # poses in the last message
-        self._is_closed = threading.Event()
+        self._is_closed = SignalSafeEvent()
         folders = tuple(model_folders)
         rospy.Subscriber("~window/step", UInt32, self._on_step, queue_size=10)
         rospy.Service(

@@ -12,6 +12,7 @@ from functools import partial
 from std_msgs.msg import Bool
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import UrdfError
 from minirospy.base.times import Duration
 from minirospy.core.control.controller import ControllerError
@@ -48,7 +49,7 @@ class GazeboRosControl(ModelPlugin):
         self._was_stopped = self._is_reset = False
         self._manager: ControllerManager | None = None
         self._hardware: SimulatedHardware | None = None
-        self._is_closed = threading.Event()
+        self._is_closed = SignalSafeEvent()
         step = self.simulation.physics.step
         self._period_ns = round(self.number("controlPeriod", step) * 1e9)
         for is_wrong, log, word in (

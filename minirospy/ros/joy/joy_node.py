@@ -11,13 +11,13 @@ Source: http://wiki.ros.org/joy.
 from __future__ import annotations
 
 import math
-import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import Joy, JoyFeedback, JoyFeedbackArray
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.ros.joy.devices import Device, DeviceError, find_by_name, open_device
 from minirospy.ros.joy.joystick import Joystick, JoystickOptions
 from minirospy.ros.joy.rumble import RumbleError
@@ -74,7 +74,7 @@ class JoyNode:
         self._device_name = str(rospy.get_param("~dev_name", ""))
         self._path = self._chosen_path()
         self._is_open = False
-        self._ended = threading.Event()
+        self._ended = SignalSafeEvent()
         rospy.on_shutdown(self._ended.set)
         self._events = self._published = 0
         self._last_diagnostics = time.monotonic()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from typing import NamedTuple
 from nav_msgs.msg import OccupancyGrid
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import UsageError
 from minirospy.ros.map_server.grid import MapError, pgm_of_grid, yaml_of_map, yaw_of_quaternion
 
@@ -87,7 +87,7 @@ def main() -> int:
 
 def _save_one(options: SaverOptions) -> int:
     received: list[OccupancyGrid] = []
-    has_come = threading.Event()
+    has_come = SignalSafeEvent()
 
     def receive(grid: OccupancyGrid) -> None:
         received.append(grid)

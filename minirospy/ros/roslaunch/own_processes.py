@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.roslaunch.core import RLException
 
@@ -137,7 +138,7 @@ class OwnProcesses:
         self.is_stopping = False  # set at shutdown: start no more processes
         self.is_complete = False  # set if no more processes will be registered
         self.thread: threading.Thread | None = None  # the polling thread, set by start()
-        self._closing = threading.Event()
+        self._closing = SignalSafeEvent()
         self._on_exit = on_exit  # called with an exited process's name and exit status
         self._on_required_exit = on_required_exit
         self._on_last_exit = on_last_exit  # called at each poll if no process is left or will come

@@ -157,7 +157,8 @@ class _Output:
             "cmd_vel", kind, queue_size=1
         )
         self._period = 1 / rate if rate > 0 else None
-        self._changed = threading.Condition()
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
         self._motion: Motion | None = None
         self._is_closed = False
         if self._period is not None:
@@ -174,20 +175,20 @@ class _Output:
 
     def set(self, motion: Motion) -> None:
         """Publish a motion."""
-        with self._changed:
+        with self._lock:
             self._motion = motion
             self._publish(motion)
             self._changed.notify()
 
     def close(self) -> None:
         """Publish zero velocity as the last message."""
-        with self._changed:
+        with self._lock:
             self._is_closed = True
             self._publish(Motion(0, 0, 0, 0))
             self._changed.notify()
 
     def _repeat(self) -> None:
-        with self._changed:
+        with self._lock:
             while not self._is_closed and not rospy.is_shutdown():
                 was_set = self._changed.wait(self._period)
                 if not was_set and self._motion is not None and not self._is_closed:

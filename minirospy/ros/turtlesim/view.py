@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.escape import escaped, own_output
 from minirospy.ros.turtlesim.canvas import PIXELS, Canvas, Color
 from minirospy.ros.turtlesim.world import SIZE, Pose, World
@@ -135,7 +136,7 @@ class Screen:
 
     def __init__(self, world: World, lock: threading.Lock) -> None:
         self._world, self._lock = world, lock
-        self._ended = threading.Event()
+        self._ended = SignalSafeEvent()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def __enter__(self) -> Screen:

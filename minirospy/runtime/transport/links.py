@@ -15,6 +15,7 @@ from collections.abc import Callable
 from itertools import islice
 from typing import TYPE_CHECKING
 
+from minirospy.base.clock import SignalSafeCondition
 from minirospy.core.wire import ring as ring_limits
 from minirospy.core.wire.framing import LargeFrame
 from minirospy.runtime.transport import shared_memory
@@ -86,7 +87,7 @@ class OutLink:
         self._begun = bool(header)
         self._is_reading = True
         self._lock = threading.Lock()
-        self._drained = threading.Condition(self._lock)
+        self._drained = SignalSafeCondition()
         self._closed = False
         self._loop_thread = threading.get_ident()
 
@@ -134,13 +135,13 @@ class OutLink:
         """Send the header, and watch for the peer to disconnect. Call this on the loop."""
         self._loop_thread = threading.get_ident()
         self._loop.add_reader(self._sock, self._readable)
-        with self._drained:
+        with self._lock:
             self._help()
         self._start_writing()
 
     def send(self, frame: bytes | LargeFrame, sharing: Sharing | None = None) -> None:
         """Send ``frame`` immediately, or queue it after the pending ones. ``sharing`` can write it into shared memory."""
-        with self._drained:
+        with self._lock:
             if self._closed:
                 return
             self.sent += 1
@@ -166,8 +167,7 @@ class OutLink:
 
     def wait(self) -> None:
         """Wait until the queue is empty, or the link is closed. Do not call this on the loop."""
-        with self._drained:
-            self._drained.wait_for(lambda: not self._outbox or self._closed)
+        self._drained.wait_for(lambda: not self._outbox or self._closed)
 
     async def drain(self, timeout: float) -> None:
         """Like :meth:`wait`, but on the loop, for at most ``timeout`` seconds."""
@@ -177,7 +177,7 @@ class OutLink:
 
     def close(self) -> None:
         """Close the connection. Call this on the loop. Idempotent."""
-        with self._drained:
+        with self._lock:
             if self._closed:
                 return
             self._closed = True
@@ -286,7 +286,7 @@ class OutLink:
             self._writable()
 
     def _writable(self) -> None:
-        if not self._drained.acquire(blocking=False):
+        if not self._lock.acquire(blocking=False):
             # A publishing thread is already sending, so stop watching the socket for a moment.
             self._loop.remove_writer(self._sock)
             self._loop.call_later(_PUSH_SECONDS, self._start_writing)
@@ -307,7 +307,7 @@ class OutLink:
                 self._loop.remove_writer(self._sock)
                 self._drained.notify_all()
         finally:
-            self._drained.release()
+            self._lock.release()
 
     def _write_some(self) -> None:
         """Send part of the queue. Raise OSError if the connection has failed."""

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import BagError, BagUnindexedError, BridgeError, MinirospyError
 from minirospy.core.bag.base import StoredMessage
 from minirospy.core.bag.records import Connection
@@ -44,7 +45,7 @@ class GraphOutput:
         self._publications: dict[str, Publication] = {}
         self._clock: Publication | None = None
         self._free = threading.BoundedSemaphore(_MAX_WAITING)
-        self._is_closed = threading.Event()
+        self._is_closed = SignalSafeEvent()
 
     # --- on the loop
 
@@ -186,7 +187,7 @@ class OpenBag:
             except BagUnindexedError as error:
                 raise BagError(f"{name}: {error}. Run `rosbag reindex {name}`") from error
             self._files = opened.pop_all()
-        self._is_ready = threading.Event()
+        self._is_ready = SignalSafeEvent()
         options = PlayOptions(paused=True, delay=0, quiet=True)
         self.player = Player(self._bags, options, lambda first, last: self._is_ready.set(), output)
         self.player.on_change = self._on_change = on_change

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import threading
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from minirospy.core.bag.records import Connection
 from minirospy.introspect.bag_convert import convert
 from minirospy.ros.rosbag.recording.sources import Bags, ReadAhead, Selection
 from tests.core.bag.bags import Given, make_bag
+from tests.interruption import ends_elsewhere, interrupt_in_lock
 
 
 @pytest.mark.parametrize("suffix", [".bag", ".mcap"])
@@ -79,3 +81,11 @@ def test_reading_ahead_ends_when_it_is_closed() -> None:
     ahead.wait()
     ahead.close()
     assert is_closed.wait(45)
+
+
+def test_ctrl_c_at_any_point_of_playing_does_not_hang_the_reading_thread() -> None:
+    connection = Connection(0, "/a", {})
+    ahead = ReadAhead((0, StoredMessage(connection, number, b"", 0)) for number in itertools.count())
+    interrupt_in_lock(lambda: next(iter(ahead)))
+    ahead.close()
+    assert ends_elsewhere(ahead.join)

@@ -9,6 +9,7 @@ import pytest
 
 from minirospy.core.sdf.model import Physics
 from minirospy.ros.gazebo_ros.loop import LoopClosed, SimulationLoop
+from tests.interruption import ends_elsewhere, interrupt_in_lock
 
 
 class Counter:
@@ -32,6 +33,15 @@ class Counter:
 
 def loop_of(counter: Counter, **options: Any) -> SimulationLoop:
     return SimulationLoop(cast(Any, counter), **options)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+def test_ctrl_c_at_any_point_of_a_call_leaves_the_loop_running(number: int) -> None:
+    loop = loop_of(Counter(), paused=True)
+    loop.start()
+    interrupt_in_lock(lambda: loop.call(lambda: None), number)
+    assert ends_elsewhere(lambda: loop.call(lambda: None))
+    assert ends_elsewhere(loop.close)
 
 
 def test_jobs_run_in_the_loops_thread_while_paused() -> None:

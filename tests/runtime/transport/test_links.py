@@ -20,6 +20,7 @@ from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitF
 from minirospy.runtime.transport import links, readers
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.sockets import is_writable
+from tests.interruption import ends_elsewhere, interrupt_in_lock
 
 KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
 
@@ -101,6 +102,17 @@ def test_frames_of_several_threads_stay_whole(
 
     assert sorted(seen) == sorted(list(range(8)) * 5)
     assert (link.sent, link.dropped, link.waiting) == (40, 0, 0)
+
+
+def test_ctrl_c_at_any_point_of_publishing_leaves_the_link_usable(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 0, lambda _: None)
+    interrupt_in_lock(lambda: link.send(b"first"))
+    interrupt_in_lock(link.wait)
+    assert ends_elsewhere(lambda: link.send(b"second"))
+    loop.post(link.close)
+    assert ends_elsewhere(link.wait)
 
 
 def test_a_full_queue_drops_the_oldest_and_never_half_a_frame(

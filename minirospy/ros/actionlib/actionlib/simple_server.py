@@ -190,7 +190,7 @@ class SimpleActionServer:
         """Run the execute callback for each goal, in the execute thread."""
         with rospy.interrupting(self._wake_soon):
             while True:
-                with self.execute_condition:
+                with self.lock:
                     self.execute_condition.wait_for(self._has_work)
                     if self.need_to_terminate or rospy.is_down():
                         return
@@ -221,7 +221,7 @@ class SimpleActionServer:
             threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
 
     def _wake(self) -> None:
-        with self.execute_condition:
+        with self.lock:
             self.execute_condition.notify_all()
 
 

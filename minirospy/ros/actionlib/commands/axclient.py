@@ -11,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import ROSException, UsageError
 from minirospy.command.form import ask_for, fields, flow
 from minirospy.command.parser import Parser
@@ -125,7 +126,7 @@ def _found_type(action: str, timeout: float | None) -> str:
     """Wait for the action's server and return the action's type. Raise ROSException after ``timeout`` seconds."""
     from minirospy.introspect.graph import Graph
 
-    waiting = threading.Event()
+    waiting = SignalSafeEvent()
     waited = 0.0
     with Graph.open("axclient") as graph:
         while True:
@@ -148,7 +149,7 @@ class _Progress:
     def __init__(self, client: SimpleActionClient, goal: Message) -> None:
         self._client = client
         self._goal = goal
-        self._done = threading.Event()
+        self._done = SignalSafeEvent()
         self._lock = threading.Lock()
         self._is_line_open = False
         self._is_active = False

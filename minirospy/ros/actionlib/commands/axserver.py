@@ -6,10 +6,10 @@ Source: http://wiki.ros.org/actionlib (Tools). ROS's axserver.py opens a window;
 from __future__ import annotations
 
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.command.form import ask_for
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Command
@@ -47,7 +47,7 @@ def _axserver(action: str, type: str) -> None:
     cls = action_class(type)
     rospy.init_node("axserver", anonymous=True, disable_signals=True, disable_rosout=True)
     server = SimpleActionServer(action, cls, auto_start=False)
-    news = threading.Event()
+    news = SignalSafeEvent()
     server.register_goal_callback(news.set)
     server.register_preempt_callback(lambda: print("\nA client wants the goal preempted.", flush=True))
     server.start()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import sys
-import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from dynamic_reconfigure.msg import ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeCondition
 from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import (
     DynamicReconfigureCallbackException,
     DynamicReconfigureParameterException,
@@ -65,7 +65,7 @@ class Client:
         self.param_description: list[Entry] | None = None
         self.group_description: Config | None = None
         self._param_types: dict[str, type] = {}
-        self._cv = threading.Condition()
+        self._changed = SignalSafeCondition()
         self._config_callback = config_callback
         self._description_callback = description_callback
 
@@ -171,28 +171,25 @@ class Client:
         If ``timeout`` is None or 0, wait until the node shuts down.
         """
         end = time.monotonic() + timeout if timeout else None
-        with self._cv:
-            while not is_there() and not rospy.is_shutdown():
-                left = _SLICE_SECONDS if end is None else min(_SLICE_SECONDS, end - time.monotonic())
-                if left <= 0:
-                    break
-                self._cv.wait(left)
-            return is_there()
+        while not is_there() and not rospy.is_shutdown():
+            left = _SLICE_SECONDS if end is None else min(_SLICE_SECONDS, end - time.monotonic())
+            if left <= 0:
+                break
+            self._changed.wait_for(is_there, left)
+        return is_there()
 
     def _updates_msg(self, msg: ConfigMsg) -> None:
         self.config = config = decode_config(msg, self.get_group_descriptions())
-        with self._cv:
-            self._cv.notify_all()
+        self._changed.notify_all()
         if self._config_callback is not None:
             self._config_callback(config)
 
     def _descriptions_msg(self, msg: ConfigDescription) -> None:
         groups = decode_description(msg)
         params = extract_params(groups)
-        with self._cv:
-            self._param_types = {each["name"]: self._param_type_from_string(each["type"]) for each in params}
-            self.group_description, self.param_description = groups, params
-            self._cv.notify_all()
+        self._param_types = {each["name"]: self._param_type_from_string(each["type"]) for each in params}
+        self.group_description, self.param_description = groups, params
+        self._changed.notify_all()
         if self._description_callback is not None:
             self._description_callback(params)
 

@@ -8,6 +8,8 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 
+from minirospy.base.clock import SignalSafeEvent
+
 __all__ = ["read_keys"]
 
 _POLL_SECONDS = 0.05
@@ -19,7 +21,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
 
     Read nothing if there is no standard input. Do not change the terminal while the process is in the background.
     """
-    stop = threading.Event()
+    stop = SignalSafeEvent()
     reader: Callable[[Callable[[str], object], threading.Event], None] | None = None
     if sys.stdin is not None and not sys.stdin.closed:
         reader = _read_windows if sys.platform == "win32" else _read_posix

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.base.clock import SignalSafeEvent, SignalSafeQueue
 from minirospy.base.errors import BagError, BagUnindexedError, NotFoundError
 from minirospy.core.bag.base import BagReader, StoredMessage
 from minirospy.core.bag.mcap_reader import open_bag_or_mcap
@@ -111,9 +112,11 @@ class ReadAhead:
     """An iterator over messages that a thread reads ahead, up to a few thousand. Iterate once, then close."""
 
     def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
-        self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
-        self._stop = threading.Event()
-        self._first = threading.Event()
+        self._ready: SignalSafeQueue[list[tuple[int, StoredMessage]] | Exception | None] = SignalSafeQueue(
+            _BATCHES
+        )
+        self._stop = SignalSafeEvent()
+        self._first = SignalSafeEvent()
         self._thread = threading.Thread(
             target=self._read, args=(messages,), name="rosbag-reader", daemon=True
         )

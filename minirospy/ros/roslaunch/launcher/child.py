@@ -9,6 +9,7 @@ import contextlib
 import os
 import threading
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, RpcError
 from minirospy.ros.roslaunch.launcher.load import load_text
@@ -41,7 +42,7 @@ def run_child(
     launcher.run_id = run_id
     with launcher.signals():
         api = Api(environment, launcher.methods())
-        done = threading.Event()
+        done = SignalSafeEvent()
         try:
             try:
                 call(parent, "register", name, api.uri)

@@ -18,6 +18,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, cast
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.environment import Environment
 from minirospy.base.errors import LaunchError, MinirospyError, RpcError, RpcFault
 from minirospy.ros.roslaunch.launcher.output import Output
@@ -100,7 +101,7 @@ class _Child:
     nodes: list[NodeSpec]
     ssh: Process
     uri: str = ""
-    has_registered: threading.Event = field(default_factory=threading.Event)
+    has_registered: threading.Event = field(default_factory=SignalSafeEvent)
     running: set[str] = field(default_factory=set)
     ended: set[str] = field(default_factory=set)
     """Names of exited processes. A process may exit before ``launch`` has reported that it has started."""

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import ClassVar
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher import process as processes
@@ -219,7 +220,7 @@ class ProcessMonitor:
     def __init__(self, name: str = "ProcessMonitor", *, launcher: ApiLauncher | None = None) -> None:
         self.name = name
         self._launcher = launcher or ApiLauncher(LaunchSpec(), Environment.read())
-        self._ended = threading.Event()
+        self._ended = SignalSafeEvent()
         self._thread: threading.Thread | None = None
         self.is_watching = False  # whether watch() has been called
         if launcher is not None:

@@ -24,7 +24,8 @@ class MarkedThreadPool:
     """
 
     def __init__(self, numThreads: int) -> None:
-        self._changed = threading.Condition()
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
         self._tasks: list[_Task] = []
         self._markers: list[object] = []
         self._threads: list[threading.Thread] = []
@@ -33,7 +34,7 @@ class MarkedThreadPool:
 
     def set_thread_count(self, newNumThreads: int) -> bool:
         """Start or stop threads to reach this count; return False if that is impossible."""
-        with self._changed:
+        with self._lock:
             if self._is_joining:
                 return False
             self._resize(newNumThreads)
@@ -41,7 +42,7 @@ class MarkedThreadPool:
 
     def get_thread_count(self) -> int:
         """Return the number of threads."""
-        with self._changed:
+        with self._lock:
             return len(self._threads)
 
     def queue_task(
@@ -52,7 +53,7 @@ class MarkedThreadPool:
         taskCallback: Callable[[object], object] | None = None,
     ) -> bool:
         """Call ``task(*args)`` in a thread, then ``taskCallback`` with the result; return whether the task was accepted."""
-        with self._changed:
+        with self._lock:
             if self._is_joining or not callable(task):
                 return False
             self._tasks.append(_Task(marker, task, args or (), taskCallback))
@@ -61,7 +62,7 @@ class MarkedThreadPool:
 
     def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
         """Stop the threads, first running the queued tasks if requested. The pool can be reused afterwards."""
-        with self._changed:
+        with self._lock:
             self._is_joining = True
             while wait_for_tasks and self._tasks and self._threads:
                 self._changed.wait()
@@ -70,7 +71,7 @@ class MarkedThreadPool:
         for thread in threads if wait_for_threads else ():
             if thread is not threading.current_thread():
                 thread.join()
-        with self._changed:
+        with self._lock:
             self._is_joining = False
 
     def _resize(self, count: int) -> None:
@@ -96,7 +97,7 @@ class MarkedThreadPool:
 
     def _next(self) -> _Task | None:
         """Return the first task whose marker is free, or None if this thread must exit."""
-        with self._changed:
+        with self._lock:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:
                     if task.marker is None or task.marker not in self._markers:
@@ -108,6 +109,6 @@ class MarkedThreadPool:
         return None
 
     def _release(self, marker: object) -> None:
-        with self._changed:
+        with self._lock:
             self._markers.remove(marker)
             self._changed.notify_all()

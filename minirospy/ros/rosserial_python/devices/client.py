@@ -19,6 +19,7 @@ from rosserial_msgs.srv import RequestParamRequest, RequestParamResponse
 from std_msgs.msg import Time
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.rosserial_python.devices.endpoints import (
     EndpointError,
@@ -103,7 +104,7 @@ class SerialClient:
         self._to_write: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._writer: threading.Thread | None = None
         self._write_error: PortError | None = None
-        self._ended = threading.Event()
+        self._ended = SignalSafeEvent()
         self._synced_at = time.monotonic()
         rospy.on_shutdown(self._shut_down)
 

@@ -6,13 +6,13 @@ Source: http://wiki.ros.org/rostest/Nodes.
 from __future__ import annotations
 
 import itertools
-import threading
 import time
 import unittest
 from collections.abc import Callable, Container
 from typing import Any, TypeAlias
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.environment import Environment
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.services import service_type
@@ -95,7 +95,7 @@ class HzTest(_NodeTest):
         check_intervals = bool(self.param("check_intervals", False))
         print(f"Hz: {hz}\nHz Error: {error}\nTopic: {topic}\nTest Duration: {duration}")
         times: list[float] = []
-        first = threading.Event()
+        first = SignalSafeEvent()
 
         def received(_: object) -> None:
             times.append(time.monotonic())
@@ -139,7 +139,7 @@ class PublishTest(_NodeTest):
         waiting = []
         for topic, timeout, negative, _ in self.limits("topics"):
             print(f"Waiting [{topic}] for [{timeout:g}] seconds with negative [{negative}]")
-            event = threading.Event()
+            event = SignalSafeEvent()
             rospy.Subscriber(topic, rospy.AnyMsg, lambda _, event=event: event.set())
             waiting.append((topic, timeout, negative, event))
         started = time.monotonic()

@@ -8,11 +8,11 @@ from __future__ import annotations
 import logging
 import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.command.parser import AssignmentParser, Misuse, Parser
 from minirospy.command.verbs import Command
@@ -105,7 +105,7 @@ def _is_file(word: str) -> bool:
 
 def _wait_for_signal() -> None:
     """Wait for Ctrl-C or SIGTERM, so that the listener can unregister before the process exits."""
-    stop = threading.Event()
+    stop = SignalSafeEvent()
     for number in (*interrupt_signals(), signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     # Wait in slices: on Windows, signals do not interrupt a wait without a timeout.

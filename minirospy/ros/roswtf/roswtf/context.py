@@ -41,6 +41,9 @@ class WtfContext:
     warnings: list[WtfError]
     errors: list[WtfError]
     env: Mapping[str, str]
+    pythonpath: str | None
+    ros_master_uri: str
+    ros_root: str
     rospack: RosPack
     rosstack: RosStack
 
@@ -48,7 +51,7 @@ class WtfContext:
         for name in self.__slots__:
             setattr(self, name, [] if name in _LISTS else {} if name in ("env", "uri_node_map") else None)
 
-    def as_dictionary(self) -> dict[str, Any]:
+    def as_dictionary(self) -> dict[str, object]:
         """Return the attributes as a dict, for a rule's message."""
         return {name: getattr(self, name) for name in self.__slots__}
 

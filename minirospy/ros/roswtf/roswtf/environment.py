@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import socket
 import stat
-from typing import Any
+from collections.abc import Mapping
+from typing import Protocol
 from urllib.parse import urlparse
 
-from minirospy.ros.roswtf.roswtf.rules import Rule, error_rule, warning_rule
+from minirospy.ros.roswtf.roswtf.rules import Context, Rule, error_rule, warning_rule
 
 __all__ = [
     "_writable_dir_check",
@@ -27,6 +28,15 @@ __all__ = [
     "rosconsole_config_file_check",
     "wtf_check_environment",
 ]
+
+
+class _Context(Context, Protocol):
+    """A context with the environment variables."""
+
+    env: Mapping[str, str]
+    pythonpath: str | None
+    ros_master_uri: str
+    ros_root: str
 
 
 def paths(path: str | None) -> list[str]:
@@ -58,7 +68,7 @@ def invalid_url(url: str | None) -> str | None:
     return None
 
 
-def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
+def ros_root_check(ctx: _Context, ros_root: str | None = None) -> str | None:
     """Return the error in ROS_ROOT, or None if it is valid."""
     path = ctx.ros_root if ros_root is None else ros_root
     if os.path.basename(os.path.normpath(path)) in ("ros", "rosbuild"):
@@ -66,7 +76,7 @@ def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
     return f"ROS_ROOT [{path}] must end in directory named 'ros'"
 
 
-def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
+def _writable_dir_check(ctx: _Context, path: str | None, name: str) -> str | None:
     """Return why ROS cannot write to a folder, or None if it can."""
     if path is None:
         return None
@@ -75,42 +85,42 @@ def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
     return None if os.access(path, os.W_OK) else f"{name} [{path}] is not writable"
 
 
-def ros_home_check(ctx: Any) -> str | None:
+def ros_home_check(ctx: _Context) -> str | None:
     """Return the error in ROS_HOME, or None if it is valid."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_HOME"), "ROS_HOME")
 
 
-def ros_log_dir_check(ctx: Any) -> str | None:
+def ros_log_dir_check(ctx: _Context) -> str | None:
     """Return the error in ROS_LOG_DIR, or None if it is valid."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_LOG_DIR"), "ROS_LOG_DIR")
 
 
-def ros_test_results_dir_check(ctx: Any) -> str | None:
+def ros_test_results_dir_check(ctx: _Context) -> str | None:
     """Return the error in ROS_TEST_RESULTS_DIR, or None if it is valid."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_TEST_RESULTS_DIR"), "ROS_TEST_RESULTS_DIR")
 
 
-def pythonpath_check(ctx: Any) -> str | None:
+def pythonpath_check(ctx: _Context) -> str | None:
     """Return an error if PYTHONPATH contains several roslib folders, else None."""
     if len({path for path in paths(ctx.pythonpath) if "roslib" in path.split(os.sep)}) > 1:
         return "Multiple roslib directories in PYTHONPATH (there should only be one)"
     return None
 
 
-def rosconsole_config_file_check(ctx: Any) -> bool | None:
+def rosconsole_config_file_check(ctx: _Context) -> bool | None:
     """Return whether ROSCONSOLE_CONFIG_FILE names a missing file, or None if it is not set."""
     file = ctx.env.get("ROSCONSOLE_CONFIG_FILE")
     return None if file is None else not os.path.isfile(file)
 
 
-def path_check(ctx: Any) -> bool | None:
+def path_check(ctx: _Context) -> bool | None:
     """Return True if ROS is installed system-wide and PATH lists /usr/bin before ROS_ROOT, else None."""
     path = ctx.env["PATH"]
     system, ros = path.find("/usr/bin"), path.find(ctx.ros_root)
     return True if os.path.exists("/usr/lib/ros/") and 0 <= system < ros else None
 
 
-def ros_master_uri_hostname(ctx: Any) -> str | None:
+def ros_master_uri_hostname(ctx: _Context) -> str | None:
     """Return an error if the host in ROS_MASTER_URI is unknown, else None. Other rules check the rest of the URI."""
     host, colon, port = urlparse(ctx.ros_master_uri).netloc.partition(":")
     if not colon or ":" in port:
@@ -179,7 +189,7 @@ environment_errors: list[Rule] = [
 ]
 
 
-def wtf_check_environment(ctx: Any) -> None:
+def wtf_check_environment(ctx: _Context) -> None:
     """Check a context's environment variables; add the errors and warnings to the context."""
     for rule in environment_warnings:
         warning_rule(rule, rule[0](ctx), ctx)

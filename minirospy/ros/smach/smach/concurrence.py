@@ -6,6 +6,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from minirospy.base.clock import SignalSafeCondition
 from minirospy.ros.smach.smach.container import Container
 from minirospy.ros.smach.smach.exceptions import (
     InvalidStateError,
@@ -57,8 +58,8 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below. Notified when the states that are still executing must finish.
-        self._done_cond = threading.Condition()
+        self._done = SignalSafeCondition()  # notified when the states that are still executing must finish
+        self._lock = threading.RLock()  # guards the attributes below
         self._is_ending = False
         self._user_code_exception = False
 
@@ -139,9 +140,9 @@ class Concurrence(Container):
         for thread in self._threads.values():
             thread.start()
 
-        with self._done_cond:
-            while not self._is_ending and not self.preempt_requested() and not is_shutdown():
-                self._done_cond.wait(_SHUTDOWN_CHECK)
+        while not self._done.wait_for(lambda: self._is_ending or self.preempt_requested(), _SHUTDOWN_CHECK):
+            if is_shutdown():
+                break
         logdebug("SMACH Concurrence preempting running states.")
         for label, state in self._states.items():
             if self._child_outcomes[label] is None:
@@ -157,15 +158,15 @@ class Concurrence(Container):
         self.call_transition_cbs()
         try:
             self._child_outcomes[label] = self._execute_state(label)
-            with self._done_cond:
+            with self._lock:
                 self.call_transition_cbs()
                 if self._is_last_needed():
                     self._is_ending = True
-                    self._done_cond.notify_all()
+                    self._done.notify_all()
         except Exception:  # noqa: BLE001 - each error has been logged; execute() raises
-            with self._done_cond:
+            with self._lock:
                 self._user_code_exception = self._is_ending = True
-                self._done_cond.notify_all()
+                self._done.notify_all()
 
     def _execute_state(self, label: str) -> str:
         state = self._states[label]
@@ -249,9 +250,8 @@ class Concurrence(Container):
 
     def request_preempt(self) -> None:
         """Ask the container and its states to stop."""
-        with self._done_cond:
-            super().request_preempt()
-            self._done_cond.notify_all()
+        super().request_preempt()
+        self._done.notify_all()
 
     # The remaining methods implement the interface of containers.
 

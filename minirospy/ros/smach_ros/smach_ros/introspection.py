@@ -13,6 +13,7 @@ from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus,
 from std_msgs.msg import Header
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.core.idl.protocols import Message
 from minirospy.ros.rostopic import rostopic
 from minirospy.ros.smach.smach.container import Container
@@ -63,7 +64,7 @@ class IntrospectionClient:
         command = SmachContainerInitialStatusCmd(
             path=path, initial_states=list(initial_states), local_data=local_data
         )
-        has_answered = threading.Event()
+        has_answered = SignalSafeEvent()
 
         def check(status: SmachContainerStatus) -> None:
             if status.path == path and _is_set(status, initial_states, data):
@@ -87,7 +88,7 @@ class IntrospectionClient:
 
 
 def _wait_for_connection(publisher: rospy.Publisher[Message]) -> None:
-    pause = threading.Event()
+    pause = SignalSafeEvent()
     for _ in range(int(_CONNECT_SECONDS / 0.02)):
         if publisher.get_num_connections() or rospy.is_shutdown():
             return
@@ -119,7 +120,7 @@ class ContainerProxy:
         self._container = container
         self._update_rate = update_rate
         self._status_pub_lock = threading.Lock()
-        self._has_stopped = threading.Event()
+        self._has_stopped = SignalSafeEvent()
         self._left_out: set[str] = set()
         self._init_cmd = rospy.Subscriber(
             server_name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._init_cmd_cb

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterable
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.core.idl.protocols import Message
 from minirospy.ros.smach.smach.state import State
 from minirospy.ros.smach.smach.user_data import Values
@@ -43,7 +43,7 @@ class MonitorState(State):
         self._cond_cb = cond_cb
         self._max_checks = max_checks
         self._n_checks = 0
-        self._trigger_event = threading.Event()
+        self._trigger_event = SignalSafeEvent()
 
     def execute(self, ud: Values) -> str:
         """Check messages until the outcome is known; return it. At a shutdown, the outcome is "preempted"."""

@@ -10,6 +10,7 @@ from typing import Any
 from actionlib_msgs.msg import GoalStatus
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.base.times import Duration
 from minirospy.core.idl.protocols import Message
 from minirospy.ros.actionlib.actionlib.simple_client import SimpleActionClient
@@ -102,7 +103,7 @@ class SimpleActionState(State):
         self._goal_result: Message | None = None
         self._duration: Duration = rospy.Duration(0)
         self._activate_time = rospy.Time.now()
-        self._done = threading.Event()
+        self._done = SignalSafeEvent()
         self._action_client = SimpleActionClient(action_name, action_spec)
         self._action_wait_thread = threading.Thread(
             name=f"{action_name}/wait_for_server", target=self._wait_for_server, daemon=True

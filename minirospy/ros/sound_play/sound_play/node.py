@@ -24,6 +24,7 @@ from sound_play.msg import (
 )
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.ros.actionlib.actionlib.simple_server import SimpleActionServer
 from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
 from minirospy.ros.rospkg.rospkg.rospack import RosPack
@@ -197,7 +198,7 @@ class SoundNode:
             rospy.logerr(str(error))
             self._server.set_aborted(text=str(error))
             return
-        pause = threading.Event()
+        pause = SignalSafeEvent()
         while sound is not None and sound.is_playing and not rospy.is_shutdown():
             if self._server.is_preempt_requested():
                 rospy.loginfo("sound_play action: Preempted")

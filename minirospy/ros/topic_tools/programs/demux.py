@@ -25,6 +25,7 @@ from topic_tools.srv import (
 )
 
 from minirospy import client as rospy
+from minirospy.base.clock import SignalSafeEvent
 from minirospy.client.topics import AnyMsg
 from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, checked_topic, run_node
 
@@ -72,7 +73,7 @@ class Demux:
         ]
 
     def _output(self, topic: str) -> None:
-        connected = threading.Event()
+        connected = SignalSafeEvent()
         self._outputs[topic] = Output(
             topic,
             latch=False,
