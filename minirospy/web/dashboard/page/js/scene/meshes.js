@@ -177,7 +177,8 @@ async function objectOf(link, uri, bytes) {
 }
 
 async function readDae(link, uri, bytes) {
-  const text = new TextDecoder().decode(bytes);
+  // As in RViz, text after the end of the file is ignored.
+  const [text] = new TextDecoder().decode(bytes).split(/(?<=<\/COLLADA\s*>)/, 1);
   // The pictures come through the bridge, too: fetched first, since the loader wants addresses.
   const pictures = new Map();
   for (const [, name] of text.matchAll(/<init_from>(?:<ref>)?([^<]+\.(?:png|jpe?g|webp))/gi)) {
@@ -189,10 +190,13 @@ async function readDae(link, uri, bytes) {
   }
   const manager = new LoadingManager();
   manager.setURLModifier((url) => pictures.get(url) ?? EMPTY_PICTURE);
-  manager.onLoad = () => {
-    for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
-  };
+  let areLoading = false;
+  manager.onStart = () => (areLoading = true);
+  const loaded = new Promise((resolve) => (manager.onLoad = () => resolve(undefined)));
   const parsed = new ColladaLoader(manager).parse(text, "");
+  // A texture is black until its picture is there, and nothing would draw the scene again then.
+  if (areLoading) await loaded;
+  for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
   if (!parsed) throw new Error(t("{name}: this is not a Collada file", { name: uri }));
   // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and
   // so does RViz.
@@ -208,11 +212,21 @@ async function readDae(link, uri, bytes) {
   const replaced = first ?? bodyMaterial(GRAY);
   const known = (material) => (isMissing(material) ? replaced : material);
   parsed.scene.traverse((/** @type {any} */ each) => {
-    if (each.isMesh) each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
+    if (!each.isMesh) return;
+    each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
+    for (const material of [each.material].flat()) setColors(material);
   });
   const group = new Group();
   group.add(parsed.scene);
   return group;
+}
+
+/** Show a texture's colors as they are in its picture, as RViz does; without the picture, show the material's color. */
+function setColors(material) {
+  const { map } = material;
+  if (!map) return;
+  if (!map.image || map.image.src === EMPTY_PICTURE) material.map = null;
+  else map.colorSpace = "";
 }
 
 /** Return whether ColladaLoader made this material, for a mesh without one or with one that the file does not have. */
