@@ -602,12 +602,13 @@ def enlarge(page: Page, *, are_all_well: bool = True) -> None:
         f"return all.length && ({str(not are_all_well).lower()} || all.every(e => e.dataset.level === 'ok'))"
     )
     style = f"position:fixed;inset:0 auto auto 0;width:{WIDTH}px;height:{HEIGHT}px;z-index:99;border:0;border-radius:0;margin:0"
+    # Count before the change: the picture in the new size may be the last one for a long time.
+    drawn = int(page.evaluate("Number(document.querySelector('canvas.stage').dataset.drawn || 0)"))
     page.evaluate(f"document.querySelector('.scene').style.cssText = {json.dumps(style)}")
     page.wait(
         "const c = document.querySelector('canvas.stage'); "
         f"return c.clientWidth === {WIDTH} && c.clientHeight === {HEIGHT}"
     )
-    drawn = int(page.evaluate("Number(document.querySelector('canvas.stage').dataset.drawn)"))
     page.wait(f"return Number(document.querySelector('canvas.stage').dataset.drawn) > {drawn}")
 
 
