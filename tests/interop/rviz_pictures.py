@@ -142,8 +142,12 @@ def collada(materials: tuple[str, str] = ("red", "")) -> str:
 _PARAMETER = '<param name="{}" type="float"/>'
 
 
-def textured(picture: str) -> str:
-    """Return a Collada file: a box with a picture on each side. After its end is other text, as in some public files."""
+def textured(picture: str, *, has_bumps: bool = False) -> str:
+    """Return a Collada file: a box with a picture on each side, which is also that of its bumps with ``has_bumps``.
+
+    After its end is other text, as in some public files.
+    """
+    bumps = '<extra><technique profile="FCOLLADA"><bump><texture texture="u" texcoord="UV"/></bump></technique></extra>'
     corners = [*_box(0, 0.15)]
     places = ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)) * len(_SIDES)
     sources = "".join(
@@ -164,7 +168,8 @@ def textured(picture: str) -> str:
         f'<library_images><image id="i"><init_from>{picture}</init_from></image></library_images>'
         '<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><surface type="2D"><init_from>i</init_from></surface>'
         '</newparam><newparam sid="u"><sampler2D><source>s</source></sampler2D></newparam><technique sid="c"><lambert>'
-        '<diffuse><texture texture="u" texcoord="UV"/></diffuse></lambert></technique></profile_COMMON></effect>'
+        '<diffuse><texture texture="u" texcoord="UV"/></diffuse></lambert>'
+        f"{bumps if has_bumps else ''}</technique></profile_COMMON></effect>"
         '</library_effects><library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>'
         f'<library_geometries><geometry id="g"><mesh>{sources}<vertices id="v">'
         f'<input semantic="POSITION" source="#p"/></vertices><triangles count="{len(corners) // 3}" material="m">'
@@ -345,6 +350,7 @@ def mesh_robot() -> str:
             (0, -1.6, "bare.obj", blue),
             (0.6, -1.6, "bare.obj", ""),
             (0.6, 1.2, "picture.dae", ""),
+            (1.2, 1.2, "bumps.dae", ""),
         )
     )
     texture = '<material name="squares"><texture filename="package://rviz_meshes/squares.png"/></material>'
@@ -628,6 +634,7 @@ def prepare(folder: Path) -> None:
     squares.paste((160, 40, 160), (2, 2, 4, 4))
     squares.resize((64, 64), Image.Resampling.NEAREST).save(package / "squares.png")
     (package / "picture.dae").write_text(textured("squares.png"), encoding="utf-8")
+    (package / "bumps.dae").write_text(textured("squares.png", has_bumps=True), encoding="utf-8")
     (package / "none.dae").write_text(collada(("", "")), encoding="utf-8")
     (package / "bare.obj").write_text(OBJ.partition("v ")[1] + OBJ.partition("v ")[2], encoding="utf-8")
     (package / "leaf.obj").write_text(OBJ, encoding="utf-8")

@@ -473,7 +473,7 @@ def test_textures_have_the_colors_of_their_pictures(
     visuals = "".join(
         f'<visual><origin xyz="{x} 0 0"/><geometry><mesh filename="package://rviz_meshes/{name}.dae" scale="6 6 1"/></geometry>'
         "</visual>"
-        for x, name in ((0, "lost"), (2, "picture"))
+        for x, name in ((0, "lost"), (2, "picture"), (-2, "bumps"))
     )
     text = f'<robot name="r"><link name="map">{visuals}</link></robot>'
     served.run(served.node("setter").set_param("/robot_description", text))
@@ -482,6 +482,8 @@ def test_textures_have_the_colors_of_their_pictures(
     metre = look_down(page)
     # Nothing moves the camera after the picture of the texture has arrived, which would draw the scene again.
     wait_color(page, (30, 160, 60), 3)
+    # As in RViz, a picture that is also that of the bumps is multiplied with itself.
+    wait_color(page, (30 * 30 // 255, 160 * 160 // 255, 60 * 60 // 255), 3)
     # A mesh whose picture is missing has its material's color, and is not black.
     end = time.monotonic() + PATIENCE
     while min(color_at(page, 0.4 * metre, 0.4 * metre)) < 250:
