@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
+import queue
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -13,8 +16,10 @@ import pytest
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcRefused
 from minirospy.board.board import Board
-from minirospy.course.results import MAX_KEY, Record, parameter_key, send
+from minirospy.course.results import MAX_KEY, Record, Result, parameter_key, send
 from minirospy.course.share import share
+from minirospy.introspect.messages import Received
+from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.web.dashboard.files import FOLDER
 
@@ -61,6 +66,91 @@ def test_state_of_the_board_is_at_the_master(master: str) -> None:
         ended.set()
         sharing.join()
         proxy.close()
+
+
+class Sharing:
+    """A thread that runs share(), and its messages on the student's own master."""
+
+    def __init__(self, record: Record) -> None:
+        self._ended = threading.Event()
+        self._inbox = queue.Queue[Received]()
+        self.environment = Environment.read()
+        self._node = ToolNode(self.environment, "teacher")
+        self._node.measure("/minirospy_class", self._inbox.put)
+        self.thread = threading.Thread(target=share, args=(record, self.environment, self._ended.is_set))
+        self.thread.start()
+
+    def message(self, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """Return the first message for which ``holds`` is true."""
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            found: dict[str, Any] = json.loads(self._node.classes.read(self._inbox.get(timeout=60)).data)
+            if holds(found):
+                return found
+        raise AssertionError("no message arrived for which it holds")
+
+    def close(self) -> None:
+        self._ended.set()
+        self.thread.join()
+        self._node.close()
+
+
+@pytest.fixture
+def share_as() -> Iterator[Callable[[Record], Sharing]]:
+    with contextlib.ExitStack() as stack:
+        yield lambda record: stack.enter_context(contextlib.closing(Sharing(record)))
+
+
+def test_topic_has_the_results_the_board_and_the_nodes(
+    master: str, share_as: Callable[[Record], Sharing]
+) -> None:
+    record = Record.read(Environment.read())
+    record.student = "Jörg"
+    sharing = share_as(record)
+    first = sharing.message(lambda found: True)
+    assert (first["key"], first["student"], first["exercises"]) == (parameter_key("Jörg"), "Jörg", {})
+    assert first["now"]["leds"] == "000000"
+    with Board() as board:
+        board.set(2, 1)
+        found = sharing.message(lambda found: found["now"]["leds"] == "100000")
+        board.reset()
+    # The node that publishes the topic is not a student's.
+    assert not any("check_share" in name for name in found["now"]["nodes"])
+
+    # A check that ends in another terminal stores its result in the file.
+    stored = Record.read(sharing.environment)
+    stored.results = {"count": Result(passed=True, time=1.0, ever=True)}
+    stored.write()
+    found = sharing.message(lambda found: "count" in found["exercises"])
+    assert found["exercises"]["count"]["ever"]
+    assert found["student"] == "Jörg"
+
+
+def test_rosnode_kill_ends_the_sharing(master: str, share_as: Callable[[Record], Sharing]) -> None:
+    sharing = share_as(Record.read(Environment.read()))
+    sharing.message(lambda found: True)
+    with contextlib.closing(MasterProxy(master, "/killer")) as proxy:
+        publishers = dict(proxy.get_system_state()[0])["/minirospy_class"]
+        [uri] = [proxy.lookup_node(name) for name in publishers]
+    with contextlib.closing(MasterProxy(uri, "/killer")) as node:
+        node.call("shutdown", "test")
+    sharing.thread.join(60)
+    assert not sharing.thread.is_alive()
+
+
+def test_class_master_suffices_without_an_own_one(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
+    record = Record.read(Environment.read())
+    record.student, record.master = "Anna", master
+    ended = threading.Event()
+    sharing = threading.Thread(target=share, args=(record, Environment.read(), ended.is_set))
+    sharing.start()
+    try:
+        with contextlib.closing(MasterProxy(master, "/teacher")) as proxy:
+            wait_for(lambda: "/minirospy_class/Anna/now/beat" in proxy.get_param_names())
+    finally:
+        ended.set()
+        sharing.join()
 
 
 def test_missing_master_is_an_error() -> None:

@@ -139,6 +139,50 @@ def collada(materials: tuple[str, str] = ("red", "")) -> str:
     )
 
 
+_PARAMETER = '<param name="{}" type="float"/>'
+
+
+def textured(picture: str, *, has_bumps: bool = False) -> str:
+    """Return a Collada file: a box with a picture on each side, which is also that of its bumps with ``has_bumps``.
+
+    After its end is other text, as in some public files.
+    """
+    bumps = '<extra><technique profile="FCOLLADA"><bump><texture texture="u" texcoord="UV"/></bump></technique></extra>'
+    corners = [*_box(0, 0.15)]
+    places = ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)) * len(_SIDES)
+    sources = "".join(
+        f'<source id="{name}"><float_array id="{name}a" count="{len(values) * len(parts)}">'
+        f"{' '.join(f'{part:g}' for value in values for part in value)}</float_array><technique_common>"
+        f'<accessor source="#{name}a" count="{len(values)}" stride="{len(parts)}">'
+        f"{''.join(map(_PARAMETER.format, parts))}</accessor></technique_common></source>"
+        for name, values, parts in (
+            ("p", [corner for corner, _ in corners], "XYZ"),
+            ("n", [normal for _, normal in corners], "XYZ"),
+            ("t", places, "ST"),
+        )
+    )
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>'
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">'
+        '<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>'
+        f'<library_images><image id="i"><init_from>{picture}</init_from></image></library_images>'
+        '<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><surface type="2D"><init_from>i</init_from></surface>'
+        '</newparam><newparam sid="u"><sampler2D><source>s</source></sampler2D></newparam><technique sid="c"><lambert>'
+        '<diffuse><texture texture="u" texcoord="UV"/></diffuse></lambert>'
+        f"{bumps if has_bumps else ''}</technique></profile_COMMON></effect>"
+        '</library_effects><library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>'
+        f'<library_geometries><geometry id="g"><mesh>{sources}<vertices id="v">'
+        f'<input semantic="POSITION" source="#p"/></vertices><triangles count="{len(corners) // 3}" material="m">'
+        '<input semantic="VERTEX" source="#v" offset="0"/>'
+        '<input semantic="NORMAL" source="#n" offset="0"/><input semantic="TEXCOORD" source="#t" offset="0" set="0"/>'
+        f"<p>{' '.join(map(str, range(len(corners))))}</p></triangles></mesh></geometry></library_geometries>"
+        '<library_visual_scenes><visual_scene id="vs"><node><instance_geometry url="#g"><bind_material><technique_common>'
+        '<instance_material symbol="m" target="#m"><bind_vertex_input semantic="UV" input_semantic="TEXCOORD" input_set="0"/>'
+        "</instance_material></technique_common></bind_material></instance_geometry></node></visual_scene></library_visual_scenes>"
+        '<scene><instance_visual_scene url="#vs"/></scene></COLLADA>\0\0</mesh>\n'
+    )
+
+
 OBJ = "mtllib part.mtl\nusemtl leaf\n" + "".join(
     f"v {' '.join(map(str, corner))}\nvn {' '.join(map(str, normal))}\n" for corner, normal in _box(0, 0.15)
 )
@@ -305,6 +349,8 @@ def mesh_robot() -> str:
             (-1, -1.6, "none.dae", blue),
             (0, -1.6, "bare.obj", blue),
             (0.6, -1.6, "bare.obj", ""),
+            (0.6, 1.2, "picture.dae", ""),
+            (1.2, 1.2, "bumps.dae", ""),
         )
     )
     texture = '<material name="squares"><texture filename="package://rviz_meshes/squares.png"/></material>'
@@ -552,19 +598,23 @@ def our_picture(page: Page) -> Image.Image:
     return Image.open(io.BytesIO(data)).convert("RGB")
 
 
-def enlarge(page: Page) -> None:
-    """Enlarge the 3D view to the page's upper left corner, in RViz's size; wait until no display reports a fault."""
+def enlarge(page: Page, *, are_all_well: bool = True) -> None:
+    """Enlarge the 3D view to the page's upper left corner, in RViz's size.
+
+    Wait until there are displays and, with ``are_all_well``, until none reports a fault.
+    """
     page.wait(
         "const all = [...document.querySelectorAll('.displays .display')];"
-        "return all.length && all.every(e => e.dataset.level === 'ok')"
+        f"return all.length && ({str(not are_all_well).lower()} || all.every(e => e.dataset.level === 'ok'))"
     )
     style = f"position:fixed;inset:0 auto auto 0;width:{WIDTH}px;height:{HEIGHT}px;z-index:99;border:0;border-radius:0;margin:0"
+    # Count before the change: the picture in the new size may be the last one for a long time.
+    drawn = int(page.evaluate("Number(document.querySelector('canvas.stage').dataset.drawn || 0)"))
     page.evaluate(f"document.querySelector('.scene').style.cssText = {json.dumps(style)}")
     page.wait(
         "const c = document.querySelector('canvas.stage'); "
         f"return c.clientWidth === {WIDTH} && c.clientHeight === {HEIGHT}"
     )
-    drawn = int(page.evaluate("Number(document.querySelector('canvas.stage').dataset.drawn)"))
     page.wait(f"return Number(document.querySelector('canvas.stage').dataset.drawn) > {drawn}")
 
 
@@ -583,6 +633,8 @@ def prepare(folder: Path) -> None:
     squares.paste((30, 160, 60), (0, 0, 2, 2))
     squares.paste((160, 40, 160), (2, 2, 4, 4))
     squares.resize((64, 64), Image.Resampling.NEAREST).save(package / "squares.png")
+    (package / "picture.dae").write_text(textured("squares.png"), encoding="utf-8")
+    (package / "bumps.dae").write_text(textured("squares.png", has_bumps=True), encoding="utf-8")
     (package / "none.dae").write_text(collada(("", "")), encoding="utf-8")
     (package / "bare.obj").write_text(OBJ.partition("v ")[1] + OBJ.partition("v ")[2], encoding="utf-8")
     (package / "leaf.obj").write_text(OBJ, encoding="utf-8")

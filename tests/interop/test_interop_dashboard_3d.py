@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import struct
 import time
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import PointStamped, PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
+from PIL import Image
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -116,15 +118,28 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
     mouse(page, "mouseReleased", *end)
 
 
+def picture(page: Page, clip: dict[str, float] | None = None) -> Image.Image:
+    """Return a picture of the page, or of a part of it."""
+    part = {} if clip is None else {"clip": clip}
+    data = base64.b64decode(page.call("Page.captureScreenshot", format="png", **part)["data"])
+    return Image.open(io.BytesIO(data)).convert("RGB")
+
+
 def colors(page: Page) -> set[tuple[int, int, int]]:
     """Return the picture's colors."""
-    import base64
-
-    from PIL import Image
-
-    data = base64.b64decode(page.call("Page.captureScreenshot", format="png")["data"])
-    image = Image.open(io.BytesIO(data)).convert("RGB")
+    image = picture(page)
     return {color for _, color in image.getcolors(image.width * image.height) or []}  # type: ignore[misc]
+
+
+def color_at(page: Page, x: float, y: float) -> tuple[int, int, int]:
+    """Return the color at a position in pixels from the middle of the 3D view, y downwards."""
+    left, top = page.evaluate(
+        "(() => { const r = document.querySelector('canvas.stage').getBoundingClientRect();"
+        "return [r.x + r.width / 2, r.y + r.height / 2] })()"
+    )
+    clip = {"x": left + x, "y": top + y, "width": 1, "height": 1, "scale": 1}
+    found: tuple[int, int, int] = picture(page, clip).getpixel((0, 0))  # type: ignore[assignment]
+    return found
 
 
 def is_near(found: set[tuple[int, int, int]], wanted: tuple[int, int, int], most: int = 12) -> bool:
@@ -445,6 +460,33 @@ def test_meshes_keep_their_materials_without_lamps_and_a_bad_shape_is_named(
     # that in the lamp's light.
     end = time.monotonic() + PATIENCE
     while not is_near(colors(page), (191, 102, 51), 3):
+        assert time.monotonic() < end
+
+
+def test_textures_have_the_colors_of_their_pictures(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rviz_pictures.prepare(tmp_path)
+    (tmp_path / "rviz_meshes" / "lost.dae").write_text(rviz_pictures.textured("lost.png"), encoding="utf-8")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    visuals = "".join(
+        f'<visual><origin xyz="{x} 0 0"/><geometry><mesh filename="package://rviz_meshes/{name}.dae" scale="6 6 1"/></geometry>'
+        "</visual>"
+        for x, name in ((0, "lost"), (2, "picture"), (-2, "bumps"))
+    )
+    text = f'<robot name="r"><link name="map">{visuals}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+    publish(served, {"/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    metre = look_down(page)
+    # Nothing moves the camera after the picture of the texture has arrived, which would draw the scene again.
+    wait_color(page, (30, 160, 60), 3)
+    # As in RViz, a picture that is also that of the bumps is multiplied with itself.
+    wait_color(page, (30 * 30 // 255, 160 * 160 // 255, 60 * 60 // 255), 3)
+    # A mesh whose picture is missing has its material's color, and is not black.
+    end = time.monotonic() + PATIENCE
+    while min(color_at(page, 0.4 * metre, 0.4 * metre)) < 250:
         assert time.monotonic() < end
 
 

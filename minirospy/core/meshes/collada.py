@@ -31,8 +31,9 @@ def parse_dae(data: bytes) -> list[Mesh]:
 
     Raise MeshError if the data is not Collada, refers to missing parts, or is too large.
     """
+    data, end, _ = data.partition(b"</COLLADA>")  # text after the end is ignored, as in ROS
     try:
-        root = parse_xml(data)
+        root = parse_xml(data + end)
     except XmlError as error:
         raise MeshError(f"this is no Collada file: {error}") from None
     if _tag(root) != "COLLADA":

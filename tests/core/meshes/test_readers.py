@@ -166,6 +166,11 @@ def test_dae_has_units_transforms_and_colours() -> None:
     ]
 
 
+@pytest.mark.parametrize("rest", [b"\n", b"\0" * 100, b"</mesh></COLLADA>"])
+def test_text_after_the_end_of_a_dae_is_ignored(rest: bytes) -> None:
+    assert len(parse_dae(DAE.encode() + rest)) == len(parse_dae(DAE.encode()))
+
+
 def test_dae_strips_fans_and_polygons() -> None:
     for tag, text, expected in (
         ("tristrips", "<p>0 1 2 3</p>", [[0, 1, 2], [3, 2, 1]]),

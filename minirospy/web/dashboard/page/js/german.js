@@ -1266,6 +1266,6 @@ export const GERMAN = {
   "no button is pressed": "kein Taster ist gedrückt",
   "no LED is lit": "keine LED leuchtet",
   "{count} students, {passed} exercises passed": "{count} Teilnehmende, {passed} Aufgaben geschafft",
-  "No results yet. Each student types `minirospy check --join {uri} --name NAME` once.":
-    "Noch keine Ergebnisse. Alle tippen einmal `minirospy check --join {uri} --name NAME`.",
+  "No results yet. Each student types `minirospy check --join {uri} --name NAME` once, or, in a fleet, `minirospy check --share`.":
+    "Noch keine Ergebnisse. Alle tippen einmal `minirospy check --join {uri} --name NAME` oder in einer Flotte `minirospy check --share`.",
 };

@@ -22,6 +22,7 @@ const cache = new WeakMap(); // link -> Map of uri -> promise of an object
 const EMPTY_PICTURE = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=";
 const GRAY = [153, 153, 153]; // of a file without any material
 const REPEATED = 1000; // three's RepeatWrapping
+const NEAREST_MIPMAP = 1007; // three's LinearMipmapNearestFilter
 
 /**
  * Return a promise of an object: a copy with its own materials.
@@ -84,6 +85,9 @@ function own(material, paint) {
   });
   if (material.color) copy.color.copy(material.color);
   if (material.emissive) copy.emissive.copy(material.emissive);
+  // RViz multiplies with the picture once more for each other picture of the material, such as that of bumps.
+  const others = [material.normalMap, material.bumpMap].filter(Boolean).length;
+  if (copy.map && others) edit(copy, "map_fragment", "diffuseColor *= sampledDiffuseColor;".repeat(others));
   let alpha = paint?.alpha ?? 1;
   if (paint?.tint) {
     // RViz draws the tint over the mesh: at most half of it.
@@ -103,14 +107,20 @@ function own(material, paint) {
 /** Mix the color of a material, also that of its texture, with another one: `part` of it. */
 function mix(material, [r, g, b], part) {
   const color = [r, g, b].map((each) => (each / 255).toFixed(4)).join(", ");
+  edit(material, "color_fragment", `diffuseColor.rgb = mix(diffuseColor.rgb, vec3(${color}), ${part.toFixed(4)});`);
+}
+
+/** Add code to a material's program, after one of its pieces. */
+function edit(material, piece, code) {
+  const edits = (material.userData.edits ??= []);
+  edits.push([`#include <${piece}>`, code]);
   material.onBeforeCompile = (shader) => {
-    shader.fragmentShader = shader.fragmentShader.replace(
-      "#include <color_fragment>",
-      `#include <color_fragment>\n  diffuseColor.rgb = mix(diffuseColor.rgb, vec3(${color}), ${part.toFixed(4)});`,
-    );
+    for (const [after, added] of edits) {
+      shader.fragmentShader = shader.fragmentShader.replace(after, `${after}\n  ${added}`);
+    }
   };
   // Programs are shared by this key.
-  material.customProgramCacheKey = () => `${color} ${part}`;
+  material.customProgramCacheKey = () => JSON.stringify(edits);
 }
 
 function checked(uri) {
@@ -177,7 +187,8 @@ async function objectOf(link, uri, bytes) {
 }
 
 async function readDae(link, uri, bytes) {
-  const text = new TextDecoder().decode(bytes);
+  // As in RViz, text after the end of the file is ignored.
+  const [text] = new TextDecoder().decode(bytes).split(/(?<=<\/COLLADA\s*>)/, 1);
   // The pictures come through the bridge, too: fetched first, since the loader wants addresses.
   const pictures = new Map();
   for (const [, name] of text.matchAll(/<init_from>(?:<ref>)?([^<]+\.(?:png|jpe?g|webp))/gi)) {
@@ -189,10 +200,13 @@ async function readDae(link, uri, bytes) {
   }
   const manager = new LoadingManager();
   manager.setURLModifier((url) => pictures.get(url) ?? EMPTY_PICTURE);
-  manager.onLoad = () => {
-    for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
-  };
+  let areLoading = false;
+  manager.onStart = () => (areLoading = true);
+  const loaded = new Promise((resolve) => (manager.onLoad = () => resolve(undefined)));
   const parsed = new ColladaLoader(manager).parse(text, "");
+  // A texture is black until its picture is there, and nothing would draw the scene again then.
+  if (areLoading) await loaded;
+  for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
   if (!parsed) throw new Error(t("{name}: this is not a Collada file", { name: uri }));
   // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and
   // so does RViz.
@@ -208,11 +222,21 @@ async function readDae(link, uri, bytes) {
   const replaced = first ?? bodyMaterial(GRAY);
   const known = (material) => (isMissing(material) ? replaced : material);
   parsed.scene.traverse((/** @type {any} */ each) => {
-    if (each.isMesh) each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
+    if (!each.isMesh) return;
+    each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
+    for (const material of [each.material].flat()) setColors(material);
   });
   const group = new Group();
   group.add(parsed.scene);
   return group;
+}
+
+/** Show a texture as RViz does, with its picture's colors; without the picture, show the material's color. */
+function setColors(material) {
+  const { map } = material;
+  if (!map) return;
+  if (!map.image || map.image.src === EMPTY_PICTURE) material.map = null;
+  else Object.assign(map, { colorSpace: "", minFilter: NEAREST_MIPMAP });
 }
 
 /** Return whether ColladaLoader made this material, for a mesh without one or with one that the file does not have. */

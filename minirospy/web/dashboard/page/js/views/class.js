@@ -1,6 +1,7 @@
-// Class: the students at this master, their boards, and the exercises that each has passed. Only shows.
+// Class: the students at this master and in the fleet, with their boards and the exercises that each has passed. Only
+// shows.
 
-import { classTable } from "../classroom.js";
+import { classTable, classTopics, readShared } from "../classroom.js";
 import { h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
@@ -12,6 +13,8 @@ export class Class {
   constructor(link, words, main) {
     this.link = link;
     this.beats = new Map(); // key -> {beat, at}
+    this.shared = new Map(); // topic -> its last message; kept when the computer has left
+    this.ends = new Map(); // topic -> what ends the subscription
     this.count = h("span", { class: "muted" });
     this.head = h("tr", {});
     this.body = h("tbody", {});
@@ -33,17 +36,41 @@ export class Class {
         this.failed,
       ),
     );
-    this.ending = link.watch(["parameters"], () => this.update());
+    this.ending = link.watch(["parameters", "channels"], () => this.update());
     this.timer = setInterval(() => this.update(), GONE_MS / 2);
   }
 
   close() {
     clearInterval(this.timer);
     this.ending();
+    for (const end of this.ends.values()) end();
+  }
+
+  /** Subscribe to the topics of the computers that a fleet joins. */
+  follow() {
+    const topics = new Set(classTopics(this.link.channels.values()));
+    for (const [topic, end] of this.ends) {
+      if (topics.has(topic)) continue;
+      end();
+      this.ends.delete(topic);
+    }
+    for (const topic of topics) {
+      if (this.ends.has(topic)) continue;
+      this.ends.set(
+        topic,
+        this.link.subscribe({ topic, mode: "all" }, ({ lines = [] }) => {
+          const found = readShared(lines.at(-1)?.message.data ?? "");
+          if (!found) return;
+          this.shared.set(topic, found);
+          this.update();
+        }),
+      );
+    }
   }
 
   update() {
-    const { exercises, students } = classTable(this.link.parameters);
+    this.follow();
+    const { exercises, students } = classTable(this.link.parameters, this.shared);
     const now = performance.now();
     for (const { key, beat } of students) {
       if (this.beats.get(key)?.beat !== beat) this.beats.set(key, { beat, at: now });
@@ -68,7 +95,10 @@ export class Class {
       this.empty,
       students.length
         ? ""
-        : t("No results yet. Each student types `minirospy check --join {uri} --name NAME` once.", { uri: "URI" }),
+        : t(
+            "No results yet. Each student types `minirospy check --join {uri} --name NAME` once, or, in a fleet, `minirospy check --share`.",
+            { uri: "URI" },
+          ),
     );
     refill(this.head, [
       h("th", { scope: "col" }, t("Student")),
@@ -81,7 +111,12 @@ export class Class {
         h(
           "tr",
           {},
-          h("th", { scope: "row" }, student.name),
+          h(
+            "th",
+            { scope: "row" },
+            student.name,
+            student.robot && student.robot !== student.name && h("span", { class: "muted" }, ` ${student.robot}`),
+          ),
           h("td", { title: student.nodes.join("\n") }, live.includes(student.key) ? board(student) : ""),
           exercises.map((name) => mark(student.results.get(name))),
         ),
