@@ -26,6 +26,7 @@ def test_rooms_are_those_of_the_layer_test() -> None:
 
 
 def test_named_files_exist() -> None:
+    assert len(paths()) > 100
     for path in paths():
         base = ROOT if path.startswith("tests/") else PACKAGE
         # In the diagrams, a module has no suffix.

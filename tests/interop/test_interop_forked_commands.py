@@ -43,9 +43,13 @@ def test_signals_reach_the_fork(real_master: str, tmp_path: Path) -> None:
 
     def ended(program: ForkedCommand | subprocess.Popen[str], number: int) -> int:
         assert program.stderr
-        assert "does not appear to be published yet" in program.stderr.readline()
-        program.send_signal(number)
-        program.communicate(timeout=PATIENCE)
+        try:
+            assert "does not appear to be published yet" in program.stderr.readline()
+            program.send_signal(number)
+            program.communicate(timeout=PATIENCE)
+        except BaseException:
+            program.send_signal(signal.SIGKILL)
+            raise
         return program.returncode
 
     words = ["echo", "/nothing"]

@@ -14,6 +14,7 @@ from minirospy.workspace.packages import Packages
 ROOT = Path(__file__).parents[2] / "minirospy"
 FOLDERS = sorted(path.parent for path in (ROOT / "ros").glob("*/package.xml"))
 # Python packages that are not ROS packages. camera_info_manager is a module in the package camera_info_manager_py.
+assert len(FOLDERS) > 50
 NO_PACKAGES = {"PyKDL", "RPi", "ament_index_python", "camera_info_manager", "catkin_pkg", "rospkg"}
 
 

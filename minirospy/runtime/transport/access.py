@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -119,6 +120,8 @@ def _linux_ipv4_addresses() -> list[str]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
         request = struct.pack("iP", len(records), records.buffer_info()[0])
         used, _ = struct.unpack("iP", fcntl.ioctl(sock, _SIOCGIFCONF, request))
+    if used == len(records):
+        raise OSError("there may be more addresses than were read")
     return [
         socket.inet_ntoa(records[start + address_at : start + address_at + 4].tobytes())
         for start in range(0, used, record_size)
@@ -133,6 +136,8 @@ def _linux_ipv6_addresses() -> list[str]:
         with open("/proc/net/if_inet6", encoding="ascii") as file:
             return [socket.inet_ntop(socket.AF_INET6, bytes.fromhex(line.split()[0])) for line in file]
     except FileNotFoundError:
+        if not os.path.exists("/proc/net"):
+            raise
         return []
 
 

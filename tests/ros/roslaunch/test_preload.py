@@ -529,7 +529,7 @@ def test_preloaded_process_ends_after_the_start(start: RoslaunchStart, master: s
     assert not preloaded_processes(psutil.Process(launch.process.pid))
 
 
-def test_forked_node_loads_no_module_and_compiles_no_pattern(tmp_path: Path, master: str) -> None:
+def test_forked_node_loads_no_module_and_compiles_no_pattern_of_xmlrpc(tmp_path: Path, master: str) -> None:
     made = Runner(tmp_path, ROS_MASTER_URI=master)
     text = """import re, sys
 import rospy

@@ -348,9 +348,23 @@ def test_own_addresses_are_those_of_psutil() -> None:
         found = [each for interface in psutil.net_if_addrs().values() for each in interface]
         return {each.address.partition("%")[0] for each in found if each.family in families}
 
-    assert "127.0.0.1" in own_addresses()
     # Another process may add an interface in the meantime.
     wait_until(lambda: set(own_addresses()) == addresses_of_psutil())
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems use psutil")
+def test_own_addresses_come_from_psutil_if_the_kernel_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    from minirospy.runtime.transport import access
+
+    asked = []
+
+    def refuse() -> list[str]:
+        asked.append("IPv4")
+        raise OSError("no ioctl here")
+
+    monkeypatch.setattr(access, "_linux_ipv4_addresses", refuse)
+    assert "127.0.0.1" in own_addresses()
+    assert asked == ["IPv4"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems use psutil")

@@ -13,6 +13,7 @@ FILES = read_folder()
 VENDOR = FOLDER / "vendor"
 OWN = sorted(path for path in FOLDER.rglob("*") if path.is_file() and VENDOR not in path.parents)
 SCRIPTS = [path for path in OWN if path.suffix == ".js"]
+assert len(SCRIPTS) > 20
 
 
 def test_index_is_served_at_the_root() -> None:

@@ -24,6 +24,7 @@ CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_V
 
 _START_SECONDS = 60.0
 _POLL_SECONDS = 0.005  # between checks whether the started master responds
+_SLOW_POLL_SECONDS = 0.02  # the same, after the first second: the master starts on a slow computer
 
 
 class LaunchMaster:
@@ -85,13 +86,14 @@ class LaunchMaster:
 
     def wait_for_start(self, process: Process) -> None:
         """Wait until the started master responds, then set /run_id. Raise MinirospyError if it exits or does not respond."""
-        end = time.monotonic() + _START_SECONDS
+        start = time.monotonic()
         while not self.is_online():
             if not process.is_running:
                 raise MinirospyError(f"the master ended with status {process.exit_code}")
-            if time.monotonic() > end:
+            waited = time.monotonic() - start
+            if waited > _START_SECONDS:
                 raise MinirospyError(f"the master does not answer at {self._environment.master_uri}")
-            self._pause(_POLL_SECONDS)
+            self._pause(_POLL_SECONDS if waited < 1.0 else _SLOW_POLL_SECONDS)
 
         if self.run_id:
             # Set the run id explicitly: the launching program may have chosen it, and it names the log folder.

@@ -117,7 +117,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
 
 
 def read_response() -> None:
-    """Read a response like the master's, which compiles the regular expressions for reading HTTP and XML-RPC.
+    """Read a response like the master's, which compiles the regular expressions that a usual response needs.
 
     Otherwise each node would compile them again, which takes some milliseconds.
     """

@@ -36,6 +36,11 @@ class DeadNodes:
     def add(self, node: str) -> None:
         """Schedule a node (global name) to be unregistered."""
         if self._thread is None:
+            # In the thread an import could fail unnoticed, for example after an update of minirospy.
+            import concurrent.futures.thread  # noqa: F401
+
+            import minirospy.introspect.nodes  # noqa: F401
+
             self._thread = threading.Thread(target=self._run, name="dead-nodes", daemon=True)
             self._thread.start()
         self._exited.put(node)
