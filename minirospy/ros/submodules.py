@@ -59,7 +59,7 @@ def offer_standard_library() -> None:
 
 
 def _on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
-    """Return a module ``__getattr__`` (PEP 562) for ``package`` that imports these submodules on first use."""
+    """Return a module ``__getattr__`` (PEP 562) for ``package`` that imports the submodules ``names`` on first use."""
 
     def find(name: str) -> ModuleType:
         if name in names:

@@ -47,7 +47,7 @@ class RobotFrames:
         return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
 
     def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
-        """Yield the poses of links whose joints have a position in the message or mimic such a joint."""
+        """Yield the poses of the links whose joint has a position in the message, or mimics a joint that has one."""
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }

@@ -34,7 +34,7 @@ class JointParameters(NamedTuple):
 
 
 def read_parameters(param: Callable[[str, object], object], zeros: Sequence[object]) -> JointParameters:
-    """Read the parameters with ``param(name, default)``. ``zeros`` lists the values of the parameter zeros, private first.
+    """Read the parameters with ``param(name, default)``. ``zeros``: the values of ~zeros and zeros.
 
     Raise JointError if a parameter is invalid.
     """
@@ -62,7 +62,7 @@ def read_parameters(param: Callable[[str, object], object], zeros: Sequence[obje
 
 
 def _zero(zeros: Sequence[object], joint: str) -> float | None:
-    """Return a joint's zero position from the first tree that contains the joint.
+    """Return a joint's zero position from the first of the ``zeros`` dicts that contains the joint.
 
     Slashes in the joint's name separate tree levels.
     """

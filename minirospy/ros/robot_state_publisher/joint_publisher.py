@@ -55,7 +55,7 @@ class JointPublisher:
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        # Read both trees: a joint missing from the private tree may be in the other one.
+        # Read both parameters: a joint missing from ~zeros may be in zeros.
         zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
         found = read_parameters(param, zeros)
         self.lock = threading.Lock()

@@ -108,7 +108,7 @@ class JointStates:
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
         """Return the adjustable joint that a joint mimics, with factor and offset. Raise JointError if joints form a cycle."""
         if name not in dependent:
-            # The joint has no limits and was omitted with a warning. The parent "" does not exist.
+            # This joint was omitted with a warning because it has no limits. No joint has the name "".
             return Dependent("")
 
         rule = dependent[name]
@@ -134,7 +134,7 @@ class JointStates:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> None:
-        """Set joints from another node's JointState. Values missing at the end of a list stay unchanged."""
+        """Set joints from another node's JointState. If a list is too short, the remaining joints keep their values."""
         for number, name in enumerate(names):
             joint = self.free.get(name)
             if joint is None:

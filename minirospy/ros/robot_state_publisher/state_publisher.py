@@ -50,7 +50,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Warn, with ROS's texts, about features of a robot that frames cannot express."""
+    """Warn, in ROS's words, about features of a robot that frames cannot express."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -97,7 +97,7 @@ class StatePublisher:
         )
 
     def publish(self, state: JointState) -> None:
-        """Publish a joint state's frames, unless the last ones were published less than a period ago."""
+        """Publish the frames for a joint state, unless frames were last published less than a period ago."""
         if not self._is_valid(state):
             return
         now = rospy.Time.now()

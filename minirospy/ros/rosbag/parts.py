@@ -26,7 +26,7 @@ def migration_verbs() -> tuple[Verb, ...]:
 
 
 def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
-    """Map the names of the migration programs to the programs."""
+    """Return a dict from the names of the migration programs to the programs."""
     module = _module("scripts")
     return module.SCRIPTS if module else {}
 

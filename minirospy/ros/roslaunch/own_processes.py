@@ -141,10 +141,10 @@ class OwnProcesses:
         self._closing = SignalSafeEvent()
         self._on_exit = on_exit  # called with an exited process's name and exit status
         self._on_required_exit = on_required_exit
-        self._on_last_exit = on_last_exit  # called at each poll if no process is left or will come
+        self._on_last_exit = on_last_exit  # called at each poll if no process is left and none will be added
 
     def start(self, name: str) -> None:
-        """Start the polling thread with this name, unless it is running or there is no process."""
+        """Start the polling thread under this name, unless it is already running or there are no processes."""
         with self.lock:
             if self.watched and self.thread is None:
                 self.thread = threading.Thread(target=self._run, name=name, daemon=True)

@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 MAX_DEFAULT_NON_FLOW_ITEMS = (
-    4  # maximum entries in a dictionary or list; longer flat values are printed in braces
+    4  # maximum entries of a block-style dictionary or list; flat ones with more are printed in braces
 )
 _USAGE_ERROR = getattr(os, "EX_USAGE", 1)
 _NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte", "char"}
@@ -88,14 +88,14 @@ def dump(
                 field = _filled(value, name)
             if not inspect.ismethod(field) and not inspect.isfunction(field):
                 entries[name] = field
-        # PyYAML reads this attribute for each following node.
+        # PyYAML applies this setting to all nodes from here on.
         if len(entries) > MAX_DEFAULT_NON_FLOW_ITEMS:
             dumper.default_flow_style = flow_style
         node: yaml.Node = dumper.represent_dict(entries)
         return node
 
     class Dumper(_Dumper):
-        """Writes messages in the format that one call's arguments specify."""
+        """A separate class for each call, because PyYAML stores the representers in the class."""
 
     Dumper.add_representer(OrderedDict, yaml.SafeDumper.represent_dict)
     Dumper.add_representer(None, represent)  # type: ignore[arg-type]
@@ -106,14 +106,14 @@ def dump(
 
 
 def _filled(message: Any, name: str) -> list[object]:
-    """Return an empty array's value with one default element, or [] if the element's class is unknown."""
+    """Return a list with one default element for an empty array, or [] if the element's class is unknown."""
     type_ = message._slot_types[message.__slots__.index(name)]
     element = get_array_type_instance(type_, default_package=message._type.partition("/")[0])
     return [] if element is None else [element]
 
 
 def get_array_type_instance(field_type: str, default_package: str | None = None) -> object:
-    """Return the default value of a type or an array's elements, or None if the type's class does not exist."""
+    """Return the default value of a type (of an array type: of one element), or None if its class does not exist."""
     from minirospy.ros.roslib.roslib.message import get_message_class
 
     base = field_type.strip().rstrip("[]")
@@ -169,7 +169,7 @@ def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator
 def represent_ordered_mapping(
     self: Any, tag: str, mapping: Any, flow_style: bool | None = None
 ) -> yaml.MappingNode:
-    """Return a dictionary's YAML node, in its order; use as a PyYAML dumper's `represent_mapping`."""
+    """Return a YAML node that preserves the dictionary's order; use as a PyYAML dumper's `represent_mapping`."""
     pairs: list[tuple[yaml.Node, yaml.Node]] = []
     node = yaml.MappingNode(tag, pairs, flow_style=flow_style)
     if self.alias_key is not None:

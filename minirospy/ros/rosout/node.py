@@ -52,7 +52,7 @@ _LARGE, _MAX_LARGE = 16 * 1024, 100
 messages.
 """
 
-STEP_LETTERS = 1024  # characters to process per step; escaping one may take a microsecond
+STEP_LETTERS = 1024  # characters to process per step; escaping a character may take a microsecond
 
 
 class RosoutNode:
@@ -196,7 +196,7 @@ def _bytes_of(message: Message) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """Convert a Python logger's name to roscpp's style: ``ros`` and its children."""
+    """Convert a Python logger's name to roscpp's style: the root logger is ``ros``, its children ``ros.NAME``."""
     return "ros" + name.removeprefix("minirospy")
 
 

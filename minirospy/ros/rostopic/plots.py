@@ -27,7 +27,7 @@ _PLAIN = (bool, int, float)
 
 
 def plot_fields(val: object, f: str, field_filter: FieldFilter | None) -> str:
-    """Return the header line for a value: `time,`, then each path below ``f``."""
+    """Return the CSV header line for a value: `time,`, then the path of each cell, starting with ``f``."""
     return f"time,{plot_field_cells(val, f, field_filter) or ''}"
 
 

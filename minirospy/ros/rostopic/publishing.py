@@ -249,7 +249,7 @@ def _lines_of_stdin() -> Iterator[str]:
     while not rospy.is_shutdown():
         if not select.select([descriptor], [], [], 1.0)[0]:
             continue
-        # Do not use readline(): select() does not see lines that it buffers.
+        # Do not use readline(): it buffers lines, and select() does not report buffered lines.
         data = os.read(descriptor, 1 << 16)
         if not data:
             return

@@ -53,7 +53,7 @@ def diff(a: Wrench, b: Wrench, dt: float = 1) -> Wrench: ...
 
 
 def diff(a: Any, b: Any, dt: float = 1) -> Any:
-    """Return the velocity that moves ``a`` to ``b`` within ``dt``; for poses, a twist in the base frame."""
+    """Return the velocity that moves ``a`` to ``b`` within ``dt``. For poses, this is a twist in the base frame."""
     if isinstance(a, Frame) and isinstance(b, Frame):
         return Twist(diff(a.p, b.p, dt), diff(a.M, b.M, dt))
     if isinstance(a, Rotation) and isinstance(b, Rotation):
@@ -73,7 +73,7 @@ def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
 
 
 def refusal(name: str) -> type:
-    """Return a placeholder class with this name. Creating an instance raises NotImplementedError with advice."""
+    """Return a class named ``name`` in place of an unsupported one. Its constructor raises NotImplementedError with advice."""
 
     def refuse(*_: object, **__: object) -> NoReturn:
         raise NotImplementedError(

@@ -239,7 +239,7 @@ class Twist(Screw):
         return Twist()
 
     def RefPoint(self, base: Vector) -> Twist:
-        """Return the same motion with ``vel`` for the point ``base``."""
+        """Return the twist of the same motion whose ``vel`` is the velocity of the point ``base``."""
         return Twist(self.vel + self.rot * base, self.rot)
 
 

@@ -36,7 +36,7 @@ class RealtimePublisher(Generic[_T]):
         self._queue_size = queue_size
 
     def publish(self, message: _T) -> bool:
-        """Queue a message for the thread. If the queue already holds ``queue_size`` messages, drop this one and return False."""
+        """Queue a message for the sender thread, or drop it and return False if ``queue_size`` messages are already queued."""
         if len(self._waiting) >= self._queue_size:
             return False
         self._waiting.append(message)
@@ -97,7 +97,7 @@ class RealtimeActionServer:
         self._is_running = True
 
     def report(self, time: int) -> bool:
-        """Report the active goal's outcome, if it has one; return whether feedback is due. ``time`` is ROS time in ns."""
+        """Report the active goal's outcome, if it is known; return whether feedback is due. ``time`` is ROS time in ns."""
         active = self._active
         if active is None:
             return False
@@ -142,7 +142,7 @@ class RealtimeActionServer:
             handle.set_rejected(rejection.result, str(rejection))
             return
         self.preempt()
-        # The action server's lock is held, so that the goal's acceptance is reported before its outcome.
+        # The caller holds the action server's lock, so that the goal's acceptance is reported before its outcome.
         self._active = _Active(handle, goal)
         handle.set_accepted()
         if not self._is_running:
@@ -156,7 +156,7 @@ class RealtimeActionServer:
             self._finish(active, _call)
 
     def _finish(self, active: _Active, call: Callable[[Callable[[], None]], None]) -> None:
-        """Report the outcome of a goal that is ending, by default cancelled."""
+        """Report the outcome of a goal that is ending; without an outcome, the goal is cancelled."""
         if self._active is active:
             self._active = None
         active.goal.finish(CANCELLED)
@@ -179,7 +179,7 @@ class _Active:
     handle: ServerGoalHandle
     goal: MonitoredGoal
     due: int | None = None  # ROS time in ns of the next report; None before the first cycle
-    report_once: threading.Lock = field(default_factory=threading.Lock)  # acquired by the thread that reports
+    report_once: threading.Lock = field(default_factory=threading.Lock)  # acquired by the reporting thread
 
 
 def _call(function: Callable[[], None]) -> None:

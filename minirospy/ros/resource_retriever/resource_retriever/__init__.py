@@ -12,7 +12,7 @@ from minirospy.ros.rospkg.rospkg.rospack import RosPack
 __all__ = ["PACKAGE_PREFIX", "URLError", "get", "get_filename", "urlopen"]
 
 PACKAGE_PREFIX = "package://"
-_TIMEOUT = 60.0  # seconds without data until a server counts as unreachable
+_TIMEOUT = 60.0  # seconds without receiving data after which a server counts as unreachable
 
 
 def get(url: str) -> bytes:

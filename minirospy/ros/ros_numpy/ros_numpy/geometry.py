@@ -37,7 +37,7 @@ _P = TypeVar("_P", Point, Vector3)
 
 @converts_to_numpy(Vector3)
 def vector3_to_numpy(msg: Vector3, hom: bool = False) -> Floats:
-    """Return x, y, z; if ``hom``, followed by 0."""
+    """Return x, y and z, followed by 0 if ``hom``."""
     return np.array([msg.x, msg.y, msg.z, *([0] if hom else [])])
 
 
@@ -52,7 +52,7 @@ def numpy_to_vector3(arr: Array) -> object:
 
 @converts_to_numpy(Point)
 def point_to_numpy(msg: Point, hom: bool = False) -> Floats:
-    """Return x, y, z; if ``hom``, followed by 1."""
+    """Return x, y and z, followed by 1 if ``hom``."""
     return np.array([msg.x, msg.y, msg.z, *([1] if hom else [])])
 
 
@@ -115,7 +115,7 @@ def _parts(matrix: Array, position: type[_P]) -> tuple[_P, Quaternion]:
 
 
 def _each(arr: Array, dimensions: int, make: Callable[[Array], object]) -> object:
-    """Convert the last ``dimensions`` axes to a message; with more axes, return an array of messages."""
+    """Convert an array with ``dimensions`` axes to a message, or one with more axes to an array of messages."""
     if arr.ndim == dimensions:
         return make(arr)
     shape = arr.shape[:-dimensions]

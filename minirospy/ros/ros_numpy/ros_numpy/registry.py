@@ -26,7 +26,7 @@ The keys are names because messages read from a bag have other classes.
 
 
 def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a converter from ``msgtype``, or from lists of it if ``plural``, to arrays."""
+    """Return a decorator that registers a converter to arrays from ``msgtype`` (from lists of this type if ``plural``)."""
 
     def register(function: _F) -> _F:
         _to_numpy[msgtype._type, plural] = function
@@ -36,7 +36,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a converter from arrays to ``msgtype``, or to lists of it if ``plural``."""
+    """Return a decorator that registers a converter from arrays to ``msgtype`` (to lists of this type if ``plural``)."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function

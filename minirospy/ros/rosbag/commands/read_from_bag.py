@@ -109,7 +109,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
         for message in reader.messages(paths) if options.limit != 0 else ():
             connection = message.connection
             field = paths[connection.id]
-            # Topics with the same field share one Echo, so that -p prints a single line of column names at the start.
+            # Use one Echo for all topics printed with the same field: with -p, an Echo prints the column names first.
             if field not in echoes:
                 echoes[field] = options.make(TopicField(connection.topic, connection.type, field))
             echo = echoes[field]
@@ -136,7 +136,7 @@ def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")
-    # The longest matching topic wins: a topic with the full name precedes a field of a shorter one.
+    # Prefer the longest topic: /a/b means the topic /a/b, if it exists, not the field b of the topic /a.
     holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
     topic = max(holders, key=len, default="")
     return {

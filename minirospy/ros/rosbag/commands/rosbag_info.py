@@ -162,7 +162,7 @@ def _filter(words: list[str], print: str | None) -> int:
         return 0 if isinstance(error, BagEncryptedError) else 1
 
     try:
-        # Hide the progress bar if matches are printed to the same terminal, because both would overwrite each other.
+        # Hide the progress bar if matches are printed to the same terminal, because they would overwrite each other.
         with showing_progress(target, total, quiet=show is not None and sys.stdout.isatty()) as progress:
             bags.filter_bag(source, target, keep, progress, show=show, on_shown=_print_match, warn=report)
     except (BagError, ValueTextError, MessageException) as error:

@@ -13,7 +13,7 @@ from minirospy.base.escape import escaped, own_output
 __all__ = ["showing_progress"]
 
 _REFRESH = 1.0
-_BESIDE_PATH = 37  # columns of ROS's progress line without the path
+_BESIDE_PATH = 37  # number of columns of ROS's progress line, without the path
 
 
 @contextlib.contextmanager
@@ -49,7 +49,7 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         DownloadColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    # Write to the unwrapped stream: the commands' stdout escapes the control sequences that move the bar's cursor.
+    # Write to the original stdout: the commands' wrapped one escapes the control sequences that move the bar's cursor.
     console = Console(file=own_output())
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
         task = progress.add_task(escaped(path), total=max(total, 1))

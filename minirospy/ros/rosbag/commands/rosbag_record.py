@@ -136,7 +136,7 @@ def _parser() -> Parser:
 
 
 def _record_verb(given: RecordArguments) -> int:
-    # `rosrun rosbag record` accepts both options together and uses the name.
+    # Only the verb rejects the combination: `rosrun rosbag record` accepts it and ignores the prefix.
     if given.output_prefix and given.output_name:
         text = "Can't set both prefix and name."
         raise Misuse(text, text)

@@ -84,7 +84,7 @@ def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) 
 
 
 def _reindex_one(source: str, target: str, quiet: bool) -> None:
-    import shutil  # imported here because importing takes longer than these commands
+    import shutil  # imported here because the import takes longer than running these commands
 
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
@@ -187,7 +187,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
     try:
         write(source, target)
     except BagError as error:
-        # The target already contains the messages before the damage.
+        # The target already contains the messages that precede the damage.
         print()
         report(f"ERROR operating on {source}: {error}")
     except OSError as error:

@@ -131,7 +131,7 @@ class MessageUpdateRule:
         return _class_named(t, self.old_types, self.old_type)
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill a message field from the old one. Call this in update().
+        """Fill a field of the new message from the old message's field. Call this in update().
 
         Raise BagMigrationException if the field's types are not in ``migrated_types``.
         """
@@ -141,7 +141,7 @@ class MessageUpdateRule:
     def migrate_array(
         self, msg_from_array: Sequence[Message], msg_to_array: list[Message], msg_to_name: str
     ) -> None:
-        """Fill an array of messages from the old one. Call this in update().
+        """Fill an array field of the new message from the old message's field. Call this in update().
 
         Raise BagMigrationException if the types are not in ``migrated_types``, KeyError if the new message does not use
         the type.
@@ -193,7 +193,7 @@ class MessageUpdateRule:
 
 
 def clean_name(name: str, top_name: str) -> str:
-    """Remove a type's package if it is std_msgs or that of the enclosing message ``top_name``."""
+    """Remove the package from a type's name if it is std_msgs or the package of the enclosing message ``top_name``."""
     parts = name.split("/")
     for package in ("std_msgs", top_name.split("/", maxsplit=1)[0]):
         if package in parts:

@@ -79,7 +79,7 @@ class ScaffoldNode:
 
 
 class Migration(NamedTuple):
-    """A migration path for a type, with the rules missing from it."""
+    """A migration path for a type, and the rules that are missing on the path."""
 
     path: list[ScaffoldNode]
     missing: list[MessageUpdateRule]
@@ -320,7 +320,7 @@ class MessageMigrator:
     # -- the scaffold
 
     def _build(self) -> None:
-        """Link each type's explicit rules, and connect the last one to the next type name or the installed class."""
+        """Link each type's explicit rules in order; link the last one to a rule for the type's new name or installed class."""
         ends = []
         for type_, chain in list(self.rulechains.items()):
             self.rename_map[type_] = self._names_of(type_)
@@ -373,7 +373,7 @@ class MessageMigrator:
                 if get_message_key(node.old_class) == get_message_key(end.new_class):
                     end.next = node
                     return
-            # Join the chain at the latest possible step, so that no message is converted twice.
+            # Link to the last step that accepts this class, to skip unnecessary conversions.
             for node in reversed(following if end.next is None else []):
                 rule = self._made(end.new_class, node.old_class)
                 if rule.valid:
@@ -386,7 +386,7 @@ class MessageMigrator:
             end.next = self._node(end.new_class, None, rule)
 
     def _path_to_nowhere(self, old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the path for a type that is not installed, which ends with a rule that the user must write."""
+        """Return the path for a type that is not installed. Its last step has an incomplete rule, for the user to write."""
         steps = self.scaffold_range(old_class._type, "")
         steps = self._from_start(steps, old_class) or steps
         last = steps[-1].new_class if steps else old_class
@@ -411,7 +411,7 @@ class MessageMigrator:
         return [self._extra(old_class, first, self._made_whole(old_class, first)), *steps]
 
     def _to_end(self, steps: list[ScaffoldNode], new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps up to the new class; append a generated step if none leads to it."""
+        """Return the steps up to the one that produces ``new_class``; append a generated step if none does."""
         candidates = []
         for number, node in reversed(list(enumerate(steps))):
             if node.new_class is None or node.new_class._type != new_class._type:
@@ -435,7 +435,7 @@ class MessageMigrator:
         return []
 
     def _from_start(self, steps: list[ScaffoldNode], old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from the old class, with a generated first step if none starts there; [] if that is impossible."""
+        """Return the steps that start at ``old_class``, the first generated if necessary; return [] if no valid one exists."""
         if exact := self._exact_start(steps, old_class):
             return exact
         for number, node in reversed(list(enumerate(steps))):

@@ -22,7 +22,7 @@ __all__ = ["SCRIPTS"]
 
 
 def _with_definition_of_md5sum(connection: Connection) -> Connection:
-    """Replace the connection's definition with the one for its md5sum, if a rule or package contains it."""
+    """Replace the connection's definition with the one that matches its md5sum, if a rule or package contains that one."""
     from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import class_of_connection
 

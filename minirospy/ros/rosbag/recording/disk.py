@@ -27,7 +27,7 @@ class DiskThread:
     def __init__(self, on_error: Callable[[Exception], object]) -> None:
         self._on_error = on_error
         self._queue: queue.SimpleQueue[tuple[Callable[[], object], int] | None] = queue.SimpleQueue()
-        # Only one thread writes each counter, so no lock is needed.
+        # Each counter is written by only one thread, so no lock is needed.
         self._queued = self._done = 0
         self._thread = threading.Thread(target=self._run, name="rosbag-disk")
         self._thread.start()
@@ -77,7 +77,7 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # open_file() does not follow symbolic links: an attacker could guess the name, because it contains the time.
+        # open_file() does not follow symbolic links, which an attacker could create under the predictable file name.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
@@ -97,7 +97,7 @@ class QueuedFile:
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Seek relative to the start or the end of the file."""
         if whence == os.SEEK_END:
-            # Do nothing: between seeking to the header and back to the end, the writer writes nothing.
+            # Do nothing: a writer seeks to the end only after its last write.
             return self._position
         self._position = offset
         self._do(lambda: self._file.seek(offset))

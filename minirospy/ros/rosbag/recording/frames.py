@@ -33,6 +33,6 @@ def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:
-    """Return a class for publishing already serialized messages of this type from their bytes, ``_buff``."""
+    """Return a class for publishing messages of this type that are already serialized; ``_buff`` holds the bytes."""
     fields = {"_type": type_, "_md5sum": md5sum, "_full_text": definition, "__slots__": []}
     return type("StoredFrame", (AnyMsg,), fields)

@@ -35,7 +35,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
     finally:
         stop.set()
         if thread:
-            # Wait for the thread to restore the terminal.
+            # Wait until the thread has restored the terminal.
             thread.join(10.0)
 
 

@@ -49,13 +49,13 @@ class Output(Protocol):
     """Where a player sends its messages. All methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
-        """Prepare the output. End the player when the connection to the graph shuts down.
+        """Prepare the output. When its connection to the graph shuts down, end the player.
 
         This method is called first.
         """
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """Advertise these connections' topics. Each connection comes with its bag's index."""
+        """Advertise the connections' topics. Each connection comes with the index of its bag."""
 
     def offer(self, player: Controls) -> None:
         """Offer controls for the player, such as a service."""
@@ -64,7 +64,7 @@ class Output(Protocol):
         """Return whether each topic has a subscriber."""
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """Return a context manager for playing, inside which each typed key is passed to ``on_key``."""
+        """Return a context manager for playing. While it is active, each typed key is passed to ``on_key``."""
 
     def publish(self, number: int, message: StoredMessage) -> None:
         """Publish a message from the bag with this index."""
@@ -96,7 +96,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Sends each latched publisher's last message to late subscribers, because a topic stores only one message."""
+    """Sends each latched publisher's last message to late subscribers, because a latched topic keeps only one message."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []

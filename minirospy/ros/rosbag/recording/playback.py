@@ -56,10 +56,10 @@ class Playback:
         self.is_fresh = True  # whether no message has been published since the start or the last seek
         # set, without the lock, when a shutdown is requested; possible in any phase
         self.is_ended = False
-        self.options = options  # control() changes the settings for looping and /clock
-        self.seek_to: int | None = None  # requested bag time, until the reader takes it
+        self.options = options  # control() replaces the options for looping and /clock
+        self.seek_to: int | None = None  # bag time of a requested seek; None once the reader has taken it
         self._span = (0, 0)  # bag times of the first and last message; set in OPENING
-        self._starts_paused = options.paused  # used before PLAYING
+        self._starts_paused = options.paused  # whether to start paused; read before PLAYING
         self._schedule: Schedule | None = None  # None in OPENING
 
     # --- transitions
@@ -195,7 +195,7 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Update is_fresh together with the time: clients that see the time count their steps from it.
+            # Change is_fresh together with the time: a client that steps reads both to count the messages to publish.
             self.is_fresh = False
         return wait
 

@@ -40,7 +40,7 @@ class Player:
         on_ready: Callable[[int, int], object] | None = None,
         output: Output | None = None,
     ) -> None:
-        """Create a player. It calls ``on_ready`` with the first and last message's times before playing starts.
+        """Create a player. Before playing, the player calls ``on_ready`` with the times of the first and the last message.
 
         From then on the player can be controlled with :meth:`control`, so it waits at the end of the bags instead of
         returning.
@@ -152,7 +152,7 @@ class Player:
         self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
-        """Wait for the delay and the subscribers that the options request; publish the messages latched before the start."""
+        """Wait for the delay and subscribers given in the options; publish each latched topic's last message before the start."""
         options = self._options
         self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
         self._sleep(options.delay)
@@ -238,7 +238,7 @@ class Player:
             self._playback.leave_end()
 
     def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
-        """Publish the messages latched before ``start``; return the messages from ``start`` on."""
+        """Publish each latched topic's last message before ``start``; return the messages from ``start`` on."""
         messages.join()
         selection = selection._replace(start=start)
         for number, message in self._bags.last_latched(selection):

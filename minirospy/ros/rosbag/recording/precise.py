@@ -10,7 +10,7 @@ from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
-# SignalSafeEvent.wait() is imprecise, so sleep during the last N ns before the deadline.
+# Time in ns before the deadline at which to switch from SignalSafeEvent.wait(), which is imprecise, to sleeping.
 _EVENT_NS = 5_000_000
 
 # Linux's PR_SET_TIMERSLACK: how much later the kernel may wake a thread, 50 us by default

@@ -58,7 +58,7 @@ class Recorder:
     def __init__(self, options: RecordOptions) -> None:
         self.options = options
         self.status = 0  # 1 after a failure such as a disk error
-        self.dropped: Counter[str] = Counter()  # messages per topic dropped because the disk was too slow
+        self.dropped: Counter[str] = Counter()  # messages dropped per topic because of a slow disk
         self._matches = topic_filter(options)
         self._matches_node = topic_filter(options, subscribed_by_node=True)
         self._topics: dict[str, _Topic] = {}
@@ -92,7 +92,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # Complete the file in a thread, which Ctrl-C does not interrupt and for which the process waits.
+        # Complete the file in a separate thread: Ctrl-C does not interrupt it, and the process waits for it to end.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -218,7 +218,7 @@ class Recorder:
             client.logwarn("rosbag record buffer exceeded.  Dropped messages: %s", _counts(new))
 
     def _end_finished(self) -> None:
-        """Unsubscribe from topics that have reached their message limit, and stop once all have."""
+        """Unsubscribe from topics that have reached their message limit; stop recording when all topics have reached it."""
         for topic in self._topics.values():
             if not topic.left and topic.subscriber:
                 topic.subscriber.unregister()
@@ -232,10 +232,10 @@ class Recorder:
         Log how much is still to be written: on each Ctrl-C, and once if the wait is long.
         """
         patience = time.monotonic() + _PATIENCE_SECONDS
-        # Do not join() the thread: on Python 3.10 and 3.11, an interrupted join() marks it as finished.
+        # Do not join() the thread: on Python 3.10 and 3.11, an interrupted join() marks the thread as finished.
         while not self._finished.is_set():
             try:
-                # is_shutdown() marks this wait as clean-up, which the shutdown must not interrupt.
+                # Calling is_shutdown() marks this loop as clean-up code, so that the shutdown does not interrupt it.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf
@@ -284,7 +284,7 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Latched messages precede the file's first message, so give them its time.
+        # Latched messages were received before this file was opened: record them at its start time.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
@@ -336,7 +336,7 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Write compressed chunks now to free memory, instead of when the next message arrives.
+                # Free memory by writing the chunks compressed so far, without waiting for the next message.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1

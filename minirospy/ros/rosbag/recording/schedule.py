@@ -107,7 +107,7 @@ class Schedule:
         self._next_tick = wall
 
     def seek(self, time: int, wall: int, *, keeps_steps: bool = False) -> None:
-        """Continue at another bag time. Offer the next message again. Pending steps are dropped unless ``keeps_steps``."""
+        """Continue at another bag time; then call :meth:`offer` again. Drop the pending steps unless ``keeps_steps``."""
         self._clock = self._message = time
         self._is_due = False
         self._delayed = False
@@ -175,12 +175,12 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now, or the next one offered if there is none."""
+        """If paused, make the current message due now. If there is none, do this with the next message offered."""
         if self._paused:
             self._steps += 1
 
     def toggle_pause_topics(self) -> None:
-        """Toggle whether to pause at the selected topics."""
+        """Toggle whether playback pauses at messages on the selected topics."""
         self._pauses_at = () if self._pauses_at else self._options.pause_topics
 
     def control_rate(self, stamp: int) -> None:
@@ -226,7 +226,7 @@ class Schedule:
         self._since = wall
 
     def _advance(self, wall: int) -> None:
-        """Advance bag time, but at most to the current message."""
+        """Advance bag time, at most to the current message's time."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, min(self._message, self._bag_time(wall)))
 

@@ -134,7 +134,7 @@ class ReadAhead:
         self._first.wait()
 
     def close(self) -> None:
-        """Request the thread to stop."""
+        """Ask the thread to stop."""
         self._stop.set()
 
     def join(self) -> None:

@@ -120,7 +120,7 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True  # set if LZ4 is available; programs check for this name
+found_lz4 = True  # always True here; programs check whether LZ4 is available
 
 
 class Compression:
@@ -363,7 +363,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _write_connection_record(self, connection_info: _ConnectionInfo, encrypt: bool = False) -> None:
-        """Add a connection for later messages with its topic and type."""
+        """Add a connection, to be used for later messages with the same topic and type."""
         if self._file is None:
             raise ValueError(CLOSED)
         if self._writer is None:
@@ -520,7 +520,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
-        # The real module keeps data in memory after close(), so reopen the bag here.
+        # In the real module, this data remains in memory after close(); here, reopen the bag to read it.
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=True) as bag:
                 return bag._summary(frequencies=frequencies)

@@ -119,7 +119,7 @@ class OpenedBag(PrivateBag):
         self._source = None
 
     def _take(self, f: Any, mode: str) -> BinaryIO:
-        """Return ``f`` if it is an open file; otherwise open it as a path."""
+        """Return ``f`` if it is an open file; otherwise open the file at the path ``f``."""
         if not self._is_file(f):
             self._filename = f
             return cast("BinaryIO", open(f, mode))

@@ -54,7 +54,7 @@ class PrivateBag(ABC):
     """Provides rosbag.Bag's private attributes."""
 
     _file: BinaryIO | None
-    _connection_indexes_read = False  # whether the index has been read, or is read on demand
+    _connection_indexes_read = False  # whether the index has been read or will be when needed
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
     """The chunks that a program has assigned to replace the bag's own, or None."""
 
@@ -148,7 +148,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position, given in the format of index entries and raw messages."""
+        """Return the message at a position, which has the format used in index entries and raw messages."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)

@@ -52,7 +52,7 @@ class _BagReader200(_BagReader):
     """Reads a version 2.0 bag."""
 
     def prepare(self) -> None:
-        """Read the index now if a subclass overrides the method for it."""
+        """If a subclass overrides _read_connection_index_records(), call it now; otherwise the index is read on demand."""
         if type(self)._read_connection_index_records is not _BagReader200._read_connection_index_records:
             self._read_connection_index_records()
 

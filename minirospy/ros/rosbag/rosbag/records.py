@@ -313,7 +313,7 @@ def _write_header(f: BinaryIO, header: Mapping[str, bytes | str]) -> bytes:
 def _write_record(
     f: BinaryIO, header: Mapping[str, bytes | str], data: bytes | str = "", padded_size: int | None = None
 ) -> None:
-    """Write a record. If ``padded_size`` is given, pad the data with spaces to give header and data that total size."""
+    """Write a record. If ``padded_size`` is given, pad the data with spaces so that header and data have that size."""
     written = _write_header(f, header)
     if padded_size is not None:
         data = " " * max(0, padded_size - len(written))

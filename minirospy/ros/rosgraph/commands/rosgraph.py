@@ -37,7 +37,7 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """A parser that prints ROS's help before its own. Like ROS, it also does so on a usage error."""
+    """A parser that prints ROS's help before its own and, like ROS, also on a usage error."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()

@@ -80,7 +80,7 @@ def is_legal_base_name(name: str | None) -> bool:
 
 
 def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Resolve ``name`` in the node ``namespace_`` to a global name, after remapping."""
+    """Resolve ``name`` to a global name, relative to the node ``namespace_``, and apply the remappings."""
     name = canonicalize_name(name)
     if not is_global(name) and not is_private(name):
         # Raise ValueError if ``namespace_`` is invalid.

@@ -37,7 +37,7 @@ class RospyLogger(logging.Logger):
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder, and `rosout` records also to the terminal. Return the file's path.
+    """Log to a file in the log folder; also log `rosout` records to the terminal. Return the file's path.
 
     Replace the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file
     (ROS_PYTHON_LOG_CONFIG_FILE, or a file in ROS_HOME) takes precedence over these settings. Set ROS_LOG_FILENAME to the path.
@@ -73,7 +73,7 @@ def configure_logging(
         return path
 
     class RotatingFileHandler(LogFileHandler):
-        """Writes log files, under the class name that programs look for among the root logger's handlers."""
+        """Writes log files. Programs search the root logger's handlers for a class of this name."""
 
     try:
         file = RotatingFileHandler(Path(path), _FILE_BYTES, _FILE_BACKUPS)
@@ -101,7 +101,7 @@ def makedirs_with_parent_perms(p: str) -> None:
     except FileExistsError:
         return  # another process has created the folder in the meantime
     wanted, made = os.stat(parent), os.stat(path)
-    # Only root may change a folder's owner; otherwise the user owns it, even in /tmp, which root owns.
+    # Only root may change a folder's owner. A folder made by another user remains theirs, even in root's /tmp.
     with contextlib.suppress(PermissionError):
         if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
             os.chown(path, wanted.st_uid, wanted.st_gid)

@@ -53,7 +53,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         self._is_closed = False
 
     def serve_forever(self, poll_interval: float = 0.5) -> None:
-        """Handle requests until :meth:`close` is called; return immediately if it already was."""
+        """Handle requests until :meth:`close` is called; return immediately if it has already been called."""
         with self._serving:
             if self._is_closed:
                 return

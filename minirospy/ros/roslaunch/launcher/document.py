@@ -136,7 +136,7 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
-        """Return a numeric attribute as ``kind``, or the default if it is empty.
+        """Return an attribute as a number of type ``kind``, or the default if the attribute is missing or empty.
 
         Raise LaunchError for anything but a number.
         """
@@ -157,7 +157,7 @@ class Tag:
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return whether the tag's ``if`` or ``unless`` attribute lets it apply.
+        """Return whether the tag applies, according to its ``if`` or ``unless`` attribute.
 
         Raise LaunchError if the tag has both attributes, or one with an invalid value.
         """

@@ -158,7 +158,7 @@ def _hint_for_package_and_file(package: str, file: str, packages: Packages, *, h
 
 
 def _command_hint(package: str, file: str, packages: Packages) -> str:
-    """Return the command that launches a package's file as a hint, or an empty string if the file does not exist."""
+    """Return a hint with the command that launches a package's file, or an empty string if the file does not exist."""
     try:
         packages.find_resource(package, file)
     except (MinirospyError, OSError, ValueError):

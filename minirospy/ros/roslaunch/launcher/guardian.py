@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""Last command-line argument on systems that kill a dead roslaunch's processes themselves, such as Windows."""
+"""Last command-line argument if the operating system itself kills the nodes when roslaunch dies, as Windows does."""
 
 
 def watch(

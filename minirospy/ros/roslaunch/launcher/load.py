@@ -383,7 +383,7 @@ class _File:
         return param_value(tag, self._spec.add_warning)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Set a parameter from inside a ``<node>`` as private, even if its name starts with a slash or tilde."""
+        """Set a ``<param>`` inside a ``<node>`` as a private parameter, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", self._value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:

@@ -23,7 +23,7 @@ CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_V
 """Parameters that every launch sets, as in ROS."""
 
 _START_SECONDS = 60.0
-_POLL_SECONDS = 0.005  # between checks whether the started master responds
+_POLL_SECONDS = 0.005  # seconds between checks whether the started master responds
 _SLOW_POLL_SECONDS = 0.02  # the same, after the first second: the master starts on a slow computer
 
 

@@ -39,7 +39,7 @@ _WAYS = ("value", "textfile", "binfile", "command")
 
 
 def param_value(tag: Tag, warn: Callable[[LaunchError], object]) -> object:
-    """Return a ``<param>``'s value; call ``warn`` if it could be read despite a fault.
+    """Return a ``<param>``'s value; call ``warn`` about a fault that does not prevent reading the value.
 
     Raise LaunchError if the tag is invalid, or its file or command fails.
     """
@@ -187,7 +187,7 @@ def _pass_on(reading: int, end: bytearray) -> None:
 
 
 def _command_words(words: list[str]) -> list[str]:
-    """Return the command to run. Like nodes, Python programs use this interpreter; `xacro` is minirospy's.
+    """Return the command to run. Python programs run with this interpreter, as nodes do; `xacro` means minirospy's xacro.
 
     Thus, launch files find xacro even if no virtual environment is active, and never use ROS 2's xacro.
     """

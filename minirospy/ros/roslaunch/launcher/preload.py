@@ -29,7 +29,7 @@ POLL_SECONDS = 0.01  # seconds between checks whether a process has exited
 
 _PR_SET_CHILD_SUBREAPER, _PR_GET_CHILD_SUBREAPER = 36, 37
 _FORKING = threading.Lock()
-"""Held while this process is a subreaper during a fork, because that setting applies to the whole process."""
+"""Held during a fork, which temporarily makes the whole process a subreaper."""
 
 _MIRRORED = frozenset(
     ("PYTHONPATH", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING", "PYTHONUTF8")
@@ -97,8 +97,8 @@ class ForkedProcess:
                 try:
                     pid, status = os.waitpid(self.pid, os.WNOHANG)
                 except ChildProcessError:
-                    # SIGCHLD is ignored, or another part of the program has collected the exit status: return 0, as subprocess
-                    # does. The process may also have another parent.
+                    # If SIGCHLD is ignored or another part of the program has collected the exit status, return 0, as subprocess
+                    # does. Otherwise, the process is still running, with another parent.
                     if self._start_time is None or _start_time(self.pid) != self._start_time:
                         self.returncode = 0
                 else:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import sys
 
-# A node's module search path contains its program's folder instead of this script's.
+# Remove this script's folder from the module search path; a node has its program's folder there instead.
 if __name__ == "__main__" and not getattr(sys.flags, "safe_path", False):
     del sys.path[0]
 
@@ -117,7 +117,7 @@ def set_command_line(arguments: list[str], environ: dict[str, str]) -> None:
 
 
 def read_response() -> None:
-    """Read a response like the master's, which compiles the regular expressions that a usual response needs.
+    """Read a response like the master's, in order to compile the regular expressions that a usual response needs.
 
     Otherwise each node would compile them again, which takes some milliseconds.
     """
@@ -141,7 +141,7 @@ def hides_module(folder: str, loaded: set[str]) -> bool:
 
 
 def serve(control: socket.socket) -> Order | None:
-    """Fork nodes until the socket is closed, then return None. In a forked node, return its order once it may start."""
+    """Fork nodes until the socket is closed, then return None. In a forked node, return its Order once the node may start."""
     while True:
         head, fds, _, _ = socket.recv_fds(control, LENGTH_SIZE, FDS)
         if not head:
@@ -235,7 +235,7 @@ def become(order: Order, main: dict[str, Any]) -> None:
     module = ModuleType("__main__")
     module.__dict__.update(main)
     sys.modules["__main__"] = module
-    # In a normally started node, importing rospy does this for the program's __main__.
+    # Call find_packages_named_like_scripts() for this node: in a normally started one, importing rospy calls it.
     from minirospy.base.script_names import find_packages_named_like_scripts
 
     module.__file__ = order.program
@@ -318,9 +318,9 @@ def open_program(path: str) -> int | None:
 
 
 def main(fd: int) -> Order | None:
-    """Import the modules and serve the socket ``fd`` until it is closed. In a forked node, return its order."""
+    """Import the modules and serve the socket ``fd`` until it is closed. In a forked node, return its Order."""
     control = socket.socket(fileno=fd)
-    # If the kernel cannot change command lines, refuse before any node waits.
+    # If the kernel does not allow changing command lines, fail now, before any node is requested.
     set_command_line(sys.orig_argv, dict(os.environ))
     for name in PRELOADED:
         import_module(name)

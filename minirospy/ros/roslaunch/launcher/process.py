@@ -111,7 +111,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # If this process is killed while it starts the guardian outside its job, the guardian remains suspended.
+        # On Windows, the guardian must outlive this process, whose job object ends the other children with it.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -185,7 +185,7 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # send_signal fails, with nothing to wait for, if the process has exited or, on Windows, has no console.
+            # Do not wait for a process if send_signal() fails: it has exited or, on Windows, has no console.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)

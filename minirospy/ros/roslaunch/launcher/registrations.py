@@ -19,7 +19,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-# seconds to wait for a node; only hanging processes need it, because exited ones refuse connections
+# timeout in seconds for a node's response; only a hanging node reaches it, because exited ones refuse connections
 _ANSWER_SECONDS = 5.0
 
 _MAX_CONCURRENT = 16

@@ -276,7 +276,7 @@ class Launcher:
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
-        """Watch the nodes until all of them or a required one have exited, or stop() is called; return the exit status.
+        """Watch until all nodes have exited, a required node has exited or stop() is called; return the exit status.
 
         ``forever``: continue even if no node is left.
         """
@@ -351,7 +351,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Unregister exited nodes from the master, unless it is about to exit too."""
+        """Unregister exited nodes from the master, unless this launch started the master, which then exits, too."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)
@@ -374,7 +374,7 @@ class Launcher:
 
 
 def _is_here(machine: MachineSpec) -> bool:
-    """Return whether a machine is this one, with the current user."""
+    """Return whether a ``<machine>`` means this machine and, if it names a user, the current user."""
     if machine.user:
         import getpass
 

@@ -138,7 +138,7 @@ class Supervisor:
     # --- called in the thread that runs the launch
 
     def watch(self, *, forever: bool = False) -> int | None:
-        """Watch the processes until all of them or a required one have exited, or stop() is called.
+        """Watch until all processes have exited, a required one has exited or stop() is called.
 
         Return the exit status, or None if no process is left. ``forever``: continue even if no process is left.
         """
@@ -193,7 +193,7 @@ class Supervisor:
         threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
 
     def _next_event(self) -> _Event | None:
-        """Return the next event, or None after handling due restarts and changed files if there was no event for a while."""
+        """Return the next event. If none arrives for a while, handle due restarts and changed files, and return None."""
         pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
             return self._events.get(timeout=min(pauses))

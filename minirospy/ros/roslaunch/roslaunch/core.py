@@ -430,7 +430,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Passes printed lines to a function: error lines if ``errors``, otherwise all other lines."""
+    """Passes printed lines to a function: only errors if ``errors`` is True, only other lines if it is False."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function
@@ -512,7 +512,7 @@ def is_child_mode() -> bool:
 
 
 def set_child_mode(child_mode: bool) -> None:
-    """Set the value of :func:`is_child_mode`."""
+    """Set the value that :func:`is_child_mode` returns."""
     _child_mode[0] = child_mode
 
 
@@ -529,7 +529,7 @@ def rle_wrapper(fn: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def remap_localhost_uri(uri: str, force_localhost: bool = False) -> str:
-    """Replace localhost in a URI with this machine's address, or any host if ``force_localhost``."""
+    """Replace the host in a URI with this machine's address if it is localhost or if ``force_localhost`` is True."""
     parts = urlsplit(uri)
     if force_localhost or parts.hostname == "localhost":
         return f"http://{Environment.read().host}:{parts.port}/"

@@ -126,7 +126,7 @@ def calculate_missing(
     file_deps: Mapping[str, RoslaunchDeps],
     use_test_depends: bool = False,
 ) -> dict[str, set[str]]:
-    """Add the packages that launch files need but package.xml does not declare to ``missing``; return ``missing``."""
+    """Add to ``missing`` the packages that launch files need but package.xml does not declare; return ``missing``."""
     for file, deps in file_deps.items():
         package = package_of(file)
         if package is None:

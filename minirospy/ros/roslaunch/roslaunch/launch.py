@@ -186,7 +186,7 @@ class ROSLaunchRunner:
             monitor.close()
 
     def _end_with_program(self) -> None:
-        # A forked child of the program must not stop the nodes at its exit.
+        # A forked child of the program must not stop the nodes when the child exits.
         if os.getpid() == self._pid:
             self.stop()
 

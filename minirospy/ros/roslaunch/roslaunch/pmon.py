@@ -207,7 +207,7 @@ class LaunchedProcess(Process):
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Add the process to another launcher, which watches it once started."""
+        """Add the process to another launcher, which watches the process after its start."""
         self._launcher = launcher
 
 
@@ -346,7 +346,7 @@ class ProcessMonitor:
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Start a thread that watches the processes, and terminates them when it stops.
+        """Start a thread that watches the processes and, when it stops, terminates them.
 
         The thread stops after shutdown(), or after registrations_complete() when all processes have exited.
         """
@@ -369,7 +369,7 @@ class ProcessMonitor:
 
     def close(self) -> None:
         """Terminate the remaining processes, in the calling thread."""
-        # Call these even after an error: other threads wait until the shutdown is complete.
+        # Call both callbacks even after an error: other threads wait until the shutdown is complete.
         with contextlib.ExitStack() as stack:
             stack.callback(self._ended.set)
             stack.callback(self._launcher.close)

@@ -143,7 +143,7 @@ class _Forwarded(LaunchSpec):
             self._config.add_param(param, filename=_shown(file), verbose=self._verbose)
 
     def add_clear(self, name: str) -> None:
-        """Add a namespace to delete to the configuration."""
+        """Add to the configuration a namespace whose parameters are to be deleted."""
         self._config.add_clear_param(f"{name.rstrip('/')}/")
 
     def add_command(self, command: ParameterCommand) -> None:

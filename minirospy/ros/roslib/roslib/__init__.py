@@ -14,7 +14,7 @@ _interactive = [False]
 
 
 def is_interactive() -> bool:
-    """Return the value from set_interactive(): whether the process is interactive."""
+    """Return whether the process is interactive, as set by set_interactive()."""
     return _interactive[0]
 
 

@@ -410,7 +410,7 @@ def load_package(package: str) -> None:
 
 
 def load_package_dependencies(package: str, load_recursive: bool = False) -> None:
-    """Register the messages of a package's direct dependencies, or of all of them if ``load_recursive``."""
+    """Register the messages of a package's direct dependencies or, if ``load_recursive``, of all its dependencies."""
     from minirospy.ros.rospkg.rospkg.rospack import RosPack
 
     _init()

@@ -11,7 +11,7 @@ __all__ = ["get_master", "get_param_server", "script_resolve_name"]
 
 
 def get_master() -> ServerProxy:
-    """Return a proxy for the master from the environment.
+    """Return a proxy for the master that the environment specifies.
 
     Each method's first argument is the caller id; each returns (code, status message, value).
     """

@@ -45,7 +45,7 @@ class InvalidROSStackException(ROSStackException):
 def list_stacks_by_path(
     path: str, stacks: list[str] | None = None, cache: dict[str, str] | None = None
 ) -> list[str]:
-    """Append the stacks below a folder to ``stacks`` and return it; store their folders in ``cache``."""
+    """Append the stacks below a folder to ``stacks`` and return ``stacks``; store the stacks' folders in ``cache``."""
     found = [] if stacks is None else stacks
     for folder in folders_with(STACK_FILE, path):
         if (name := os.path.basename(folder)) not in found:
@@ -112,7 +112,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to search, or None for those in this process's environment."""
+    """Return the folders to search in ``env``, or None if ``env`` is None: search those in this process's environment."""
     return None if env is None else _folders(env)
 
 

@@ -41,8 +41,8 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 _LOG_BYTES = 10 * 1024 * 1024
 
 ANSWER_SECONDS = 4.0
-"""Seconds to wait for a response from the master on a busy machine. A master that is still recovering already holds its
-journal's lock.
+"""Seconds to wait for a response from the master on a busy machine. A master that still reads its journal does not respond
+yet, but already holds the journal's lock.
 """
 
 
@@ -277,7 +277,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # Remove the file while this master still owns the port; later, it may belong to the next master.
+        # Remove the pid file while this master still owns the port; later, the file may be the next master's.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -491,7 +491,7 @@ def _show(line: str) -> None:
 def _log_to_file(
     folder: Path, *, verbose: bool, level: str | None
 ) -> tuple[Path | None, Callable[[str], object]]:
-    """Log to ``folder``/master.log; next to the folder, create a link ``latest`` to it if possible.
+    """Log to ``folder``/master.log. If possible, create a link ``latest`` to the folder, in the same parent folder.
 
     Return the file, and the function that logs registrations. If the file cannot be written, the master runs without a log.
     """

@@ -14,7 +14,7 @@ __all__ = ["DEFAULT_MASTER_PORT", "rosmaster_main"]
 
 
 def rosmaster_main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; ``argv`` starts with its name. Return its exit status."""
+    """Run the command; return its exit status. ``argv`` starts with the command's name."""
     from minirospy.ros.rosmaster.commands.master import rosmaster
 
     return rosmaster(list(sys.argv if argv is None else argv)[1:])

@@ -320,7 +320,7 @@ def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names of a folder's entries that ``rfilter`` accepts by path, or [] if the folder does not exist."""
+    """Return the names of a folder's entries whose paths ``rfilter`` accepts, or [] if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]

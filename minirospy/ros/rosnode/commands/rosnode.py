@@ -96,7 +96,7 @@ def _no_node_to_ping() -> Misuse:
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # Like ROS, print the error twice, because ROS includes the message in its list of nodes.
+    # Like ROS, print the error twice: before and after the list of nodes.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
@@ -144,7 +144,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping a node and print the time; first append it to ``times`` (ms), in case of Ctrl-C."""
+    """Ping a node and print the time in ms. Before, append the time to ``times``, because Ctrl-C may interrupt the print."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -294,7 +294,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return the ``names`` that are nodes, and print an error for each of the others."""
+    """Return those of ``names`` that are nodes; print an error for each other name."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

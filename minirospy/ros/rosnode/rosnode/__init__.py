@@ -86,7 +86,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
-    """Return `NODE (URI)` for the node with this URI that uses ``topic`` in ``system_state``, or only the URI."""
+    """Return `NODE (URI)` if a node that uses ``topic`` in ``system_state`` has this URI, otherwise only the URI."""
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
@@ -125,7 +125,7 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node responds to ``max_count`` pings. If that is None, ping until one fails.
+    """Return whether a node responds to ``max_count`` pings. If ``max_count`` is None, ping until a ping fails.
 
     Raise ROSNodeIOException if the master does not respond. The reason for a failure is always printed to stderr,
     everything else only if ``verbose``.
@@ -287,7 +287,7 @@ def _run_verb(name: str, argv: Sequence[str]) -> int | None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return a function that runs a verb, given a command line that starts with the command's name and the verb."""
+    """Return a function that runs a verb. Its argument is a command line, starting with the command's name and the verb."""
 
     def call(argv: Sequence[str]) -> None:
         _run_verb(name, argv)

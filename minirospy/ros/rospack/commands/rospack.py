@@ -318,7 +318,7 @@ def _contains(line: _Line, tree: Dependencies) -> None:
 
 
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
-    """Return a verb that prints the flags in <cpp> exports accepted by ``keep``, without ``prefix``."""
+    """Return a verb that prints the flags in <cpp> exports that ``keep`` accepts, and removes ``prefix`` from each."""
 
     def body(line: _Line, tree: Dependencies) -> None:
         words = " ".join(_exported(line, tree, _package(line), "cpp", attribute)).split()

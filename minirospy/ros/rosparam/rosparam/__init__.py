@@ -178,7 +178,7 @@ def list_params(ns: str) -> list[str]:
 def load_file(
     filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] for each document in a YAML file, even with types that parameters do not support.
+    """Return [(values, namespace)] for each document in a YAML file. Values may have types that parameters do not support.
 
     ``-`` or an empty name means stdin. Raise RosParamException if the file cannot be read; for invalid YAML, the exception
     is also a yaml.YAMLError.

@@ -108,7 +108,7 @@ class Manifest:
         self.unknown_tags: list[Element] = []
 
     def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """Return an attribute's values in all exports with this tag. If ``convert``, replace ``${prefix}`` with the folder.
+        """Return an attribute's values in all exports with this tag. If ``convert``, replace ``${prefix}`` with its folder.
 
         Raise ValueError if ``convert`` and the manifest has no path.
         """
@@ -122,7 +122,7 @@ class Manifest:
 
 
 def catkin_manifest(read: manifest.Manifest, depends: Sequence[str], rosdeps: Sequence[str]) -> Manifest:
-    """Return a package.xml with rospkg's attributes and its dependencies split into packages and others."""
+    """Return the manifest in a package.xml with rospkg's attributes; its dependencies are split into packages and others."""
     result = Manifest(filename=str(read.path), is_catkin=True)
     result.name = read.name
     result.version = read.version

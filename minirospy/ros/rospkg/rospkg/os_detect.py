@@ -93,7 +93,7 @@ _OF_FDO = {
 
 
 class OsNotDetected(Exception):
-    """Raised if a detector's OS is not running, or no detector matches."""
+    """Raised if the running OS is not the one that a detector detects, or no detector matches."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
@@ -126,7 +126,7 @@ class OsDetector:
     """Detects one operating system."""
 
     def is_os(self) -> bool:
-        """Return whether the detector's OS is running."""
+        """Return whether this machine runs the OS that this object detects."""
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
@@ -146,7 +146,7 @@ class FdoDetect(OsDetector):
         self.release_info = release if release and release.get("ID") == fdo_id else None
 
     def is_os(self) -> bool:
-        """Return whether the detector's OS is running."""
+        """Return whether this machine runs the OS that this object detects."""
         return self.release_info is not None
 
     def get_version(self) -> str:
@@ -188,7 +188,7 @@ class _Platform(OsDetector):
     system = ""
 
     def is_os(self) -> bool:
-        """Return whether the detector's OS is running."""
+        """Return whether this machine runs the OS that this object detects."""
         return platform.system() == self.system
 
     def get_version(self) -> str:

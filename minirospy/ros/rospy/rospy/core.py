@@ -201,7 +201,7 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a validator for topic names, which raises ParameterInvalid, naming ``param_name``, for other values."""
+    """Return a validator for topic names. For other values, it raises ParameterInvalid with ``param_name`` in the message."""
     resolved = valid_name(param_name)
 
     def check(param_value: object, caller_id: str) -> str:
@@ -213,7 +213,7 @@ def is_topic(param_name: str) -> Validator:
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
-    """Wrap ``h`` as a hook without arguments for the lifecycle. Raise TypeError if ``h`` is not callable."""
+    """Return a function without arguments that calls ``h(reason)``. Raise TypeError if ``h`` is not callable."""
     if not callable(h):
         raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
     lifecycle = current_session().lifecycle

@@ -132,7 +132,7 @@ def scoped_name(caller_id: str, name: str) -> str:
 
 
 def global_name(param_name: str) -> Validator:
-    """Return a validator for global names, which raises ParameterInvalid, naming ``param_name``, for other values."""
+    """Return a validator for global names. For other values, it raises ParameterInvalid with ``param_name`` in the message."""
 
     def validator(param_value: object, caller_id: str) -> str:
         text = _text(param_name, param_value)

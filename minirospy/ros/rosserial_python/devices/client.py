@@ -349,7 +349,7 @@ class SerialClient:
         return known
 
     def handleTimeRequest(self, data: bytes) -> None:
-        """Send the time to the device. Its request also serves as a heartbeat."""
+        """Send the time to the device. The device's requests for the time also serve as a heartbeat."""
         self.send(TopicInfo.ID_TIME, to_bytes(Time(rospy.Time.now())))
         self.lastsync = rospy.Time.now()
         self._synced_at = time.monotonic()

@@ -95,7 +95,7 @@ class Subscriber:
 
 
 class _Service:
-    """Base class of services: the message classes, and the topic id for the device's part of a call.
+    """Base class of services. Holds the message classes, and the id of the topic that carries the device's part of a call.
 
     Raise EndpointError if the service type is not installed.
     """

@@ -14,7 +14,7 @@ __all__ = ["MAX_MESSAGE_LENGTH", "Decoder", "Fault", "Packet", "WrongVersion", "
 
 _SYNC, _VERSION = 0xFF, 0xFE
 _HEAD = struct.Struct("<HBH")
-MAX_MESSAGE_LENGTH = 0xFFFF  # maximum in bytes; the packet's length field has 16 bits
+MAX_MESSAGE_LENGTH = 0xFFFF  # in bytes: the maximum of the packet's 16-bit length field
 
 
 class Packet(NamedTuple):
@@ -75,7 +75,7 @@ class Decoder:
 
     @property
     def step(self) -> str:
-        """Return the part of a packet to read next, under the real rosserial_python's name for it."""
+        """Return the name, as in the real rosserial_python, of the part of the packet to read next."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:

@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
 
 
 def _param(name: str, default: object) -> object:
-    """Return a private parameter, by default the one of rosserial_embeddedlinux, which older launch files set."""
+    """Return a private parameter. If it is not set, return the one of rosserial_embeddedlinux, which older launch files set."""
     return rospy.get_param(f"~{name}", rospy.get_param(f"{_OTHER}/{name}", default))
 
 

@@ -127,7 +127,7 @@ def get_service_args(service_name: str) -> str:
 
 
 def get_service_class_by_name(service_name: str) -> ServiceClass:
-    """Return a running service's class. Raise ROSServiceException if the service does not exist or its type is missing."""
+    """Return a running service's class. Raise ROSServiceException if the service does not exist or its type is not installed."""
     from minirospy.core.idl.load import service_class
 
     with _graph() as graph:
@@ -159,7 +159,7 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """Return the connection header of a service's response. Raise ROSServiceIOException if it does not respond."""
+    """Return the connection header of a service's response. Raise ROSServiceIOException if the service does not respond."""
     if not isinstance(service_uri, str):
         raise ROSServiceException(
             f"Unable to communicate with service [{service_name}], address [{service_uri}]"
@@ -185,7 +185,7 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return a function that runs a verb, given a command line that starts with the command's name and the verb."""
+    """Return a function that runs a verb. Its argument is a command line, starting with the command's name and the verb."""
 
     def call(argv: Sequence[str] = sys.argv) -> None:
         from minirospy.command.called import Raised, call_verb
@@ -336,7 +336,7 @@ def _fullusage() -> None:
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Return a name's global name. As in ROS, a non-string becomes a name that matches no service."""
+    """Resolve a name to a global name. As in ROS, a non-string becomes a name that matches no service."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 

@@ -96,7 +96,7 @@ def _rostest(
     from minirospy.ros.rostest.runner.runner import RosTest
 
     base = _base(results_base_dir)
-    # When the nodes exit, delete the boards created by test nodes, such as MINIROSPY_BOARD=$(anon test).
+    # Delete the simulated boards that test nodes create, such as MINIROSPY_BOARD=$(anon test), when the nodes exit.
     os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,

@@ -31,7 +31,7 @@ _Item: TypeAlias = dict[str, Any]  # an item of a list parameter: a name and its
 def main(name: str) -> None:
     """Run a test node, as its program's main function."""
     test = _TESTS[name]
-    # ROS defines the class in the program itself, so the results contain this module name.
+    # In ROS, the program itself defines the class, so the test results name the module __main__.
     test.__module__ = "__main__"
     rosrun("rostest", name, test)
 

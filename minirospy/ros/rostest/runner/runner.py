@@ -36,7 +36,7 @@ _CLASS = "rostest.runner.RosTest"
 
 @dataclass
 class RosTest:
-    """Runs a launch file's tests. ``own`` holds whether each test could run, ``results`` the cases reported by the tests.
+    """Runs a launch file's tests. ``own`` records whether each test could run; ``results`` holds the cases that the tests report.
 
     ``text``: print everything and write no XML files. ``reuse_master``: use the running master instead of starting one;
     ``clear`` deletes all of its parameters. ``results_dir``: folder for the XML files.
@@ -112,7 +112,7 @@ class RosTest:
         return ""
 
     def _try(self, test: TestSpec, case: TestCaseResult) -> None:
-        """Run a test once; record errors missing from the test's own results in ``case``."""
+        """Run a test once; record in ``case`` the errors that the test's own results do not contain."""
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()

@@ -164,7 +164,7 @@ def _measure(
 
 
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the topics' global names, given with or without a field; warn about topics without a publisher."""
+    """Return the global names of topics, which may be given with a field; warn about topics without a publisher."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):

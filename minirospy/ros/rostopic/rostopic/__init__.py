@@ -127,7 +127,7 @@ _TopicRow = tuple[str, str, list[str]]
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """A ROSTopicIOException and also a socket error, which programs expect from ROS's get_topic_list."""
+    """A ROSTopicIOException that is also a socket error, which programs expect from ROS's get_topic_list."""
 
 
 def get_topic_type(
@@ -197,7 +197,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat the step as a field name that no message has.
+        # Treat the invalid text as field names, which no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def report(error: NotFoundError | IndexError) -> None:
@@ -298,7 +298,7 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
 
 
 def _verb(name: str) -> Callable[[Sequence[str]], None]:
-    """Return a function that runs a verb, given a command line that starts with the command's name and the verb."""
+    """Return a function that runs a verb. Its argument is a command line, starting with the command's name and the verb."""
 
     def call(argv: Sequence[str] = sys.argv) -> None:
         from minirospy.command.called import Raised, call_verb
@@ -568,7 +568,7 @@ def _resource_name_package(name: str) -> str | None:
 
 
 def _optparse_topic_only(cmd: str, argv: Sequence[str]) -> str:
-    """Return the global name of the single topic on a command line; otherwise print the usage and exit."""
+    """If a command line contains exactly one topic, return its global name; otherwise print the usage and exit."""
     from optparse import OptionParser
 
     parser = OptionParser(usage=f"usage: %prog {cmd} /topic", prog=NAME)

@@ -139,7 +139,7 @@ class ROSTopicDelay:
 
 
 def _now() -> float:
-    # By the time of its first message, a subscriber has imported rospy.
+    # Import this late, because it is slow; a program that receives messages has already imported it with rospy.
     from minirospy.client import get_time
 
     return get_time()

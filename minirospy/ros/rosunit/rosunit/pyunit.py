@@ -42,7 +42,7 @@ def start_coverage(packages: Sequence[str]) -> None:
 
 
 def stop_coverage(packages: Sequence[str], html: str | None = None) -> None:
-    """Stop measuring coverage and print that of ``packages``. If ``html`` is given, also write a report to that folder."""
+    """Stop measuring coverage and print the coverage of ``packages``. If ``html`` is given, write a report to that folder."""
     if not _running:
         return
     measured = _running.pop()

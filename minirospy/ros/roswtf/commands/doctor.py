@@ -81,7 +81,7 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
     if machines and offline:
         raise Misuse(f"{machines[0]}: to try another machine needs the network")
 
-    # Suppress the log of the node that runs the checks, because the checks report these errors themselves.
+    # Suppress the log of the node that runs the checks: the checks themselves report the errors that it logs.
     logging.getLogger("minirospy").addHandler(logging.NullHandler())
     show = _show_json if json else _show
     counts = dict.fromkeys(Status, 0)

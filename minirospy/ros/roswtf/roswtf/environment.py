@@ -137,7 +137,7 @@ def _not_folders(path: str | None) -> list[str]:
 
 
 def _not_package_folders(path: str | None) -> list[str]:
-    # A catkin workspace adds the folder share and a folder for stacks, which may be missing.
+    # Ignore missing folders named share or stacks: a catkin workspace lists them even if they do not exist.
     return [
         each
         for each in _not_folders(path)

@@ -90,7 +90,7 @@ class Iterator(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute the state for each item. Return the last outcome, mapped, or the exhausted outcome if no items are left."""
+        """Execute the state for each item. Return the container's outcome for the last one, or for running out of items."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
         self._is_running = True

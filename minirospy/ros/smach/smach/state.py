@@ -102,7 +102,7 @@ class CBState(State):
 
 
 def adopt_interface(state: State, cb: object) -> None:
-    """Add the keys and outcomes declared by a ``cb_interface`` callback to a state."""
+    """Add to a state the keys and outcomes that a ``cb_interface`` callback declares."""
     if has_smach_interface(cb):
         state.register_input_keys(cb.get_registered_input_keys())
         state.register_output_keys(cb.get_registered_output_keys())

@@ -38,7 +38,7 @@ class StateMachine(Container):
         self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
-        # For `add_auto`: the label of the state added last, and those of its outcomes that lead to the next state.
+        # For `add_auto`: the label of the last added state, and the outcomes of this state that lead to the next one.
         self._last_added_label: str | None = None
         self._connector_outcomes: Sequence[str] = ()
 
@@ -87,7 +87,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state like ``add``, but let its ``connector_outcomes`` lead to the state that is added next."""
+        """Add a state like ``add``. Its outcomes in ``connector_outcomes`` lead to the state that is added next."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()

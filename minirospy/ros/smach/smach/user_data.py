@@ -23,7 +23,7 @@ class UserData:
         self._data.update(other_userdata._data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return a new UserData with copies of the values of ``keys``. ``remapping`` maps their new names to ``keys``."""
+        """Return a new UserData with copies of the values of ``keys``, renamed according to ``remapping``: {new name: key}."""
         names = {outer: inner for inner, outer in remapping.items()}
         if len(names) != len(remapping):
             logerr(f"SMACH userdata remapping is not one-to-one: {remapping}")

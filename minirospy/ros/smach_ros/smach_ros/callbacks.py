@@ -49,7 +49,7 @@ class StateCallback:
         self._state = state
 
     def adopt(self) -> None:
-        """Add the keys and outcomes that the callback declares to its state."""
+        """Add to the state the keys and outcomes that its callback declares."""
         adopt_interface(self._state, self._callback)
 
     def __bool__(self) -> bool:

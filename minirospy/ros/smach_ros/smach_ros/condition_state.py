@@ -27,7 +27,7 @@ class ConditionState(State):
         timeout: rospy.Duration | None = None,
         max_checks: int = 1,
     ) -> None:
-        """Create the state. ``cond_cb`` is called with the userdata once per ``poll_rate``.
+        """Create the state. ``cond_cb`` is called with the userdata at intervals of ``poll_rate``.
 
         If ``max_checks`` is -1, there is no limit. As in ROS, the value n allows n + 1 checks.
         """

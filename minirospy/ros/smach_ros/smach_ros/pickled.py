@@ -121,7 +121,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Wrap a constructor so that it accepts only arguments of these types. A number, for example, could be read as a size."""
+    """Wrap a constructor to reject first arguments of other types: bytes(N), for example, would allocate N bytes."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):
@@ -149,7 +149,7 @@ def _simple_dtype(name: object, *_: object) -> Any:
     found = np.dtype(name if isinstance(name, str) else "O")
     if found.kind not in _SIMPLE:
         raise pickle.UnpicklingError(f"an array of {name}")
-    # Return a copy: pickle sets its state next, which must not change numpy's shared dtype.
+    # Return a copy: pickle then changes the state of the returned dtype, which must not be numpy's shared one.
     return np.dtype(found.str, copy=True)
 
 
@@ -170,7 +170,7 @@ def _scalar(dtype: Any, data: Any) -> object:
 def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    # Reject arrays: setting the state of this result afterwards could free their memory.
+    # Reject arrays: pickle may set the state of the returned array next, which could free memory that it shares.
     if type(data) not in (bytes, bytearray):
         raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
     return np.frombuffer(data, dtype, count)

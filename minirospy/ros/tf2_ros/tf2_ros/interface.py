@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """Raised if no conversion is registered for a type. To register it, the program imports the type's package."""
+    """Raised if no conversion is registered for a type. Import the type's package to register it."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)

@@ -37,7 +37,7 @@ _MAX_DIGITS = 17
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf_echo: SOURCE TARGET [RATE], parameters ~rate and ~precision; return the exit status."""
+    """Run tf_echo with the arguments SOURCE TARGET [RATE] and the parameters ~rate and ~precision; return the exit status."""
     return run_program(_run_tf, words)
 
 

@@ -52,7 +52,7 @@ def main_tf(words: Sequence[str] | None = None) -> int:
 
 
 def main_tf2(words: Sequence[str] | None = None) -> int:
-    """Run tf2_ros's program: the arguments of tf's without the period, or a parameter's name; return the exit status."""
+    """Run tf2_ros's program, whose arguments are those of tf's without the period, or a parameter; return the exit status."""
     return run_program(_run_tf2, words)
 
 

@@ -29,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic with the type of the first forwarded message. Latched if ``latch`` is true, or if it is None and the input is."""
+    """A topic to publish, with the type of the first forwarded message. If ``latch`` is None, it is latched if the input is."""
 
     def __init__(
         self,

@@ -148,7 +148,7 @@ class Graph:
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
-        """Return False: ``bad_nodes`` never contains a node to query again."""
+        """Return False, because no node is queried (in ROS: query the nodes in ``bad_nodes`` again)."""
         return False
 
     def update(self) -> bool:
