@@ -250,7 +250,7 @@ def _checked_uri(uri: str) -> str:
 
 
 def _local_uri(uri: str) -> str:
-    """Return the URI of a master on this machine, rewritten so that it reaches a master that listens only on loopback."""
+    """Return the URI of a master on this machine with the host replaced by localhost, unless it is already loopback."""
     host, port, path = split_uri(uri)
     if host in ("localhost", "127.0.0.1", "::1"):
         return uri

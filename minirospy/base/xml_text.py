@@ -69,7 +69,7 @@ class XmlElement:
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that delivers text in large pieces. It rejects declarations that may expand (Parse raises XmlError)."""
+    """Return a parser that delivers text in large pieces. Its Parse raises XmlError for entities and attribute defaults."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 

@@ -215,7 +215,7 @@ class Gpio:
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
                 # In a shutdown hook: the interrupted program may already have checked its stop flag, and be about to use a pin.
-                # That use must not fail: RPi.GPIO's calls are in C, so there the call would finish before the hook runs.
+                # That use must not fail, because with RPi.GPIO it cannot: its calls are in C, and finish before a hook runs.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -499,7 +499,7 @@ class PWM:
         self._running.set(duty=dutycycle)
 
     def ChangeFrequency(self, frequency: float) -> None:  # noqa: N802 - RPi.GPIO's name
-        """Set the frequency in Hz, above 0.0."""
+        """Set the frequency in Hz; it must be above 0.0."""
         self._running.set(frequency=frequency)
 
     def stop(self) -> None:

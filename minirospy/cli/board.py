@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set this variable for the nodes, so that they open the same board as the verbs.
+        # Set this variable for the nodes, so that they open the same board as this command.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:

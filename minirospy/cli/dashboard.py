@@ -371,7 +371,7 @@ def _serve(
             self._opened: list[Dashboard] = []
 
         async def wait(self) -> None:
-            """If nothing listens at the master's address, serve a page without data. Do not wait for a master."""
+            """If nothing listens at the master's address, start serving a page without data, which :meth:`start` replaces."""
             if await _is_reachable(self._node.master_uri):
                 return
             for each in ports:
@@ -546,7 +546,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Check one second late, so that the code has certainly expired according to the clock of Codes.
+    # Check one second late, so that the code has certainly expired by the clock that Codes uses.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 

@@ -29,7 +29,7 @@ class Identity:
     """
 
     def __init__(self, previous: Identity | None = None) -> None:
-        """Use the identity ``previous``, except for topic names, until :meth:`take_name` is called."""
+        """Create an identity that equals ``previous``, except for topic names, until :meth:`take_name` is called."""
         # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node.
         # Programs may change this dict and `mappings`.
         self.remappings: dict[str, str] = previous.remappings if previous else {}

@@ -38,7 +38,7 @@ __all__ = [
 NEVER = 1 << 100  # ns; a time that is later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
 MAX_MAGNITUDE = 1e100  # maximum position or derivative; larger values could overflow a segment's coefficients
-# rad; this close to a half turn, the sign of the position difference decides, not a rounding error
+# rad; within this distance of a half turn, use the sign of the position difference, because rounding may flip the other
 _SINGULARITY = 1e-9
 
 
@@ -356,7 +356,7 @@ class JointPath:
 
 
 def wraparound_offset(before: float, after: float) -> float:
-    """Return the whole turns, in rad, to add to ``after`` so that a continuous joint takes the shorter way."""
+    """Return the multiple of 2 pi to add to ``after`` so that a continuous joint takes the shorter way from ``before``."""
     distance = math.remainder(after - before, math.tau)
     if math.pi - abs(distance) < _SINGULARITY:
         distance = math.copysign(distance, after - before)

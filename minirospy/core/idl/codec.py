@@ -218,7 +218,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the source of the call that packs values. Read a nested message only once if several values are in it."""
+        """Return source code that packs values. If it packs several fields of a nested message, it looks up that message once."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -247,7 +247,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return the name of the variable with a field's value, converted to the object whose length is written."""
+        """Generate code that converts a field's value for writing, before its length; return the name of the variable for it."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])

@@ -55,7 +55,7 @@ def parse_model(
 def parse_world(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "world", max_parts: int = MAX_PARTS
 ) -> World:
-    """Return the first world in SDF text or, if it has none, a world with its models and lights.
+    """Return the first world in SDF text. If there is none, return a world with the text's models and lights.
 
     Models that are unusable, or exceed ``max_parts`` links, joints and models, are skipped, and named in ``warnings``. Raise
     SdfError if the text is not SDF.
