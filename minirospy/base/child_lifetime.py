@@ -75,7 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager that makes child processes end with this process, if the system supports that (``is_guarded``)."""
+    """A context manager; until its exit or :meth:`close`, child processes end with this process if ``is_guarded`` is true."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None

@@ -201,7 +201,7 @@ class WallClock:
 
 
 class FirstTimeWait:
-    """Calls a function once if the first time of a simulated clock does not arrive within two seconds."""
+    """Calls a function once if a simulated clock is not set within two seconds."""
 
     def __init__(self, on_silence: Callable[[], object]) -> None:
         self._pending = [on_silence]  # a list, because list.pop() is atomic and several threads may wait

@@ -75,7 +75,7 @@ class Environment(NamedTuple):
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
-        """Read the settings from ``environ`` (default: the process's environment); ``overrides``: master_uri, host, namespace.
+        """Read the settings from ``environ`` (default: os.environ). ``overrides`` may contain master_uri, host and namespace.
 
         Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is not just a name or
         address, MINIROSPY_PORTS is not a range such as 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown,
@@ -137,7 +137,7 @@ class Environment(NamedTuple):
 
     @property
     def master_is_local(self) -> bool:
-        """Return whether the master's host is this machine. Only then may a tool start a master."""
+        """Return whether the master's host is this machine. A tool may start a master only if it is."""
         return is_own_host(self.master_address[0], self.host)
 
 

@@ -51,7 +51,7 @@ class XmlSyntaxError(XmlError):
 
 @dataclass
 class XmlElement:
-    """A tag at ``line``. ``text`` is its own text, without the text of its children."""
+    """A tag at ``line``. ``text`` excludes the text of the tag's children."""
 
     tag: str
     attributes: dict[str, str]

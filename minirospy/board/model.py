@@ -109,7 +109,7 @@ class Force(NamedTuple):
 
 Operation = Setup | Write | Press | Release | Force
 
-Position = tuple[float, float]  # metres ahead of the scanner, and to its left
+Position = tuple[float, float]  # distances in metres: ahead of the scanner, and to its left
 
 
 class Change(NamedTuple):

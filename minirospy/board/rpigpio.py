@@ -468,7 +468,7 @@ class Gpio:
             warnings.warn(f"virtual board: {fault}", RuntimeWarning, stacklevel=4)
 
     def _warn(self, text: str, depth: int) -> None:
-        """Issue a warning for the user's line, which is ``depth`` calls above this one."""
+        """Issue a warning that names the line of user code ``depth`` calls above this function."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
 

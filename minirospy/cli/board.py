@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""Distance that the person moves per key press, in metres. Also the width of a map cell, and half its height."""
+"""Distance that the person moves per key press, in metres. A cell of the map is as wide as this, and twice as high."""
 
 _MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead of the scanner and to each side
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 _MASTER_SECONDS = 1.0  # timeout for connecting to a master, after which the page is served without one
-_OWN_MASTER_SECONDS = 30.0  # timeout for a master on loopback, which is slow only on a busy machine
+_OWN_MASTER_SECONDS = 30.0  # timeout for a master on loopback; only a busy machine takes so long
 
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as written in its link
 
@@ -482,7 +482,7 @@ def end_with_stdin() -> None:
 
 
 def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
-    """Return this user's tokens. If they cannot be stored in ROS_HOME, create new ones, unless ``must_be_kept`` is set.
+    """Return this user's tokens. If ROS_HOME cannot store them, return temporary tokens, or raise if ``must_be_kept``.
 
     ``must_be_new``: return tokens that only this process uses, because a saved notebook contains its token.
 

@@ -84,7 +84,7 @@ class ServiceProxy(Generic[_S_co]):
         # Number of calls that reached the service; it becomes ``seq`` in requests that start with a header.
         self._calls = 0
         self._transport: TCPROSTransport | None = (
-            None  # a connection set by the program, or one that the program requested
+            None  # the connection that the program has set, or has read, through ``transport``
         )
         self._transport_is_own = False  # True if the proxy, not the program, opened the connection
         self._protocol: TCPROSServiceClient | None = None

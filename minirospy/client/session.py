@@ -92,7 +92,7 @@ class Session:
 
     @property
     def name(self) -> str:
-        """This node's global name; ``/unnamed``, in its namespace, before init_node."""
+        """This node's global name. Before init_node, it is ``unnamed`` in the node's namespace."""
         return self.identity.name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:

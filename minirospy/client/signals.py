@@ -68,7 +68,7 @@ class SignalWatchdog:
         return self._sending is not None
 
     def install(self) -> None:
-        """Make the signals shut the node down. No effect in other threads than the main one, which cannot install handlers."""
+        """Make the signals shut the node down. No effect outside the main thread, because Python installs handlers only there."""
         if threading.current_thread() is not threading.main_thread():
             return
 

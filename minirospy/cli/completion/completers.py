@@ -34,7 +34,7 @@ __all__ = [
 
 LIVE_SECONDS = 0.8  # timeout in seconds for the master and for nodes
 
-_MAX_LETTERS = 1000  # maximum length of a parameter value that is offered, in characters
+_MAX_LETTERS = 1000  # maximum length, in characters, of a parameter value that is offered for completion
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 

@@ -47,7 +47,7 @@ CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is com
 _LARGE = 64 * 1024  # a message of at least this many bytes is not copied into the chunk
 
 _BILLION = 10**9
-_OVERHEAD = 46  # bytes in a message's record in addition to its body
+_OVERHEAD = 46  # bytes in a message record besides the message's body
 _ENTRY = struct.Struct("<III")
 _TIME = struct.Struct("<II")
 _UINT32 = struct.Struct("<I")
@@ -91,7 +91,7 @@ class _Stream:
 
 
 class _Complete(NamedTuple):
-    """A complete chunk to be written: two functions for its data (see :meth:`BagWriter._data`), its size and its index."""
+    """A complete chunk to be written: two functions for its data (see BagWriter._data), the data's size, and its index."""
 
     is_ready: Callable[[], bool]
     data: Callable[[], list[Buffer]]

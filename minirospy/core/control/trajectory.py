@@ -38,7 +38,7 @@ __all__ = [
 NEVER = 1 << 100  # ns; a time that is later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
 MAX_MAGNITUDE = 1e100  # maximum position or derivative; larger values could overflow a segment's coefficients
-# rad; within this distance of a half turn, use the sign of the position difference, because rounding may flip the other
+# rad; this close to a half turn, rounding may flip the shorter way's sign: use the position difference's sign instead
 _SINGULARITY = 1e-9
 
 

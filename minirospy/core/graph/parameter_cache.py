@@ -36,7 +36,7 @@ class ParameterCache:
         return self._changes
 
     def get(self, key: str) -> object:
-        """Return the value stored for ``key``. Raise LookupError if there is none, or if it has changed since."""
+        """Return the value stored for ``key``. Raise LookupError if none was stored, or if a change has invalidated the value."""
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:

@@ -330,7 +330,7 @@ class Registry:
         return chain((shutdown,), self._updates(*published))
 
     def _cost_of_text(self, name: str, kind: int, text: str) -> int:
-        """Return the number of bytes for a type or service URI, minus those of the one that it replaces."""
+        """Return how many more bytes a type or service URI uses than the string that it replaces."""
         if kind == SERVES:
             service = self._services.get(name)
             return text_cost(text) - (text_cost(service.uri) if service else 0)

@@ -19,7 +19,7 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-_SPARE = 10_000  # maximum number of elements without bytes, in addition to one per byte of the message
+_SPARE = 10_000  # maximum number of zero-size elements, in addition to one per byte of the message
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 

@@ -237,7 +237,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
 
 
 def get_printable_message_args(msg: protocols.Message, buff: TextIO | None = None, prefix: str = "") -> str:
-    """Return the names of a message's fields in order, nested ones with dots. If ``buff`` is given, also write them to it."""
+    """Return the names of a message's fields in order, nested fields as ``a.b``. If ``buff`` is given, also write them to it."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
