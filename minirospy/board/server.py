@@ -70,7 +70,7 @@ def main(argv: list[str]) -> int:
 
 
 class _LogOnDemand(io.TextIOBase):
-    """A standard error stream that opens its file for each write, so that no file exists without an error."""
+    """A standard error stream that opens its file for each write, so that the file exists only after an error."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -166,7 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the previous drawing, or below it if TERM=dumb, where the cursor cannot move up."""
+    """Yield a function that draws over the previous drawing, or below it on a dumb terminal, which cannot move its cursor up."""
     from rich.live import Live
 
     if console.is_dumb_terminal:

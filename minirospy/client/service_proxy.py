@@ -181,7 +181,7 @@ class ServiceProxy(Generic[_S_co]):
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection; if another thread is calling through it, that call fails."""
+        """Close a persistent connection. If another thread's call is using the connection, that call fails."""
         with self._handover:
             self._end_client()
             transport, self._transport = self._transport, None

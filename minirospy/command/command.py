@@ -68,7 +68,7 @@ _IN_ARCHIVE = (
 )
 
 INTERRUPTED = 130
-"""The exit status that shells use for a program terminated by SIGINT. It stops `catkin_make && roslaunch ...`."""
+"""The exit status that shells use for a program terminated by SIGINT. Being nonzero, it stops `catkin_make && roslaunch ...`."""
 
 
 class RosText(NamedTuple):

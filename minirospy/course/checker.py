@@ -154,7 +154,7 @@ class _Run:
         self._judge_programs()
 
     def _expect(self, step: Step) -> bool:
-        """Check an expectation and add a finding. If it fails because a program has exited, return False and add none."""
+        """Check an expectation and add a finding. If it fails because a program has exited, return False and add no finding."""
         text = sentence(step, self._after, self._trial.world.patience)
         outcome = expect(self._trial, step)
         if not outcome.holds and not self._judge_programs():
@@ -303,7 +303,7 @@ def _ended_finding(program: Program, status: int, fault: str, exercise: Exercise
 
 
 def _judge_stop(world: World, report: Report, tell: Callable[[Finding], object]) -> bool:
-    """Report student programs that ignored Ctrl-C and had to be killed. Return True if there are none."""
+    """Report student programs that ignored Ctrl-C and had to be killed. Return True if no program had to be killed."""
     stubborn = [each for each in world.programs if each.is_work and each.ignored_interrupt]
     for program in stubborn:
         finding = Finding(

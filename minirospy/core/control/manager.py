@@ -64,7 +64,7 @@ class Loaded:
 
 @dataclass(slots=True, eq=False)
 class Switch:
-    """A requested change of the running controllers, which the loop performs. Times are in seconds."""
+    """A requested change to the set of running controllers. The loop performs the change. Times are in seconds."""
 
     start: Sequence[Loaded]
     stop: Sequence[Loaded]

@@ -53,7 +53,7 @@ class ErrorCode(IntEnum):
 
 
 class TrajectoryError(MinirospyError):
-    """Raised if a trajectory is rejected. The text is ROS's, if ROS also rejects it."""
+    """Raised if a trajectory is rejected. The text is ROS's, if ROS also rejects the trajectory."""
 
 
 class PastTrajectoryError(TrajectoryError):

@@ -40,7 +40,7 @@ class ParameterCache:
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:
-        """Store the value that the master returned, unless it has changed since the query."""
+        """Store the value that the master returned, unless any parameter has changed since ``changes`` was read."""
         if changes == self._changes:
             self._values[key] = value
 

@@ -78,7 +78,7 @@ Layout = tuple[Item, ...]
 
 
 class Transcoder(NamedTuple):
-    """Functions that convert bytes in either direction. Both raise DeserializationError on bytes that end too early.
+    """Functions that convert bytes in either direction. Both raise DeserializationError if the bytes are truncated.
 
     ``to_cdr(data, header)``: ``header`` is like CDR_HEADER, possibly with options set.
     """

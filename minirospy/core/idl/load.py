@@ -242,7 +242,7 @@ def top_module(package: str, files: Iterable[str]) -> str:
 
 
 def _is_generated(file: Path) -> bool:
-    """Return whether the file may be generated: it does not exist, or an earlier build has generated it."""
+    """Return whether a build may write the file: it does not exist, or an earlier build has generated it."""
     from minirospy.core.idl.emit import GENERATED
 
     return not file.exists() or GENERATED in file.read_text(encoding="utf-8").partition("\n")[0]

@@ -227,7 +227,7 @@ class TransformBuffer(FrameTree):
         return _Walk(time, from_source, from_target)
 
     def _common_time(self, target: Frame, source: Frame) -> int:
-        """Return the newest time at which every frame between the two has data; static frames have data at any time.
+        """Return the newest time at which every frame between source and target has data; static frames have data at any time.
 
         Raise ConnectivityException if the frames are not connected, LookupException if the transforms form a loop.
         """
