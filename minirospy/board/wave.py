@@ -11,7 +11,7 @@ from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
 
-PWM_LIMIT = 50.0  # maximum frequency shown by the board, in Hz; a faster PWM is shown at this one, with its own duty cycle
+PWM_LIMIT = 50.0  # Hz; the board shows faster PWMs at this frequency, with their own duty cycles
 
 
 class Output(Protocol):

@@ -124,7 +124,7 @@ def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
 
 
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
-    """Generate the source of a message's class. Its globals must contain the classes of all nested messages.
+    """Generate the source of a message's class. Its globals must contain the classes of the message's fields.
 
     Raise DefinitionError if a name is not legal in Python.
     """
