@@ -31,7 +31,7 @@ class TerminalHandler(logging.Handler):
         """Write one line."""
         name = SEVERITIES.get(record.levelno, record.levelname)
         stream = sys.stdout if record.levelno < logging.WARNING else sys.stderr
-        # The terminal may be closed, which is not the program's fault.
+        # Ignore a closed terminal, because logging must not end the program.
         with contextlib.suppress(OSError, ValueError):
             stream.write(f"[{name}] [{record.created:f}]: {self.format(record)}\n")
             stream.flush()

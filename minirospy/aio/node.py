@@ -52,7 +52,7 @@ _Request = TypeVar("_Request", bound=Message)
 _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
-# maximum log lines per ten seconds; a bridge may register thousands of topics
+# maximum log lines per ten seconds about refused registrations; a bridge may register thousands of topics
 MAX_REGISTRATION_FAULTS = 5
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
@@ -114,7 +114,7 @@ class Node:
         # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
 
-        # The reason given by another process that requested the shutdown, such as the master if a new node took this name
+        # The reason for a shutdown that another process requested, for example the master because a new node has this name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)

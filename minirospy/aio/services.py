@@ -101,7 +101,7 @@ class ServiceProxy(Generic[_Response_co]):
         return response
 
     def close(self) -> None:
-        """Close a persistent connection. If another task is calling through it, that call fails. Idempotent."""
+        """Close a persistent connection. If another task's call is using the connection, that call fails. Idempotent."""
         if self._lock.locked() and self._client:
             # Let the call in progress close the socket; closing it here would not wake that call.
             self._client.hang_up()

@@ -23,7 +23,7 @@ class ErrorReporter:
     """Reports unexpected errors in a long-running task: one line per ten seconds, with the number of suppressed errors."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
-        """Create a reporter for the task that ``work`` describes, such as "the watch of the graph"."""
+        """Create a reporter. ``work`` is the task's description in log lines, such as "the watch of the graph"."""
         self._log = log
         self._lines = RateLimitedLogger(log)
         self._work = work

@@ -211,7 +211,7 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def wait_for_expected(self) -> None:
-        """Wait up to a second for the subscribers that the master listed at registration to connect."""
+        """Wait up to a second until the subscribers that the master listed at registration have connected."""
         await self
         state = self._state
         if state is None:
@@ -220,7 +220,7 @@ class Publisher(Handle, Generic[_M_co]):
             await asyncio.wait_for(self._wait_for(state.publication.expected), JOIN_SECONDS)
 
     async def close(self) -> None:
-        """Stop publishing. The node's last publisher on a topic also unregisters the topic. Idempotent."""
+        """Stop publishing. Closing the node's last publisher on a topic also unregisters the topic. Idempotent."""
         state, self._state = self._state, None
         if state:
             await state.leave(self)

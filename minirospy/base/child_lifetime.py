@@ -38,7 +38,7 @@ class JobSystem(Protocol):
 
 
 class ProcessJob:
-    """The job that contains this process and its children. A process cannot leave its job, so all guards share it."""
+    """The job that contains this process and its children. All guards share one job, because a process cannot leave its job."""
 
     def __init__(self, system: JobSystem) -> None:
         self._system = system
@@ -75,7 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager that makes child processes end with this process until :meth:`close`, if ``is_guarded`` is set."""
+    """A context manager; until its exit or :meth:`close`, child processes end with this process if ``is_guarded`` is true."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None
@@ -121,7 +121,7 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # This process is in another program's job, such as an IDE's or a service's, and that job lets no process leave.
+            # This process is in another program's job, such as an IDE's or a service's, which does not let processes leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 

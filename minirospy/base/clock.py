@@ -39,7 +39,7 @@ _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
 """Seconds per wait in the main thread, the thread that receives signals.
 
-On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just before a wait is handled only after it.
+On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just before a wait is handled only after that wait.
 """
 
 _POLL_SECONDS = 0.1
@@ -54,7 +54,7 @@ SILENT_CLOCK = (
 
 
 class SignalSafeEvent(threading.Event):
-    """An event that a signal handler may set or wait for, whichever code it interrupts.
+    """An event that a signal handler may set or wait for, no matter what code the signal interrupts.
 
     The interrupted thread may be inside wait() or set() of the same event. threading.Event acquires a lock there, so a handler
     that sets the event, or waits for another thread that needs the lock, would deadlock.
@@ -100,13 +100,13 @@ class SignalSafeEvent(threading.Event):
 
 
 class SignalSafeCondition:
-    """A condition that any thread may wait for or notify, whichever code a signal interrupts. It has no lock."""
+    """A lock-free condition. Signal handlers may wait for it or notify it, no matter what code the signal interrupts."""
 
     def __init__(self) -> None:
         self._waiting: list[SignalSafeEvent] = []
 
     def notify_all(self) -> None:
-        """Let the waiting threads call their predicates again. Call this after each change that may affect one."""
+        """Make the waiting threads call their predicates again. Call this after each change that may affect a predicate."""
         for event in self._waiting.copy():
             event.set()
 
@@ -133,12 +133,12 @@ class SignalSafeCondition:
 
 
 class SignalSafeQueue(Generic[_T]):
-    """A queue for at most ``size`` items, which any thread may use, whichever code a signal interrupts."""
+    """A queue for at most ``size`` items. Signal handlers may use it, no matter what code the signal interrupts."""
 
     def __init__(self, size: int) -> None:
         # SimpleQueue is written in C: a signal handler runs only before or after its calls.
         self._items: queue.SimpleQueue[_T] = queue.SimpleQueue()
-        self._free: queue.SimpleQueue[None] = queue.SimpleQueue()  # one item per free place
+        self._free: queue.SimpleQueue[None] = queue.SimpleQueue()  # holds one None per free slot
         for _ in range(size):
             self._free.put(None)
 
@@ -201,7 +201,7 @@ class WallClock:
 
 
 class FirstTimeWait:
-    """Calls a function once if the first time of a simulated clock does not arrive within two seconds."""
+    """Calls a function once if a simulated clock is not set within two seconds."""
 
     def __init__(self, on_silence: Callable[[], object]) -> None:
         self._pending = [on_silence]  # a list, because list.pop() is atomic and several threads may wait
@@ -233,7 +233,7 @@ class SimulatedClock:
         self._now = now
         self._first = FirstTimeWait(on_silence)
         self._changed = changed or threading.Condition()
-        # Sleepers do not wait on the condition: a signal handler may wait for a thread that sets the clock or sleeps.
+        # Sleepers do not wait on the condition, whose lock could deadlock with a signal handler that waits for another thread.
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:

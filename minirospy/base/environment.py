@@ -75,7 +75,7 @@ class Environment(NamedTuple):
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
-        """Read the settings from ``environ`` (default: the process's environment); ``overrides``: master_uri, host, namespace.
+        """Read the settings from ``environ`` (default: os.environ). ``overrides`` may contain master_uri, host and namespace.
 
         Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is not just a name or
         address, MINIROSPY_PORTS is not a range such as 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown,
@@ -137,7 +137,7 @@ class Environment(NamedTuple):
 
     @property
     def master_is_local(self) -> bool:
-        """Return whether the master's host is this machine. Only then may a tool start a master."""
+        """Return whether the master's host is this machine. A tool may start a master only if it is."""
         return is_own_host(self.master_address[0], self.host)
 
 
@@ -250,7 +250,7 @@ def _checked_uri(uri: str) -> str:
 
 
 def _local_uri(uri: str) -> str:
-    """Return the URI of a master on this machine, rewritten so that it reaches a master that listens only on loopback."""
+    """Return the URI of a master on this machine with the host replaced by localhost, unless it is already loopback."""
     host, port, path = split_uri(uri)
     if host in ("localhost", "127.0.0.1", "::1"):
         return uri

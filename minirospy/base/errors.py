@@ -180,7 +180,7 @@ class MasterUnreachableError(MinirospyError):
 
 
 class NodeUnreachableError(MinirospyError):
-    """The node ``name`` (or another ``kind``: "service"), registered at ``uri``, does not respond."""
+    """The node ``name``, registered at ``uri``, does not respond. For a service, ``kind`` is "service"."""
 
     def __init__(self, name: str, uri: str, why: str = "", kind: str = "node") -> None:
         super().__init__(name, uri, why, kind)
@@ -283,7 +283,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """An error at ``line`` (from 1; 0: the whole text) of text that a user wrote; ``file`` is its path or another name."""
+    """An error in text that a user wrote, at ``line`` (1-based; 0: the whole text); ``file`` is the text's path or name."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)

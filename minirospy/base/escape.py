@@ -40,7 +40,7 @@ def has_controls(text: str) -> bool:
 
 
 def own_output() -> TextIO:
-    """Return a standard output that does not escape control sequences, for drawings that move the cursor.
+    """Return a stream to stdout that does not escape control sequences, for drawings that move the cursor.
 
     The caller must escape untrusted text in the drawing.
     """

@@ -28,7 +28,7 @@ def return_large_blocks(least: int = _LARGE) -> None:
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # Keep glibc's default ratio. Otherwise each block above 128 KiB would grow and shrink the heap at its end.
+            # Keep glibc's default ratio of the two thresholds. Otherwise each block above 128 KiB would grow and shrink the heap.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 

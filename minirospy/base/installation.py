@@ -49,7 +49,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
 
 def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
-    """Return uv's command with all earlier requirements, because uv removes those that the new command does not repeat."""
+    """Return a `uv tool install` command that repeats all earlier requirements, because uv removes the ones not repeated."""
     try:
         text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
     except OSError:

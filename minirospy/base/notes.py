@@ -11,7 +11,7 @@ _E = TypeVar("_E", bound=BaseException)
 
 
 def noted(error: _E, note: str) -> _E:
-    """Add a note (PEP 678), which the traceback shows last, to an error; return the error. Python 3.10 does not show notes."""
+    """Add a note (PEP 678) to an error; return the error. Tracebacks show the note last, except in Python 3.10."""
     if sys.version_info >= (3, 11):
         error.add_note(f"minirospy: {note}")
     return error

@@ -14,7 +14,7 @@ _this_thread = threading.local()
 
 @contextlib.contextmanager
 def dispatching_signal() -> Iterator[None]:
-    """Make :func:`is_dispatching_signal` return True in this thread for the duration of the block, which handles a signal."""
+    """Make :func:`is_dispatching_signal` return True in this thread during the block. The block handles a signal."""
     _this_thread.is_dispatching = True
     try:
         yield

@@ -29,7 +29,7 @@ _STEM = 4  # minimum length, in letters, of a prefix for which completions are s
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: bool = False) -> str:
-    """Return text that suggests up to ``most`` of the ``known`` words, similar to an unknown word, or "".
+    """Return "; did you mean ...?" with up to ``most`` of the ``known`` words that resemble ``word``, or "" if none does.
 
     ``only_slips``: suggest only words with one or two missing, wrong or extra letters.
     """

@@ -72,7 +72,7 @@ class TVal:
     def __bool__(self) -> bool:
         return bool(self.secs or self.nsecs)
 
-    # Time and Duration are comparable only with their own class, a TVal with both.
+    # A Time compares only with Times, a Duration only with Durations, and a plain TVal with both.
     def __lt__(self, other: TVal) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, TVal) else NotImplemented
 

@@ -34,7 +34,7 @@ _FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff\ud800-\udfff]"
 _PLAIN_DECLARATION = re.compile(r"""<\?xml\s+version\s*=\s*(["'])1\.\d\1""")
 _ENCODING = re.compile(rb"""^\s*<\?xml\b[^>]*?\bencoding\s*=\s*["']([A-Za-z][\w.:-]*)["']""")
 
-_FALLBACK = "Latin-1"  # can decode any bytes, because each byte is a character
+_FALLBACK = "Latin-1"  # this encoding can decode any bytes, because it maps each byte to a character
 
 
 class Note(NamedTuple):

@@ -51,7 +51,7 @@ class XmlSyntaxError(XmlError):
 
 @dataclass
 class XmlElement:
-    """A tag at ``line``. ``text`` is its own text, without the text of its children."""
+    """A tag at ``line``. ``text`` excludes the text of the tag's children."""
 
     tag: str
     attributes: dict[str, str]
@@ -69,7 +69,7 @@ class XmlElement:
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that delivers text in large pieces. It rejects declarations that may expand (Parse raises XmlError)."""
+    """Return a parser that delivers text in large pieces. Its Parse raises XmlError for entities and attribute defaults."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 

@@ -196,7 +196,7 @@ _ADVICE = {
 
 
 _RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)
-"""Exceptions that check_yaml and PyYAML raise, for example for an invalid date or for !!bool before other text."""
+"""Exceptions that check_yaml and PyYAML raise, for example for an invalid date or for !!bool before text that is not a bool."""
 
 
 def _reason(error: Exception) -> str:

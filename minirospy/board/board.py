@@ -93,7 +93,7 @@ class Board:
         self._link.call(MovePerson(position))
 
     def reset(self) -> None:
-        """Reset the board: every pin becomes an input at 0, every button is released, the person is removed."""
+        """Reset the board: make every pin an input at level 0, release every button, and remove the person."""
         for pin, (state, fresh) in enumerate(zip(self.state().pins, BoardModel().pins, strict=True)):
             if state != fresh:
                 self._link.call(Setup(pin, Function.IN, initial=0))

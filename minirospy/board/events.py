@@ -64,7 +64,7 @@ class Detector:
         return occurred
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait up to ``timeout`` seconds for an edge to report; return whether one occurred."""
+        """Wait up to ``timeout`` seconds until :meth:`see` has recorded an edge; return whether it has."""
         if timeout is not None or sys.platform != "win32":
             return self._occurred.wait(timeout)
         # Wait in slices: Windows delivers Ctrl-C only between waits.
@@ -74,7 +74,7 @@ class Detector:
 
 
 class CallbackThread:
-    """Runs callbacks in the order of their edges. If a callback raises, prints the exception and goes on with the next one."""
+    """Runs callbacks in the order of their edges. If a callback raises, prints the exception and runs the next callback."""
 
     def __init__(self) -> None:
         self._due: queue.SimpleQueue[Detector | None] = queue.SimpleQueue()

@@ -101,7 +101,7 @@ class Link:
         self._reader.start()
 
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
-        """Perform ``operation``, and return when the mirror shows its effect.
+        """Perform ``operation``; return when its effect has arrived in the mirror, this process's copy of the pins.
 
         If it is None, only wait for the operations sent earlier. Raise BoardError if the board refuses, or does not
         respond within ``timeout`` seconds.
@@ -279,7 +279,7 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without a responding server: the new server exited because of another one, and that one has exited since.
+            # Status 0 without a responding server: the new server exited because of another server, which has exited since.
             # Negative status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)

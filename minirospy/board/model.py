@@ -109,7 +109,7 @@ class Force(NamedTuple):
 
 Operation = Setup | Write | Press | Release | Force
 
-Position = tuple[float, float]  # metres ahead of the scanner, and to its left
+Position = tuple[float, float]  # distances in metres: ahead of the scanner, and to its left
 
 
 class Change(NamedTuple):
@@ -179,7 +179,7 @@ class BoardModel:
         return {pin: state if initial is None else state._replace(latch=_level(initial))}
 
     def _pressed(self, pin: int) -> int:
-        # A button at a pin with a pull-up connects it to ground; the wired buttons connect theirs to 3.3 V.
+        # A button connects a pin with a pull-up to ground, and one of the wired buttons connects its pin to 3.3 V.
         return 0 if pin not in BUTTONS and self.pins[pin].pull is Pull.UP else 1
 
 

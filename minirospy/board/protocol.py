@@ -66,7 +66,7 @@ class MovePerson(NamedTuple):
 
 
 class Request(NamedTuple):
-    """A request to perform ``operation``. If it is None, the server only replies with Done."""
+    """A request to perform ``operation``, or None only to get a Done in reply."""
 
     number: int
     operation: Operation | MovePerson | None

@@ -215,7 +215,7 @@ class Gpio:
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
                 # In a shutdown hook: the interrupted program may already have checked its stop flag, and be about to use a pin.
-                # That use must not fail: RPi.GPIO's calls are in C, so there the call would finish before the hook runs.
+                # That use must not fail, because with RPi.GPIO it cannot: its calls are in C, and finish before a hook runs.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -468,7 +468,7 @@ class Gpio:
             warnings.warn(f"virtual board: {fault}", RuntimeWarning, stacklevel=4)
 
     def _warn(self, text: str, depth: int) -> None:
-        """Issue a warning for the user's line, which is ``depth`` calls above this one."""
+        """Issue a warning that names the line of user code ``depth`` calls above this function."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
 
@@ -499,7 +499,7 @@ class PWM:
         self._running.set(duty=dutycycle)
 
     def ChangeFrequency(self, frequency: float) -> None:  # noqa: N802 - RPi.GPIO's name
-        """Set the frequency in Hz, above 0.0."""
+        """Set the frequency in Hz; it must be above 0.0."""
         self._running.set(frequency=frequency)
 
     def stop(self) -> None:

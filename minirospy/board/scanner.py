@@ -26,7 +26,7 @@ _DARK_EDGE = 0.35  # minimum brightness, from 0 to 1, of a surface seen at a fla
 
 
 class Wall(NamedTuple):
-    """A straight wall between two points; with ``is_reflector`` set, it reflects all light."""
+    """A straight wall between two points. If ``is_reflector`` is true, the wall reflects all light."""
 
     x1: float
     y1: float
@@ -66,7 +66,7 @@ class Scan(NamedTuple):
         return nearest >= FIELDS[0], nearest >= FIELDS[1]
 
 
-# A room of 6 m by 4 m. There is a door to the left and a reflector on the wall ahead; the scanner is at the wall behind.
+# A room of 6 m by 4 m, with the scanner 1 m from the rear wall, a door on the left and a reflector on the wall ahead
 WALLS = (
     Wall(-1.0, -2.0, 5.0, -2.0),
     Wall(5.0, -2.0, 5.0, -0.3),

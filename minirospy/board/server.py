@@ -45,7 +45,7 @@ LINGER = 1.5  # seconds for which a board without clients waits for the next one
 SAVE_AFTER = 0.05
 """Delay in seconds before a change is saved, so that even a fast-blinking LED causes at most 20 writes a second."""
 
-# Maximum unsent bytes for a client; above it, the client is disconnected, and reconnects when it reads again
+# Maximum unsent bytes for a client. With more, the server disconnects it; a client that resumes reading reconnects
 MAX_UNSENT = 1 << 20
 
 LOCK_PATIENCE = 5.0  # seconds to wait for the lock if another server is about to exit
@@ -70,7 +70,7 @@ def main(argv: list[str]) -> int:
 
 
 class _LogOnDemand(io.TextIOBase):
-    """A standard error stream that opens its file for each write, so that no file exists without an error."""
+    """A standard error stream that opens its file for each write, so that the file exists only after an error."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

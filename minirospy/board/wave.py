@@ -11,7 +11,7 @@ from minirospy.base.errors import BoardError
 
 __all__ = ["PWM_LIMIT", "Wave"]
 
-PWM_LIMIT = 50.0  # Hz; the board shows a faster PWM at this frequency, with the PWM's duty cycle
+PWM_LIMIT = 50.0  # Hz; the board shows faster PWMs at this frequency, with their own duty cycles
 
 
 class Output(Protocol):

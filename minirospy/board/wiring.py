@@ -10,7 +10,7 @@ _PARTS = f"its LEDs are at {min(LEDS)} to {max(LEDS)}, its buttons at {' and '.j
 
 
 def wiring_fault(channel: int, pin: int, direction: int, *, is_board: bool) -> str:
-    """Return the reason why using BCM ``pin`` in this direction has no effect, or "" if it has one.
+    """Return the reason why using BCM ``pin`` in this direction has no effect, or "" if it has an effect.
 
     ``channel`` is the number that the program uses; ``is_board`` means that it is a GPIO.BOARD number.
     """

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""Distance that the person moves per key press, in metres. Also the width of a map cell, and half its height."""
+"""Distance that the person moves per key press, in metres. A cell of the map is as wide as this, and twice as high."""
 
 _MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead of the scanner and to each side
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set this variable for the nodes, so that they open the same board as the verbs.
+        # Set this variable for the nodes, so that they open the same board as this command.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
@@ -166,7 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the previous drawing, or below it if TERM=dumb, where the cursor cannot move up."""
+    """Yield a function that draws over the previous drawing, or below it on a dumb terminal, which cannot move its cursor up."""
     from rich.live import Live
 
     if console.is_dumb_terminal:

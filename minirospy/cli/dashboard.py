@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard", "end_with_stdin"]
 
 _MASTER_SECONDS = 1.0  # timeout for connecting to a master, after which the page is served without one
-_OWN_MASTER_SECONDS = 30.0  # timeout for a master on loopback, which is slow only on a busy machine
+_OWN_MASTER_SECONDS = 30.0  # timeout for a master on loopback; only a busy machine takes so long
 
 Fields = Mapping[str, Sequence[str]]  # a view's settings, as written in its link
 
@@ -371,7 +371,7 @@ def _serve(
             self._opened: list[Dashboard] = []
 
         async def wait(self) -> None:
-            """If nothing listens at the master's address, serve a page without data. Do not wait for a master."""
+            """If nothing listens at the master's address, start serving a page without data, which :meth:`start` replaces."""
             if await _is_reachable(self._node.master_uri):
                 return
             for each in ports:
@@ -482,7 +482,7 @@ def end_with_stdin() -> None:
 
 
 def _tokens(home: Path, *, must_be_kept: bool, must_be_new: bool) -> Tokens:
-    """Return this user's tokens. If they cannot be stored in ROS_HOME, create new ones, unless ``must_be_kept`` is set.
+    """Return this user's tokens. If ROS_HOME cannot store them, return temporary tokens, or raise if ``must_be_kept``.
 
     ``must_be_new``: return tokens that only this process uses, because a saved notebook contains its token.
 
@@ -546,7 +546,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Check one second late, so that the code has certainly expired according to the clock of Codes.
+    # Check one second late, so that the code has certainly expired by the clock that Codes uses.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 

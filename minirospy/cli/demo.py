@@ -32,7 +32,7 @@ BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
 """Seconds for which the button is held, and then left released.
 
-Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
+Neither is a multiple of the node's polling period of 0.1 s, so that the LED reacts after its typical delay.
 """
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0

@@ -186,7 +186,7 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
 
 
 class _Listing:
-    """Prints the connections that the bridge would make after ROS 2 has discovered its nodes, then stops the node."""
+    """Waits until ROS 2 has discovered its nodes, prints the connections that the bridge would make, and stops the node."""
 
     def __init__(self, bridge: Ros2Bridge, node: Node) -> None:
         self._bridge = bridge

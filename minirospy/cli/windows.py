@@ -36,7 +36,7 @@ class Window(NamedTuple):
 
     command: str
     view: str
-    what: str  # the command's description, without "in a browser"
+    what: str  # what the command does; its help appends "in a browser"
     version: str  # the ROS package's version
     description: str  # the ROS package's description
     package: str = ""  # the ROS package's name, if it differs from the command

@@ -179,7 +179,7 @@ def on_shutdown(h: Callable[[], object]) -> None:
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; the hooks run in this thread."""
     current_session().lifecycle.signal_shutdown(reason)
-    # Mark the calling thread as notified: it only cleans up from now on, and may sleep.
+    # Mark the calling thread as notified of the shutdown: its sleeps no longer raise, because it is only cleaning up.
     current_session().poll_shutdown()
 
 

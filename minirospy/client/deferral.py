@@ -54,5 +54,5 @@ class Deferral:
 
 
 def is_main_thread() -> bool:
-    """Return whether the calling thread is the main thread, the only one that signals interrupt."""
+    """Return whether the calling thread is the main thread. Signals interrupt only that thread."""
     return threading.current_thread() is threading.main_thread()

@@ -27,7 +27,7 @@ def report_waiting(*, is_leaving: bool) -> None:
 
 
 def report_interrupt(reason: str) -> None:
-    """Print that the main thread is being interrupted, where it is in the program, and the reason for the shutdown."""
+    """Print a line about interrupting the main thread, with its position in the program and the reason for the shutdown."""
     main = threading.main_thread()
     place = _place(sys._current_frames().get(main.ident or 0))
     at = f" at {place}" if place else ""

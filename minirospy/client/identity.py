@@ -29,7 +29,7 @@ class Identity:
     """
 
     def __init__(self, previous: Identity | None = None) -> None:
-        """Use the identity ``previous``, except for topic names, until :meth:`take_name` is called."""
+        """Create an identity that equals ``previous``, except for topic names, until :meth:`take_name` is called."""
         # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node.
         # Programs may change this dict and `mappings`.
         self.remappings: dict[str, str] = previous.remappings if previous else {}
@@ -77,7 +77,7 @@ class Identity:
 
     @property
     def name(self) -> str:
-        """This node's global name; ``/unnamed``, in its namespace, before init_node."""
+        """This node's global name. Before init_node, it is ``unnamed`` in the node's namespace."""
         if self._name is None:
             self._name = names.join(self.environment.namespace, _UNNAMED)
         return self._name
@@ -117,7 +117,7 @@ class Identity:
         return names.resolve(name, self.name, self.resolved_mappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the name to which the command line remaps ``name``, as written there, or ``name`` if it is not remapped."""
+        """Return the global name to which the command line remaps ``name``, or ``name`` itself if it is not remapped."""
         mapped = self.mappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 

@@ -78,7 +78,7 @@ class Lifecycle:
         self.interrupts: list[Callable[[], object]] = []
         """called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls"""
 
-        self.spin_shuts_down = True  # False in a notebook: an interrupt ends spin(), not the node
+        self.spin_shuts_down = True  # False in a notebook: there, an interrupt ends spin(), but not the node
         self.has_waited = False  # True after a thread has waited or slept in a rospy call
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
@@ -141,7 +141,7 @@ class Lifecycle:
         return _Interrupting(self, interrupt)
 
     def spin(self) -> None:
-        """Wait until the node shuts down. An interrupt shuts the node down; in a notebook, the interrupt is only raised."""
+        """Wait until the node shuts down. Ctrl-C shuts it down, except in a notebook, where KeyboardInterrupt is only raised."""
         try:
             wait_for_event(self.shutting_down, None)
         except KeyboardInterrupt:
@@ -156,7 +156,7 @@ class Lifecycle:
         return self._claim.locked()
 
     def is_shutdown(self) -> bool:
-        """Return whether the node has shut down, without recording that the calling thread polls."""
+        """Return whether the node has shut down. Unlike :meth:`poll_shutdown`, do not record that the calling thread polls."""
         return self.shutting_down.is_set()
 
     # --- notified threads

@@ -124,7 +124,7 @@ class RosOutHandler(DeferringHandler):
 
 
 def check_message(record: logging.LogRecord) -> str:
-    """Return the record's text. If its arguments do not match its format string, return a text that names the error."""
+    """Return the record's text. If the arguments do not match the format string, return a description of the error."""
     try:
         return record.getMessage()
     except Exception as error:  # noqa: BLE001 - also what a program's own __str__() raises

@@ -146,7 +146,7 @@ def _log_to_file(session: Session, path: Path) -> None:
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):
-        """A handler with the class name that programs written for rospy look for among the root logger's handlers."""
+        """A log file handler. Programs written for rospy look for this class name among the root logger's handlers."""
 
     try:
         file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)

@@ -221,7 +221,7 @@ class PublishedTopic(SharedTopic):
 
     @property
     def is_latch(self) -> bool:
-        """Return whether the last message is sent to subscribers that connect later. Programs may assign to it."""
+        """Return whether the last message is sent to subscribers that connect later. Programs may set this property."""
         return self.publication.latch
 
     @is_latch.setter

@@ -84,15 +84,15 @@ class ServiceProxy(Generic[_S_co]):
         # Number of calls that reached the service; it becomes ``seq`` in requests that start with a header.
         self._calls = 0
         self._transport: TCPROSTransport | None = (
-            None  # a connection set by the program, or one that the program requested
+            None  # the connection that the program has set, or has read, through ``transport``
         )
-        self._transport_is_own = False  # the proxy opened the transport's connection, and may open another
+        self._transport_is_own = False  # True if the proxy, not the program, opened the connection
         self._protocol: TCPROSServiceClient | None = None
         # Held during calls that share a connection.
         # Reentrant, because a signal may run a shutdown hook during this thread's call, and the hook may call the service.
         self._lock = threading.RLock()
-        self._is_calling = False  # True while a thread makes such a call
-        # Held while the connection changes hands, never during a call, because other threads may read ``transport`` then.
+        self._is_calling = False  # True while a thread makes a call on a shared connection
+        # Held while the connection is handed to another owner. Not held during calls, so that threads can read ``transport``.
         # Reentrant, because a signal may run a shutdown hook that also reads ``transport``.
         self._handover = threading.RLock()
 
@@ -157,7 +157,7 @@ class ServiceProxy(Generic[_S_co]):
                 from minirospy.client.tcpros import TCPROSTransport
 
                 # From here on, the connection belongs to the transport, which the program may use or close.
-                # A call in progress still receives its response; the next call waits for that, and then uses the transport.
+                # A call in progress still receives its response. The next call waits for that call, and then uses the transport.
                 transport = TCPROSTransport(self.protocol, self.resolved_name)
                 transport.set_socket(client.detach(), client.uri)
                 transport.dest_address = split_uri(client.uri, "rosrpc")[:2]
@@ -181,7 +181,7 @@ class ServiceProxy(Generic[_S_co]):
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection; if another thread is calling through it, that call fails."""
+        """Close a persistent connection. If another thread's call is using the connection, that call fails."""
         with self._handover:
             self._end_client()
             transport, self._transport = self._transport, None

@@ -48,7 +48,7 @@ class Session:
     """The process's node before, during and after its lifetime: its name, lifecycle, clock, tables and event loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
-        """Replace the session ``previous``. Its name, clock and listeners remain in use until init_node is called."""
+        """Create the session after ``previous``, whose name, clock and listeners remain in use until init_node is called."""
         self.is_fork = is_fork
         self.is_abandoned = False  # True if this process is a fork, and the session belongs to its parent
         self._forked_from = previous.name if previous and is_fork else ""
@@ -92,7 +92,7 @@ class Session:
 
     @property
     def name(self) -> str:
-        """This node's global name; ``/unnamed``, in its namespace, before init_node."""
+        """This node's global name. Before init_node, it is ``unnamed`` in the node's namespace."""
         return self.identity.name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
@@ -194,7 +194,7 @@ class Session:
         return lambda: self._or_interrupted(lambda: wait(None))
 
     def post(self, function: Callable[..., object], *args: object) -> None:
-        """Call ``function`` on the node's loop soon."""
+        """Schedule a call of ``function`` on the node's loop; return immediately."""
         if self._loop:
             self._loop.post(function, *args)
 
@@ -215,13 +215,13 @@ class Session:
         Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
         """
         if self._installs_signals:
-            # Until it polls, a fork keeps the default signal handling.
+            # A fork keeps the default signal handling until it calls is_shutdown() for the first time.
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()
 
     def spin(self) -> None:
-        """Wait until the node shuts down. Raise ROSInitException before init_node."""
+        """Wait until the node shuts down. Raise ROSInitException if init_node has not been called."""
         if not self.initialized and not self.is_shutdown() and not self.is_fork:
             raise ROSInitException("client code must call rospy.init_node() first")
         if self.is_fork_without_node:

@@ -10,10 +10,10 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-# seconds for the main thread to start the hooks, and the same again to see that is_shutdown() is true
+# seconds for the main thread to start the hooks, and then again to notice that is_shutdown() returns True
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
-# Seconds for the main thread to exit by itself after a request from another process.
+# Seconds for the main thread to exit by itself after another process has requested the shutdown.
 # The time is longer than after a signal, because no user is waiting at the terminal.
 # A main thread that polls is_shutdown() may be in a long iteration of its loop.
 _REQUEST_GRACE_SECONDS = 2.0

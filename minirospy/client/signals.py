@@ -55,9 +55,9 @@ class SignalWatchdog:
         # Dict from signal number to the previous handler
         self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
         self._number = int(signal.SIGINT)
-        # the action for which the main thread must raise an exception
+        # the action that requires an exception in the main thread; the next call of the signal handler raises it
         self._interrupt: Action | None = None
-        self._is_nudge = False  # True if a nudge was sent that has not reached the handler yet
+        self._is_nudge = False  # True if _nudge() has sent a signal that has not reached the handler yet
         self._nudging = threading.Lock()
         self._sending: socket.socket | None = None
         self._arrived = self._handled = self._nudges = 0
@@ -68,7 +68,7 @@ class SignalWatchdog:
         return self._sending is not None
 
     def install(self) -> None:
-        """Let the signals shut the node down. No effect outside of the main thread, the only one that can install handlers."""
+        """Make the signals shut the node down. No effect outside the main thread, because Python installs handlers only there."""
         if threading.current_thread() is not threading.main_thread():
             return
 
@@ -177,7 +177,7 @@ class SignalWatchdog:
                 self._perform(machine.tick(now))
 
                 if not (was_pending and deferral.pending):
-                    # Do not count the time before the signal.
+                    # Measure the delay from the signal's arrival.
                     deferred_at = now
                 elif now - deferred_at >= _DEFER_SECONDS:
                     self._nudge()
@@ -230,7 +230,7 @@ class SignalWatchdog:
             _send_to_main(self._number)
 
     def _nudge(self) -> None:
-        """Run the handler in the main thread, interrupting its system call, if any."""
+        """Send the main thread a signal that runs the handler there and interrupts any blocking system call."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
                 # Do not send a second nudge before the first has arrived.

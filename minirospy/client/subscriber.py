@@ -92,7 +92,7 @@ class Subscriber(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, queue_size, buff_size, tcp_nodelay)
-            # Read the links after joining: a message on a link that opens meanwhile may be delivered twice, but is not lost.
+            # Join before reading the links. If a link opens in between, its message may be delivered twice, but none is lost.
             links = state.links
         self.impl = state
 
@@ -106,7 +106,7 @@ class Subscriber(Topic[_M_co]):
             state.replay(data_class, _Callback(callback, callback_args), links)
 
     def unregister(self) -> None:
-        """Stop receiving. The topic's last Subscriber in this process also closes the connections."""
+        """Stop receiving. Unregistering the topic's last Subscriber in this process also closes the connections."""
         super().unregister()
         self.callback = self.callback_args = None
 

@@ -349,7 +349,7 @@ class TCPROSTransport(Transport):
         self.is_latched = self.latch == "1"
 
     def send_message(self, msg: Message, seq: int) -> None:
-        """Send the contents of ``write_buff`` and then a message. Raise TransportInitError without a connection."""
+        """Send the contents of ``write_buff`` and then a message. Raise TransportInitError if the transport is not connected."""
         serialize_message(self.write_buff, seq, msg)
         data = self.write_buff.getvalue()
         self.write_buff.seek(0)
@@ -357,7 +357,7 @@ class TCPROSTransport(Transport):
         self.write_data(data)
 
     def write_data(self, data: bytes) -> None:
-        """Send bytes. Raise TransportInitError without a connection, TransportException if the peer has closed it."""
+        """Send bytes. Raise TransportInitError if there is no connection, TransportException if the peer has closed it."""
         sock = self._open_socket()
         try:
             sock.sendall(data)

@@ -68,7 +68,7 @@ _IN_ARCHIVE = (
 )
 
 INTERRUPTED = 130
-"""The exit status that shells use for a program terminated by SIGINT. It stops `catkin_make && roslaunch ...`."""
+"""The exit status that shells use for a program terminated by SIGINT. Being nonzero, it stops `catkin_make && roslaunch ...`."""
 
 
 class RosText(NamedTuple):
@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error whose ROS message depends on the command, too. ``ros`` is that message; it is printed first."""
+    """An error for which ROS's message depends on the command. ``ros`` is ROS's message; it is printed first."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -116,7 +116,7 @@ def ros_words(error: Exception, wording: Wording) -> RosText:
 
 
 _WITH_ROS2 = ("minirospy", "minirospy ros2-bridge")
-"""Commands whose process may need ROS 2's packages. `minirospy VERB` runs the command for that verb."""
+"""Commands that may need ROS 2's packages. "minirospy" is included because `minirospy ros2-bridge` runs in its process."""
 
 
 def run(
@@ -127,7 +127,7 @@ def run(
     *,
     heeds_interrupts: bool = True,
 ) -> int:
-    """Run ``body`` and return the exit status, which is ``interrupted`` after Ctrl-C.
+    """Run ``body`` and return the exit status; after Ctrl-C, return the status ``interrupted``.
 
     An expected error is printed as ``name: ERROR: text`` on stderr, after ROS's message for it. ``heeds_interrupts``:
     exit on SIGINT even if the signal was ignored at the start, unless ``interrupted`` is nonzero.

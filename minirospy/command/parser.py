@@ -285,7 +285,7 @@ def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
 
 
 def integer(name: str) -> Callable[[str], int]:
-    """Return a function that parses an integer. ROS's error message calls the value ``name``."""
+    """Return a function that parses an integer. ``name`` is the word for the value in ROS's error message."""
 
     def read(text: str) -> int:
         try:

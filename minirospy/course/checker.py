@@ -20,7 +20,7 @@ from minirospy.course.world import World
 __all__ = ["Finding", "Report", "check", "words_of"]
 
 START_SECONDS = 15.0  # timeout for a node to register, on a slow laptop with a virus scanner
-OWN_START_SECONDS = 60.0  # timeout for a program of the exercise itself, without which nothing is checked
+OWN_START_SECONDS = 60.0  # timeout for a program of the exercise itself; without it, the check fails
 EXIT_SECONDS = 1.0  # time between a failed program's traceback and its exit
 _LAST_LINES = 8  # number of lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # time that `click` holds a button: more than two periods of 10 Hz polling
@@ -67,7 +67,7 @@ class Report:
 
 
 def words_of(exercise: Exercise, words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Split the words after an exercise's name into programs and answers. By default, the programs are those on its page.
+    """Split the words after an exercise's name into programs and answers. Without words, use the programs on its course page.
 
     Raise UsageError if there are too many words, or if there is no program and the page names none.
     """
@@ -154,7 +154,7 @@ class _Run:
         self._judge_programs()
 
     def _expect(self, step: Step) -> bool:
-        """Check an expectation and add a finding. If it fails because a program has exited, return False and add none."""
+        """Check an expectation and add a finding. If it fails because a program has exited, return False and add no finding."""
         text = sentence(step, self._after, self._trial.world.patience)
         outcome = expect(self._trial, step)
         if not outcome.holds and not self._judge_programs():
@@ -184,7 +184,7 @@ class _Run:
         return True
 
     def _start(self, step: Step) -> bool:
-        """Start the student's programs or one of the exercise's, and wait until each has registered a node."""
+        """Start the student's programs, or a program of the exercise; wait until each has registered a node."""
         world = self._trial.world
         if step.subject == "work":
             words = self._programs
@@ -195,7 +195,7 @@ class _Run:
         for word in words:
             before = world.nodes()
             program = world.start(word, is_work=step.subject == "work" or isinstance(step.subject, int))
-            # A reduced ``patience`` applies only to the student's programs, because the check needs the exercise's own ones.
+            # A reduced ``patience`` applies only to the student's programs: the check cannot continue without the exercise's.
             seconds = START_SECONDS if program.is_work else OWN_START_SECONDS / min(1.0, world.patience)
             has_started = partial(_has_started, world, before, program)
             runs = world.wait_until(has_started, seconds, needs_work=program.is_work)
@@ -303,7 +303,7 @@ def _ended_finding(program: Program, status: int, fault: str, exercise: Exercise
 
 
 def _judge_stop(world: World, report: Report, tell: Callable[[Finding], object]) -> bool:
-    """Report student programs that ignored Ctrl-C and had to be killed. Return True if there are none."""
+    """Report student programs that ignored Ctrl-C and had to be killed. Return True if no program had to be killed."""
     stubborn = [each for each in world.programs if each.is_work and each.ignored_interrupt]
     for program in stubborn:
         finding = Finding(

@@ -56,7 +56,7 @@ DEFAULT_SECONDS = 10.0
 MAX_HERTZ = 1000.0  # maximum publishing rate of messages, in Hz
 MAX_SECONDS = 3600.0  # maximum time limit of a step, in seconds
 
-# Options of each kind of step that no other kind accepts.
+# Dict from each kind of step to its options, in addition to _OPTIONS, which all kinds accept.
 ACTIONS: Mapping[str, frozenset[str]] = {
     "start": frozenset(),
     "stop": frozenset(),
@@ -302,7 +302,7 @@ class _Reader:
         )
 
     def _check(self, kind: str, words: Mapping[str, Any], place: str) -> None:
-        """Check values in advance whose faults would otherwise appear only while the student's program is running."""
+        """Check in advance the values that would otherwise cause errors only while the student's program is running."""
         subject = words[kind]
         if kind in ("press", "release", "click", "led") and not _is_pin(subject):
             raise self._error(f"{place}: [{subject}] is not a pin: BCM numbers are 0 to 53")

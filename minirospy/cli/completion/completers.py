@@ -34,13 +34,13 @@ __all__ = [
 
 LIVE_SECONDS = 0.8  # timeout in seconds for the master and for nodes
 
-_MAX_LETTERS = 1000  # maximum length of a parameter value that is offered, in characters
+_MAX_LETTERS = 1000  # maximum length, in characters, of a parameter value that is offered for completion
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Cursor(NamedTuple):
-    """The cursor's context: in an argument of ``verb``, after the arguments ``given``, at the end of the partial ``word``."""
+    """The cursor's context: the command's ``verb``, the ``given`` arguments before the cursor, and the partial ``word`` at it."""
 
     verb: str
     given: tuple[str, ...]
@@ -138,7 +138,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return the paths that complete ``word``: the contents of its folder, with ``shown`` in place of ``root``."""
+    """Return the contents of the folder named in ``word``, as paths that start with ``shown`` in place of ``root``."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -292,7 +292,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     if not cursor.given:
         return []
     file = _launch_file(cursor)
-    # Give missing arguments an empty value and collect errors in a list, because either would otherwise hide nodes.
+    # Set missing arguments to "" and collect errors in a list; a missing argument or an error would otherwise hide nodes.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.named_runnables()), cursor.word)

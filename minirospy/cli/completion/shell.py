@@ -36,7 +36,7 @@ def _parser() -> Parser:
 
 
 def shell_name(word: str) -> str:
-    """Return the name in ``SHELLS`` of the shell ``word`` or, if that is empty, of the shell in the variable SHELL.
+    """Return the key in ``SHELLS`` for the shell ``word``, or for the one in the variable SHELL if ``word`` is empty.
 
     Raise UsageError if there is nothing for the shell.
     """

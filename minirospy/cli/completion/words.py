@@ -94,7 +94,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Remove the quotes from a word. ``quote`` is the one at the start of the word, even if it has been closed."""
+    """Remove the quotes from a word. The result's ``quote`` is the quote that starts the word, even if closed."""
     text = ""
     quote = ""
     read = 0

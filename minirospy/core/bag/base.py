@@ -117,7 +117,7 @@ class BagReader(ABC):
 
 
 class ScannedReader(BagReader):
-    """A reader for bags that may lack an index; it then scans the bag to build one."""
+    """A reader for bags that may lack an index. If the index is missing, the reader scans the bag to build one."""
 
     @abstractmethod
     def scan(self) -> Iterator[int]:

@@ -262,7 +262,7 @@ Leaves one core to the reader's thread.
 """
 
 
-# Maximum size in bytes of a chunk to decompress in advance; several of them may be in memory
+# Maximum size in bytes of a chunk to decompress in advance; several such chunks may be in memory together
 _MAX_AHEAD = 64 * 1024 * 1024
 
 # Chunk bytes per requested message; above this ratio, read only the requested messages instead of the whole chunk

@@ -58,7 +58,7 @@ def compress(name: str, data: Buffer) -> bytes:
 
 
 def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], bool] = lambda: False) -> bytes:
-    """Decompress a chunk's data, which must then have ``size`` bytes.
+    """Decompress a chunk's data. The result must have ``size`` bytes.
 
     Allocates at most ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly in another
     thread than the caller's. Raise BagFormatError if the data is damaged, if its size is not ``size``, or after a

@@ -95,7 +95,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         end = seconds(max(index.times[-1] for index in indexes if index))
 
     if frequencies:
-        # Omit connections without messages, as ROS's reader does; ROS's Python writer stores those, too.
+        # Omit connections without messages, as ROS's reader does. Bags from ROS's Python writer may contain such connections.
         connections = [each for each in connections if counts[each.id]]
     types: dict[str, str] = {}
     by_topic: dict[str, list[Connection]] = {}

@@ -63,7 +63,7 @@ class Reader12(ScannedReader):
             raise BagUnindexedError(str(error)) from error
 
     def scan(self) -> Iterator[int]:
-        """Build the index from the messages; yield the position of each record. Stops at the first damaged record."""
+        """Build the index from the messages; yield each record's position before reading it. Stop at the first damaged record."""
         self.connections.clear()
         self._by_topic.clear()
         self._indexes.clear()

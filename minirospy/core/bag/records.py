@@ -63,7 +63,7 @@ BAG_HEADER_SIZE = 4096
 closed.
 """
 
-# maximum bytes in a record's header; in version 1.2 bags it contains definitions
+# maximum bytes in a record's header; in version 1.2 bags, headers contain definitions
 MAX_HEADER = 16 * 1024 * 1024
 
 MAX_UINT32 = 0xFFFFFFFF

@@ -209,7 +209,7 @@ class Repair:
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
-            # A chunk's size is written to its header at the end, so the writer was killed before it completed this chunk.
+            # A writer fills in the chunk's size last, so a size of 0 means that it was killed before completing the chunk.
             raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)
@@ -233,7 +233,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError if the chunk is unreliable: a connection differs from the same one in previous chunks."""
+        """Raise BagFormatError if a connection in the chunk has another topic or type than in earlier chunks."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (

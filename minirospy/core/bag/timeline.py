@@ -33,7 +33,7 @@ class TopicTimes(NamedTuple):
 
 
 class Timeline:
-    """A bag's index, keyed by topic. ``topics`` maps the names of the topics that have messages to their times.
+    """A bag's index by topic. ``topics`` is a dict from topic name to message times, for the topics that have messages.
 
     Raise BagFormatError if the index is damaged.
     """

@@ -47,7 +47,7 @@ CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is com
 _LARGE = 64 * 1024  # a message of at least this many bytes is not copied into the chunk
 
 _BILLION = 10**9
-_OVERHEAD = 46  # bytes in a message's record in addition to its body
+_OVERHEAD = 46  # bytes in a message record besides the message's body
 _ENTRY = struct.Struct("<III")
 _TIME = struct.Struct("<II")
 _UINT32 = struct.Struct("<I")
@@ -91,7 +91,7 @@ class _Stream:
 
 
 class _Complete(NamedTuple):
-    """A complete chunk to be written: functions that return its data, the data's size, and the contents of the chunk's index."""
+    """A complete chunk to be written: two functions for its data (see BagWriter._data), the data's size, and its index."""
 
     is_ready: Callable[[], bool]
     data: Callable[[], list[Buffer]]
@@ -181,7 +181,7 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """The bag's size so far in bytes; data not compressed yet counts with the previous chunks' compression ratio.
+        """The bag's size so far in bytes; for data not compressed yet, estimated from the ratio so far.
 
         Before the first chunk is written, the data in memory counts as 0, because the ratio is unknown.
         """
@@ -392,7 +392,7 @@ class BagWriter:
         return future.done, (lambda: [future.result()])
 
     def _write_complete(self, left: int) -> None:
-        """Write the complete chunks that are ready; then wait for the others until at most ``left`` remain."""
+        """Write the complete chunks in order, waiting for their compression while more than ``left`` of them remain."""
         while self._complete:
             chunk = self._complete[0]
             if len(self._complete) <= left and not chunk.is_ready():

@@ -186,7 +186,7 @@ class RobotHardware:
         """Update the states of joints and sensors. ``period``: ROS time since the last cycle."""
 
     def write(self, time: Time, period: Duration) -> None:
-        """Send the commands of the joints to the motors, and stop the joints whose ``active`` is None.
+        """Send the joints' commands to the motors. Stop each joint that no interface commands (its ``active`` is None).
 
         A position motor holds its position without a command. A motor that keeps its last velocity or effort must be sent the
         joint's command, which is then 0.

@@ -102,7 +102,7 @@ def _limit(parameters: Parameters, flag: str, key: str, given: float, none: floa
 
 
 class LimitEnforcer:
-    """Keeps commands within limits. A command that is not finite is replaced: the joint holds its position, or gets no effort."""
+    """Keeps commands within limits. If a command is not finite, the joint holds its position, or its effort becomes 0."""
 
     def __init__(self, joints: Iterable[Joint], limits: Mapping[str, JointLimits]) -> None:
         self._joints = [_Limiter(joint, limits.get(joint.name, JointLimits())) for joint in joints]

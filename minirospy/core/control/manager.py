@@ -64,7 +64,7 @@ class Loaded:
 
 @dataclass(slots=True, eq=False)
 class Switch:
-    """A requested change of the running controllers, which the loop performs. Times are in seconds."""
+    """A requested change to the set of running controllers. The loop performs the change. Times are in seconds."""
 
     start: Sequence[Loaded]
     stop: Sequence[Loaded]
@@ -211,7 +211,7 @@ class ControllerTable:
         return switch
 
     def update(self, time: Time, period: Duration, reset_controllers: bool = False) -> None:
-        """Update the running controllers, then perform a change. ``reset_controllers``: restart them first."""
+        """Update the running controllers, then perform a requested change. With ``reset_controllers``, first restart them."""
         loaded = self.loaded
         if reset_controllers:
             for each in loaded:

@@ -100,7 +100,7 @@ class AckermannOdometry(Odometry):
         self._travelled = 0.0  # m travelled by the rear wheel
 
     def update(self, wheel: float, steering: float, *, wheelbase: float, radius: float, time: int) -> None:
-        """Add the wheel's motion since the last update, along the arc of the steering angle."""
+        """Add the motion since the last update: the distance from the driven wheel's angle, along the arc set by ``steering``."""
         before, self._travelled = self._travelled, wheel * radius
         travel = self._travelled - before
         self.move(travel, math.tan(steering) * travel / wheelbase, time)

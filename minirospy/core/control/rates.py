@@ -41,7 +41,7 @@ class PublishRate:
         self._last = nanoseconds(time) - (self._period or 0) * is_due
 
     def is_due(self, time: Time) -> bool:
-        """Return whether to publish in this cycle. If time has jumped back, restart the schedule from there."""
+        """Return whether to publish in this cycle. If time has jumped back, restart the schedule at ``time``."""
         period = self._period  # read once, because another thread may change it
         if period is None:
             return False

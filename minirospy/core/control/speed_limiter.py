@@ -23,7 +23,7 @@ class Range:
 
 @dataclass(frozen=True)
 class SpeedLimiter:
-    """Limits on a velocity, its acceleration and its jerk, in s and m or rad; None means unlimited."""
+    """Limits on a linear or angular velocity (m or rad, and s), its acceleration and its jerk; None means unlimited."""
 
     velocity: Range | None = None
     acceleration: Range | None = None
@@ -41,7 +41,7 @@ class SpeedLimiter:
         return cls(read_range("velocity"), read_range("acceleration"), read_range("jerk"))
 
     def limit(self, velocity: float, last: float, before_last: float, dt: float) -> float:
-        """Return the allowed velocity that is nearest to the requested one, ``dt`` seconds after the previous one.
+        """Return the allowed velocity nearest to ``velocity``. ``last`` is the velocity ``dt`` seconds before.
 
         As in ROS, the jerk in one cycle may reach twice its limit, and the acceleration and velocity limits are applied
         afterwards.

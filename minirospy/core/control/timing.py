@@ -29,7 +29,7 @@ class CycleTimes:
         self._busy: list[int] = []
 
     def add(self, late: int, busy: int, is_overrun: bool) -> None:
-        """Record a cycle that started ``late`` after its deadline and lasted ``busy``, and whether it missed the next one."""
+        """Record a cycle: its delay ``late``, its duration ``busy``, and whether the next cycle's deadline was missed."""
         self.cycles += 1
         self.overruns += is_overrun
         if len(self._late) < MAX_CYCLES:

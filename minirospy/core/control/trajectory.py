@@ -38,7 +38,7 @@ __all__ = [
 NEVER = 1 << 100  # ns; a time that is later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
 MAX_MAGNITUDE = 1e100  # maximum position or derivative; larger values could overflow a segment's coefficients
-# rad; this close to a half turn, the sign of the position difference decides, not a rounding error
+# rad; this close to a half turn, rounding may flip the shorter way's sign: use the position difference's sign instead
 _SINGULARITY = 1e-9
 
 
@@ -53,7 +53,7 @@ class ErrorCode(IntEnum):
 
 
 class TrajectoryError(MinirospyError):
-    """Raised if a trajectory is rejected. The text is ROS's, if ROS also rejects it."""
+    """Raised if a trajectory is rejected. The text is ROS's, if ROS also rejects the trajectory."""
 
 
 class PastTrajectoryError(TrajectoryError):
@@ -356,7 +356,7 @@ class JointPath:
 
 
 def wraparound_offset(before: float, after: float) -> float:
-    """Return the whole turns, in rad, to add to ``after`` so that a continuous joint takes the shorter way."""
+    """Return the multiple of 2 pi to add to ``after`` so that a continuous joint takes the shorter way from ``before``."""
     distance = math.remainder(after - before, math.tau)
     if math.pi - abs(distance) < _SINGULARITY:
         distance = math.copysign(distance, after - before)

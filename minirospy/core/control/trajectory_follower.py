@@ -162,7 +162,7 @@ class TrajectoryFollower:
         ]
 
     def columns(self, names: Sequence[str]) -> list[int | None]:
-        """Return the index in ``names`` of each of the controller's joints, or None for a joint that is missing there.
+        """Return the index in ``names`` of each of the controller's joints, or None for a joint that ``names`` lacks.
 
         Raise JointsError if ``names`` has unknown or duplicate names, or too few.
         """

@@ -30,7 +30,7 @@ class TransmissionMap:
     joints: Sequence[str] = ()
 
     def __init__(self, motion: _Matrix, effort: _Matrix, offsets: Sequence[float]) -> None:
-        """Set the matrices that convert actuator velocities and efforts to joint ones, and the joints' zero positions."""
+        """Set the joints' zero positions, and the matrices that convert velocities and efforts from actuators to joints."""
         self._motion, self._effort, self._offsets = motion, effort, tuple(offsets)
         self._inverse_motion, self._inverse_effort = _inverse(motion), _inverse(effort)
 

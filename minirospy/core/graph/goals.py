@@ -64,7 +64,7 @@ class SimpleState(IntEnum):
 
 
 class GoalEvent(Enum):
-    """A server's action on a goal, or a request for one. The value describes the new state, for use in messages."""
+    """An event that changes a goal's state. The value describes the new state, for use in messages."""
 
     ACCEPT = "an active state"
     CANCEL_REQUEST = "a cancel requested state"

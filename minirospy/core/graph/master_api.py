@@ -50,7 +50,7 @@ _FEW = 200  # maximum number of nodes to notify in one step
 
 _ROWS = 500  # maximum number of table rows to collect in one step
 
-PARAMETERS = ""  # represents the parameters in :meth:`MasterApi.defer`; no topic has this name
+PARAMETERS = ""  # passed to :meth:`MasterApi.defer` in place of a topic; no topic has this name
 
 # A notification from the master to a node after a change.
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
@@ -129,7 +129,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notifications about a topic or PARAMETERS to a node that is receiving a response about it."""
+        """Delay notifications to a node about ``topic`` (or PARAMETERS) while it receives a response about the same one."""
 
     @abstractmethod
     def stop(self) -> None:

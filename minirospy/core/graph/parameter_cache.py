@@ -36,11 +36,11 @@ class ParameterCache:
         return self._changes
 
     def get(self, key: str) -> object:
-        """Return the value stored for ``key``. Raise LookupError if there is none, or if it has changed since."""
+        """Return the value stored for ``key``. Raise LookupError if none was stored, or if a change has invalidated the value."""
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:
-        """Store the value that the master returned, unless it has changed since the query."""
+        """Store the value that the master returned, unless any parameter has changed since ``changes`` was read."""
         if changes == self._changes:
             self._values[key] = value
 

@@ -19,7 +19,7 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-# Maximum nesting of namespaces and dictionaries. With the response around them, they must fit into XML-RPC's 64 levels
+# Maximum nesting of namespaces and dictionaries. Together with a response's own elements, XML-RPC allows 64 levels
 _MAX_DEPTH = 56
 
 _MAX_INT = 2**31

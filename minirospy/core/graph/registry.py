@@ -120,7 +120,7 @@ class Registry:
         return Registered(list(subscribers.values()), chain(actions, self._updates(topic)))
 
     def unregister_publisher(self, node: str, topic: str, uri: str) -> Iterable[Action] | None:
-        """Unregister ``node`` as a publisher of ``topic``. Return None if it was not registered from ``uri``."""
+        """Unregister ``node`` as a publisher of ``topic``. Return None if ``node`` was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
         self._drop(self._publishers, topic, node, PUBLISHES)
@@ -206,7 +206,7 @@ class Registry:
 
     @property
     def is_crowded(self) -> bool:
-        """Return whether the only memory left is that reserved for nodes with few registrations."""
+        """Return whether all memory is in use, except the part reserved for nodes with few registrations."""
         return self.shares.total > self.shares.shared * 7 // 8
 
     def node_uri(self, node: str) -> str | None:
@@ -330,7 +330,7 @@ class Registry:
         return chain((shutdown,), self._updates(*published))
 
     def _cost_of_text(self, name: str, kind: int, text: str) -> int:
-        """Return the number of bytes for a type or service URI, minus those of the one that it replaces."""
+        """Return how many more bytes a type or service URI uses than the string that it replaces."""
         if kind == SERVES:
             service = self._services.get(name)
             return text_cost(text) - (text_cost(service.uri) if service else 0)

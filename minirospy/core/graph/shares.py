@@ -31,7 +31,7 @@ class Shares:
         self.most = most
         self.largest = largest
         self.small = small
-        self.shared = most - reserve  # limit for the total of all holders that exceed ``small``
+        self.shared = most - reserve  # a holder may exceed ``small`` only if the total stays within this
         self._held: dict[str, int] = {}
 
     def excess(self, holder: str, more: int) -> Excess | None:

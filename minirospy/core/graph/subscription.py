@@ -13,7 +13,7 @@ __all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
 MAX_PUBLISHERS = 1000  # maximum publishers of one topic that a node connects to
 
-# Number of new publishers to connect to as a group, and seconds between groups, so that refusals do not all arrive together
+# Size of the groups in which to connect to new publishers, and seconds between groups, to spread out any refusals
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
 FIRST_DELAY = 0.1

@@ -78,7 +78,7 @@ Layout = tuple[Item, ...]
 
 
 class Transcoder(NamedTuple):
-    """Functions that convert bytes in either direction. Both raise DeserializationError on bytes that end too early.
+    """Functions that convert bytes in either direction. Both raise DeserializationError if the bytes are truncated.
 
     ``to_cdr(data, header)``: ``header`` is like CDR_HEADER, possibly with options set.
     """
@@ -214,7 +214,7 @@ def block_of(layout: Layout) -> Block | None:
 
 
 def _least_size(layout: Layout, absent: Side) -> int:
-    """Return the minimum size of a layout, without padding, in the message that lacks the items of the side ``absent``."""
+    """Return a layout's minimum size, without padding, in a message of the type that lacks the items marked ``absent``."""
     size = 0
     for item in layout:
         if item.side is absent:

@@ -19,7 +19,7 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-_SPARE = 10_000  # maximum number of elements without bytes, in addition to one per byte of the message
+_SPARE = 10_000  # maximum number of zero-size elements, in addition to one per byte of the message
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 
@@ -218,7 +218,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the source of the call that packs values. Read a nested message only once if several values are in it."""
+        """Return source code that packs values. If it packs several fields of a nested message, it looks up that message once."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -247,7 +247,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return the name of the variable with a field's value, converted to the object whose length is written."""
+        """Generate code that converts a field's value for writing, before its length; return the name of the variable for it."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])

@@ -51,7 +51,7 @@ def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
-    """Return all types that a message uses, each one once and before the types that it uses itself."""
+    """Return all types that a message uses, directly or in nested messages. Each type is listed once, depth first."""
     found: dict[str, None] = {}
 
     def visit(current: MessageSpec) -> None:

@@ -124,7 +124,7 @@ def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
 
 
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
-    """Generate the source of a message's class. The globals must contain the classes of its fields.
+    """Generate the source of a message's class. Its globals must contain the classes of the message's fields.
 
     Raise DefinitionError if a name is not legal in Python.
     """
@@ -146,7 +146,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Generate the ``__init__`` of a msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
+    """Generate the ``__init__`` of a msg or srv folder. Module ``_Name`` defines a class ``Name`` + suffix for each of ``parts``.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError if a name is not legal in Python.
     """
@@ -384,7 +384,7 @@ class _Module:
 
 
 def _is_even(letters: str) -> bool:
-    """Return whether these format characters all have 8 bytes, so that ``struct`` adds no padding, and include a float.
+    """Return whether all these format characters stand for 8 bytes, so that ``struct`` adds no padding, and include a float.
 
     Return False for 32-bit floats, because in native byte order a value that is too large would become infinity instead of
     raising OverflowError.

@@ -50,7 +50,7 @@ _SEPARATOR = "=" * 80
 
 
 class Catalogue:
-    """The definitions in some packages, given as a dict from package name to folder. Each spec is parsed once.
+    """The definitions in ``packages``, a dict from package name to folder. Specs are parsed on first use and cached.
 
     A package's definitions are the files in its folders msg, srv and action, or, if ``definitions`` contains the package,
     only the files listed there.
@@ -159,7 +159,7 @@ class Catalogue:
         raise NotFoundError("message type", full_name, [f"{package}/{other}" for other in files])
 
     def _packages_with(self, name: str) -> list[str]:
-        """Return the packages that define a message of this name, those of ROS itself first."""
+        """Return the packages that define a message of this name, with ROS's own packages first."""
         from minirospy.core.idl.own_packages import COMPILED_AHEAD
 
         found = [package for package in self.packages if name in self.files(package, "msg")]
@@ -242,7 +242,7 @@ def top_module(package: str, files: Iterable[str]) -> str:
 
 
 def _is_generated(file: Path) -> bool:
-    """Return whether the file may be generated: it does not exist, or an earlier build has generated it."""
+    """Return whether a build may write the file: it does not exist, or an earlier build has generated it."""
     from minirospy.core.idl.emit import GENERATED
 
     return not file.exists() or GENERATED in file.read_text(encoding="utf-8").partition("\n")[0]

@@ -132,7 +132,7 @@ class Message:
         return self._slot_types
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field.
+        """Raise SerializationError for the first invalid field. If all are valid, report ``exc``, the error in writing, if given.
 
         As in genpy, which does not convert struct's errors, a number that exceeds a float32 raises OverflowError.
         """
@@ -201,7 +201,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            # Accept a class from another generator or another text: its serialized bytes are the same.
+            # Accept a class with the same md5sum from another generator or definition file: its serialized bytes are the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")
@@ -237,7 +237,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
 
 
 def get_printable_message_args(msg: protocols.Message, buff: TextIO | None = None, prefix: str = "") -> str:
-    """Return the names of a message's fields in order, nested ones with dots. If ``buff`` is given, also write them to it."""
+    """Return the names of a message's fields in order, nested fields as ``a.b``. If ``buff`` is given, also write them to it."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
@@ -378,7 +378,7 @@ _Check = Callable[[str, str, object], None]
 
 
 def _check_field(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
-    """Raise SerializationError unless ``checks`` accept a value for its field, including nested fields."""
+    """Raise SerializationError if a field's value, or a value nested in it, fails the check for its type in ``checks``."""
     if type_.endswith("]"):
         _check_array(name, type_.removesuffix("]"), value, checks)
     elif type_ in checks:
@@ -503,7 +503,7 @@ def _items_of_array(name: str, type_: str, value: object, checks: Mapping[str, _
     if len(shape) < 2:
         return cast("Iterable[object]", value)
     length = type_.partition("[")[2]
-    # Serializing counts the rows first, so a column of the right length fails there: each row is taken as a number.
+    # serialize() takes each row for a number. It therefore fails if the number of rows is the array's length.
     is_refused = checks is _CHECKS and length == str(shape[0])
     if length and (is_refused or length != str(math.prod(shape))):
         hint = ": use reshape(-1)" if is_refused and length == str(math.prod(shape)) else ""

@@ -64,7 +64,7 @@ class Source:
         """Return the name of a message's class, which is unique within the module."""
         if full_name not in self.classes:
             name = "_" + full_name.replace("/", "_")
-            # Without this check, a/b_C and a_b/C would get the same name, and struct/I that of a compiled struct.
+            # Without this check, a/b_C and a_b/C would get the same name, and struct/I the name of a compiled struct.
             while name in self.classes.values() or (name.startswith("_struct_") and name[-1] != "_"):
                 name += "_"
             self.classes[full_name] = name

@@ -17,7 +17,7 @@ _TYPES = {"bool": "bool", "float32": "float", "float64": "float", "string": "str
 
 
 def emit_stub(messages: Sequence[MessageSpec], services: Sequence[ServiceSpec] = ()) -> str:
-    """Generate the stub for a package's msg or srv folder. ``emit`` must have checked its names."""
+    """Generate the stub for a package's msg or srv folder. The module ``emit`` must have checked the names in it."""
     stub = _Stub(messages, has_services=bool(services))
     for message in messages:
         stub.message(message)

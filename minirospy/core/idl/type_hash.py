@@ -63,7 +63,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
 
 
 def _described(text: str) -> tuple[int, int, str]:
-    """Return a field's type as (type number, maximum number of elements, message name); the name is "" for other types."""
+    """Return a field's type as (type number, maximum number of elements, message name); the name is "" if it is no message."""
     added, capacity, base = 0, 0, text
     if text.startswith("sequence<"):
         base, _, bound = text[len("sequence<") : -1].partition(",")

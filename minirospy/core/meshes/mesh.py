@@ -13,7 +13,7 @@ from minirospy.core.sdf.model import Color, Vector
 
 __all__ = ["MAX_TRIANGLES", "Mesh", "MeshMaterial"]
 
-MAX_TRIANGLES = 2_000_000  # maximum per file; larger arrays and the data derived from them exceed a gigabyte
+MAX_TRIANGLES = 2_000_000  # maximum triangles per file; with more, the arrays and the data derived from them exceed a gigabyte
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollo
 MAX_HULLS = 32  # maximum hulls for a moving mesh; a mesh with more parts gets a single hull
 # Maximum flat patches in a static mesh; a mesh with more is simplified, because worlds have many small, fine meshes.
 MAX_PRISMS = 1500
-MIN_PRISMS = 100  # minimum of the limit on a mesh's flat patches
+MIN_PRISMS = 100  # the limit on a mesh's flat patches is at least this number
 PRISMS_PER_METER = 200  # limit on a mesh's flat patches, per metre of its longest side
 MAX_CONVEX = 5000  # maximum triangles in a part that is tested for convexity; more would take seconds
 MAX_RAYS = 200  # maximum rays, cast from the largest triangles to detect a hollow mesh

@@ -14,7 +14,7 @@ __all__ = ["polyline_mesh", "terrain"]
 
 MAX_POINTS = 2000  # maximum points per polyline; triangulation takes quadratic time
 MIN_EAR = 1e-12  # m^2
-NO_ELEVATION = -12_000.0  # m, below the deepest sea; lower values mark missing data
+NO_ELEVATION = -12_000.0  # m; deeper than any sea, so lower values mark missing data
 MAX_TERRAIN = 2049  # maximum pixels per side: four million cells
 
 

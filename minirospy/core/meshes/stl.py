@@ -9,7 +9,7 @@ from minirospy.core.meshes.mesh import MAX_TRIANGLES, Mesh
 
 __all__ = ["parse_stl"]
 
-HEADER = 84  # header size in bytes: a text, then the number of triangles
+HEADER = 84  # bytes before the triangles: an 80-byte comment and the 4-byte number of triangles
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 

@@ -57,7 +57,7 @@ def open_include(element: Element, source: Source) -> Included | None:
 
 
 def sdf_version(root: Element) -> tuple[int, int]:
-    """Return a document's version. Without a version, or with another root element, it counts as the newest."""
+    """Return a document's SDF version; the newest if it states none or its root is neither ``<sdf>`` nor ``<gazebo>``."""
     match = re.match(r"\s*(\d+)\.(\d+)", root.attributes.get("version", ""))
     if match is None or root.tag not in ("sdf", "gazebo"):
         return (1, 7)

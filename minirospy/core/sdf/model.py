@@ -58,7 +58,7 @@ class Pose(NamedTuple):
 
 
 IDENTITY = Pose()
-MIN_STEP = 1e-9  # s, because time is counted in whole nanoseconds
+MIN_STEP = 1e-9  # s; shorter steps are impossible, because time is counted in whole nanoseconds
 
 
 class Box(NamedTuple):

@@ -74,14 +74,14 @@ def unit(vector: Vector) -> Vector | None:
 
 
 def transform(pose: Pose, point: Vector) -> Vector:
-    """Return a point, given in the pose's frame, in the parent's frame."""
+    """Convert a point from the pose's frame to the parent's frame."""
     x, y, z = rotate(pose.orientation, point)
     px, py, pz = pose.position
     return px + x, py + y, pz + z
 
 
 def compose(parent: Pose, child: Pose) -> Pose:
-    """Return the pose of ``child``, which is relative to ``parent``, in the frame to which ``parent`` is relative."""
+    """Convert the pose ``child`` from the frame at ``parent`` to the frame in which ``parent`` is given."""
     return Pose(
         transform(parent, child.position), normalized(multiply(parent.orientation, child.orientation))
     )
@@ -96,5 +96,5 @@ def inverse(pose: Pose) -> Pose:
 
 
 def relative(base: Pose, pose: Pose) -> Pose:
-    """Return ``pose`` in the frame of ``base``; both have the same parent."""
+    """Convert ``pose`` to the frame at ``base``; both are given in the same frame."""
     return compose(inverse(base), pose)

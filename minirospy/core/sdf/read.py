@@ -25,7 +25,7 @@ _OLDEST = (1, 4)
 def parse_urdf(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "robot_description", name: str = ""
 ) -> Model:
-    """Return the model of a robot description; ``name`` replaces the robot's. Raise SdfError if it is unusable."""
+    """Return the model of a robot description; ``name`` replaces the robot's name. Raise SdfError if it is unusable."""
     source = new_source(file, resolve)
     return read_urdf(parse_document(text, file, source.warnings), source, name)
 
@@ -33,7 +33,7 @@ def parse_urdf(
 def parse_model(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "model", name: str = ""
 ) -> Model:
-    """Return the first model in SDF or URDF text; ``name`` replaces its own. Raise SdfError if none is usable."""
+    """Return the first model in SDF or URDF text; ``name`` replaces the model's name. Raise SdfError if none is usable."""
     source = new_source(file, resolve)
     root = parse_document(text, file, source.warnings)
     if root.tag == "robot":
@@ -55,7 +55,7 @@ def parse_model(
 def parse_world(
     text: str | bytes, resolve: Resolve = no_files, *, file: str = "world", max_parts: int = MAX_PARTS
 ) -> World:
-    """Return the first world in SDF text or, if it has none, a world with its models and lights.
+    """Return the first world in SDF text. If there is none, return a world with the text's models and lights.
 
     Models that are unusable, or exceed ``max_parts`` links, joints and models, are skipped, and named in ``warnings``. Raise
     SdfError if the text is not SDF.

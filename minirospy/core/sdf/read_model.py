@@ -131,7 +131,7 @@ class _Reader:
             raise source.error(element, f"model [{self.name}] has no links")
         return Model(self.name, links, joints, IDENTITY, is_static, self_collide, plugins)
 
-    # ---- what there is
+    # ---- names, parts and included models
 
     def _own_static(self) -> bool | None:
         """Return the first ``<static>`` of the model and the models that it includes, or None if there is none.

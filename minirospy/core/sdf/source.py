@@ -21,7 +21,7 @@ Resolve = Callable[[str], "str | None"]
 URIs start with ``model://``, ``package://`` or ``file://``.
 """
 
-MAX_FILE_BYTES = 64 * 1024 * 1024  # the largest worlds of Gazebo's users have 10 MB
+MAX_FILE_BYTES = 64 * 1024 * 1024  # Gazebo users' largest worlds have about 10 MB
 MAX_INCLUDES = 16  # maximum nesting of files and models; a greater depth is a mistake or an attack
 MAX_WARNINGS = 200  # maximum warnings per model or world; nobody reads more
 MAX_PARTS = 20_000  # maximum links, joints and models per world or spawn request

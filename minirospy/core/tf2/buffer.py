@@ -227,7 +227,7 @@ class TransformBuffer(FrameTree):
         return _Walk(time, from_source, from_target)
 
     def _common_time(self, target: Frame, source: Frame) -> int:
-        """Return the newest time at which every frame between the two has data; static frames have data at any time.
+        """Return the newest time at which every frame between source and target has data; static frames have data at any time.
 
         Raise ConnectivityException if the frames are not connected, LookupException if the transforms form a loop.
         """
@@ -284,7 +284,7 @@ class TransformBuffer(FrameTree):
     def _path(self, target: str, source: str, time: int) -> list[str]:
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         if target_frame is source_frame:
-            # Two equal names mean the same frame, even if it does not exist.
+            # The frames are the same, or both are unknown (None).
             return []
         if target_frame is None or source_frame is None:
             if time == 0:

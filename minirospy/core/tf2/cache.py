@@ -38,7 +38,7 @@ class Frame:
         self.name = name
         self.cache: TimeCache | StaticCache | None = None
         self.authority = ""
-        # number of lazy messages that had arrived when this frame's messages were last decoded
+        # number of messages that had arrived when this frame's messages were last decoded
         self.settled = 0
 
 

@@ -11,7 +11,7 @@ from minirospy.core.tf2.cache import Frame, StaticCache, TimeCache, seconds
 
 __all__ = ["escaped_name", "frames_as_dot", "frames_as_yaml"]
 
-_MIN_SPAN = 0.0001  # seconds; a single sample counts as having this time span when a rate is computed
+_MIN_SPAN = 0.0001  # seconds; the time span assumed for a single sample when a rate is computed
 
 
 def frames_as_yaml(buffer: TransformBuffer) -> str:

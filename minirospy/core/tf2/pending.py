@@ -142,7 +142,7 @@ class Layouts:
     """All known layouts, looked up by a message's bytes."""
 
     def __init__(self) -> None:
-        # For messages with one transform: the layout, keyed by the contiguous bytes of the names
+        # For messages with one transform: dict from the bytes that contain both frame names to the layout
         self._single: dict[bytes, Layout] = {}
         # Dict from message length to (mask of the constant bytes, their value, layout)
         self._several: dict[int, list[tuple[int, int, Layout]]] = {}

@@ -113,7 +113,7 @@ class Collision(NamedTuple):
 
 
 class Inertial(NamedTuple):
-    """A link's mass, and its inertia about its centre: ixx, ixy, ixz, iyy, iyz, izz."""
+    """A link's mass, and its inertia about the centre of mass: ixx, ixy, ixz, iyy, iyz, izz."""
 
     mass: float
     inertia: tuple[float, float, float, float, float, float]

@@ -271,7 +271,7 @@ class HttpReader:
             yield from self._more()
         if len(self._buffer) > 2 * count:
             return self._take(count)
-        # Copy the shorter part instead of the longer one.
+        # Most of the buffer belongs to the body: copy the rest out of the buffer, and return the buffer itself.
         rest = self._buffer[count:]
         del self._buffer[count:]
         whole, self._buffer = self._buffer, rest

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 __all__ = ["LargeMessages", "parse_large_messages"]
 
-# The end of a connection's text in getBusInfo; it comes from another process, so its length and its characters are limited
+# Matches a suffix of a connection's description in getBusInfo. Limits length and characters, as the peer wrote the text
 _LARGE_MESSAGES = r"; (\d{1,18}) of (\d{1,18}) large messages by shared memory(?:: ([ -~]{1,200}))?\Z"
 
 
@@ -23,13 +23,13 @@ class LargeMessages(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The end of a connection's text in getBusInfo; :func:`parse_large_messages` reads it."""
+        """The suffix for a connection's description in getBusInfo; :func:`parse_large_messages` reads it."""
         return f"; {self.shared} of {self.all} large messages by shared memory" + (
             f": {self.why}" if self.why else ""
         )
 
 
 def parse_large_messages(info: str) -> LargeMessages | None:
-    """Parse the end of a connection's text in getBusInfo. Return None if it does not mention large messages."""
+    """Parse the suffix of a connection's description in getBusInfo. Return None if it does not mention large messages."""
     match = re.search(_LARGE_MESSAGES, info)
     return LargeMessages(int(match[1]), int(match[2]), match[3] or "") if match else None

@@ -56,13 +56,13 @@ REFUSED = b"n"  # answer to OFFER_WORD: the subscriber cannot map the ring
 MIN_MESSAGE = 1_000_000
 
 MAX_RING = 64 * 1024 * 1024  # maximum bytes per topic; enough for two 4K images (25 MB each)
-MAX_PLACES = 16  # maximum per ring; enough for a few subscribers, and few enough for the processor's cache
-MIN_PLACES = 2  # one place for writing while a subscriber reads another
+MAX_PLACES = 16  # maximum places per ring; enough for a few subscribers, but fits the processor's cache
+MIN_PLACES = 2  # minimum places per ring: one to write to while a subscriber reads the other
 PAGE = 64 * 1024  # bytes; the largest page size of common Linux machines, so that no two places share a page
 MAX_MESSAGE = MAX_RING // MIN_PLACES  # maximum bytes of a message that is sent through a ring
 
 # Maximum bytes of messages that one subscriber may hold at a time; a Unix socket buffers at most this much.
-# Beyond this, messages for a slow subscriber wait in the publisher's queue, where its drop rule applies.
+# Beyond this, messages for a slow subscriber wait in the publisher's queue, where the oldest may be dropped.
 MAX_HELD = 4 * 1024 * 1024
 ALWAYS_HELD = 2  # places that a subscriber may hold regardless of size: one to read, one waiting
 
@@ -74,7 +74,7 @@ ANNOUNCEMENT_BYTES = _ANNOUNCEMENT.size - _WORD.size  # bytes that follow PLACE_
 
 
 class Announcement(NamedTuple):
-    """A message's location in the ring: its offset, its size, and the size of its trailing byte array (0: not split)."""
+    """A message's location in the ring. ``tail`` is the size of the byte array at its end, or 0 if it is sent in one part."""
 
     offset: int
     size: int

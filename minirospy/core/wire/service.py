@@ -55,7 +55,7 @@ def parse_request_head(head: bytes) -> int:
 
 
 def parse_response_head(head: bytes) -> tuple[bool, int]:
-    """Return whether the call succeeded, and the length of the rest. Raise WireError if it exceeds the limit."""
+    """Return whether the call succeeded, and the length of what follows. Raise WireError if the length exceeds the limit."""
     ok, length = _OK_LENGTH.unpack(head)
     if length > MAX_FRAME:
         raise _too_long(length)

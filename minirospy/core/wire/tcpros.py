@@ -89,7 +89,7 @@ def publisher_header(
 
 
 def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | None:
-    """Return the reason why a publisher of ``type_`` refuses a subscriber that sent these fields, or None if it accepts it."""
+    """Return why a publisher of ``type_`` refuses a subscriber that sent these fields, or None if the subscriber is accepted."""
     for name in ("md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
@@ -157,7 +157,7 @@ def service_header(
 
 
 def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
-    """Return the reason why a service of ``type_`` refuses a client that sent these fields, or None if it accepts it."""
+    """Return why a service of ``type_`` refuses a client that sent these fields, or None if the client is accepted."""
     for name in ("service", "md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"

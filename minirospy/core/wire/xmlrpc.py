@@ -45,7 +45,7 @@ class Call(NamedTuple):
 
 
 class Serialized:
-    """A response that is already XML. It is in pieces, because joining those of a long response takes time."""
+    """A response that is already XML. It is kept in pieces, because joining the pieces of a long response takes time."""
 
     __slots__ = ("pieces",)
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 __all__ = ["read_plain"]
 
 _MAX_TAGS = 2_000_000
-# Maximum number of open elements. Below the parser's nesting limit; deeper documents are left to the parser
+# Maximum number of open elements, below the XML parser's nesting limit. Deeper documents are left to that parser
 _MAX_OPEN = 60
 
 _SPACE = r"[ \t\r\n]*"
@@ -54,7 +54,7 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
     Raise ValueError if a number is invalid.
     """
     if tokens and tokens[-1][4] not in {"", "</param>"}:
-        # Any unexpected part of the document becomes the last token.
+        # The last token is the part of the document, if any, that starts at the first unexpected text.
         return None
 
     params: list[object] = []

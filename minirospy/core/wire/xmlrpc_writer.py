@@ -216,7 +216,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
 
 
 def _writer_of_kin(value: object) -> _Writer:
-    """Return the writer for a subclass of a known type, a date, a wrapper of xmlrpc.client, or numpy's numbers and arrays."""
+    """Return the writer for a subclass of a known type, a date, an xmlrpc.client wrapper class, or a numpy number or array."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):
             return writer
