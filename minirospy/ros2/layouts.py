@@ -139,7 +139,7 @@ class _Pairing:
         for skipped in ros2.fields[place:]:
             items += self._alone(skipped.type, Side.ROS2, around)
         if not ros2.fields:
-            # rosidl adds a member to empty structs, which CDR does not allow.
+            # CDR does not allow empty structs, so rosidl adds a member to them.
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)

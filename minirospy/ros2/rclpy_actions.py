@@ -237,7 +237,7 @@ class ActionClient:
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The goal ID has 16 bytes, so the data that follows stays aligned after its removal.
+        # The goal ID has 16 bytes, so removing it keeps the data that follows aligned.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
@@ -265,7 +265,7 @@ def _uuid_message(id: bytes) -> object:
 
 
 def _client_class() -> Callable[..., _RclpyActionClient]:
-    """Return rclpy's action client class, extended by a lock as a class attribute.
+    """Return a subclass of rclpy's action client that has a lock as a class attribute.
 
     rclpy's constructor adds the client to the executor before it creates the lock, and the executor's thread would fail
     without the lock.

@@ -197,7 +197,7 @@ class Calls:
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return a probe for the nodes of a service, or None if one is unknown or offers no parameter services.
+        """Return a probe for the nodes that offer a service, or None if a node is unknown or offers no parameter services.
 
         May be called from any thread.
         """
@@ -225,7 +225,7 @@ class Calls:
         self.executor.create_task(destroy)
 
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
-        """Await a future of another thread in a coroutine of the executor; return its result.
+        """Wait, in a coroutine of the executor, for a future that another thread completes; return its result.
 
         If ``after_tasks``, return it only after the tasks that the other thread has already submitted to the executor.
         """

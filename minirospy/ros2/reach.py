@@ -24,7 +24,7 @@ _LOOK_SECONDS = 0.02
 AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait if the servers cannot be probed
 MAX_SECONDS = 10.0
-"""Maximum seconds to wait for responses to a probe; after that, requests are sent without them."""
+"""Maximum seconds to wait for responses to a probe; after that, requests are sent anyway."""
 
 
 class Reach:

@@ -45,7 +45,7 @@ def service_links(
     ros2: Mapping[str, str],
     partner: Callable[[str, Direction], str],
 ) -> list[ServiceLink]:
-    """Return the services to bridge: those that only one side offers, ignoring those that bridges offer.
+    """Return the services to bridge: those with a server on only one side, not counting servers of bridges.
 
     ``ros1`` maps services to their nodes, ``ros1_types`` to their types if known. ``ros2`` maps services to their types.
     ``partner(type, direction)`` returns the type on the calling side.

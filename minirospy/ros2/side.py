@@ -39,7 +39,7 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Maximum number of messages to read per executor callback, which costs more than reading a message."""
+"""Maximum number of messages to read per executor callback; a callback costs more time than reading a message."""
 
 
 # --- interfaces of the parts of rclpy that are used (untyped, because rclpy may not be installed)
@@ -386,7 +386,7 @@ class TopicSubscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message and those queued behind it: the executor is slow, because it delivers one per iteration."""
+        """Deliver a message and those queued behind it, because the executor delivers only one per iteration, which is slow."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:

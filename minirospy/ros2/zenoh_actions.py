@@ -159,7 +159,7 @@ class ZenohActionClient:
 
     @property
     def is_ready(self) -> bool:
-        """Return whether there is a server with all its endpoints."""
+        """Return whether all endpoints of a server are known."""
         publishers = self._graph.of_name(self._ends.feedback.name, Kind.PUBLISHER)
         clients = (self._send_goal, self._get_result, self._cancel_goal)
         return bool(publishers) and all(each.is_ready for each in clients)

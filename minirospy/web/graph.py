@@ -376,11 +376,11 @@ class SharedGraph:
         self._check_after = now + CHECK_SECONDS
         self._unchecked = [key for key in self._unchecked if key in wanted] or [*wanted]
         if self._unchecked:
-            # Check the service last in the master's list first, because the list reveals changes of all others.
+            # The master moves a service that is offered again to the end of its list. The last one cannot move: check it first.
             self._service_types.refresh(self._unchecked.pop())
 
     def check_service(self, service: str) -> None:
-        """Query the type of a service again, because a call has shown that it changed."""
+        """Query a service's type again, because a call has shown that the type has changed."""
         self._service_types.refresh((service, self.snapshot.services.get(service, ())))
 
     async def _service_type(self, key: ServiceKey) -> ServiceInfo:
@@ -432,7 +432,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def subscribed_own(self, topic: str) -> None:
-        """Delay messages of this node's publisher until this node's own, new subscription is connected."""
+        """Hold back this node's messages on a topic until this node's own, new subscription to the topic is connected."""
         shared = self.publishers.get(topic)
         if shared:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))
@@ -451,7 +451,7 @@ class SharedGraph:
             await own.wait_for_publisher(self.node.name)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Record that a client has stopped publishing a topic. Unadvertise the topic if it was the last one."""
+        """Record that a client has stopped publishing a topic. Unadvertise the topic if that was its last client."""
         shared.clients -= 1
         if not shared.clients and self.publishers.get(topic) is shared:
             del self.publishers[topic]

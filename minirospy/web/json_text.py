@@ -25,11 +25,11 @@ __all__ = [
 ]
 
 _MAX_VALUES = 4_000_000  # maximum number of values in a JSON string; if they are numbers, they take 160 MB
-# maximum number of strings in a JSON string, including field names, which take 150 MB
+# maximum number of strings, including field names, in a JSON string; they take 150 MB
 _MAX_STRINGS = 2_000_000
-# maximum number of lists and objects in a JSON string, which take 100 to 240 MB
+# maximum number of lists and objects in a JSON string; they take 100 to 240 MB
 _MAX_COLLECTIONS = 1_000_000
-# maximum length of any JSON string parsed on the event loop, which takes at most 2 ms
+# maximum length of any JSON string parsed on the event loop; parsing it takes at most 2 ms
 MAX_QUICK_CHARACTERS = 64 * 1024
 # maximum length of a JSON string with few values, such as a base64 image, parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024

@@ -50,7 +50,7 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state recovered from a killed master's journal. ``age``: seconds since its last write.
+    """The state recovered from a killed master's journal. ``age``: seconds since the journal was last written.
 
     ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
     """
@@ -94,7 +94,7 @@ class Journal:
         # During an incremental rewrite: the records appended since it started, and the new file's descriptor.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Number of incremental rewrites finished or abandoned; a rewrite that sees it change has been abandoned.
+        # Number of finished or abandoned incremental rewrites. If it changes during a rewrite, that rewrite was abandoned.
         self._rewrites = 0
 
     @property

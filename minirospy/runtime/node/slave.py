@@ -213,7 +213,7 @@ class SlaveApi:
         return [SUCCESS, "shutdown", 0]
 
     def _large_messages(self, link: OutLink) -> str:
-        """Return the end of a connection's text: how its large messages are sent, or "" if there were none."""
+        """Return the last part of a connection's description: how its large messages are sent, or "" if there were none."""
         if not link.large:
             return ""
         chosen = self._node.environment.transport

@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a master that has lost its state
 
-# Number of failures before a publisher that refuses connections is reported; one that is shutting down is gone by then
+# Number of failed connections before a publisher is reported; a publisher that is shutting down is gone by then
 _WARN_AFTER = 3
 
 # maximum number of log lines about publishers that send invalid responses; further ones are only counted
@@ -51,7 +51,7 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options to deliver a subscription's messages of up to ``most`` bytes in steps on the loop. ``start`` runs the steps.
+    """Options for delivering a subscription's messages of up to ``most`` bytes in steps on the loop. ``start`` runs the steps.
 
     A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """

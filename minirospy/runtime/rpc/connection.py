@@ -48,7 +48,7 @@ _SHORT_BODY = 4096  # maximum bytes of a short body; a longer one is read in ste
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (
-    # transferred bytes after which the time limit starts again, because a large value takes long on a slow radio link
+    # transferred bytes after which the time limit starts again: a large value takes a long time on a slow radio link
     65536
 )
 

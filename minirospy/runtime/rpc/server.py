@@ -57,10 +57,10 @@ Thousands of clients may connect together; the server accepts all of them, 30 us
 
 _ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from them
 
-# Number of connections to read before accepting new ones, which takes about 1 ms; thousands may be readable together
+# Number of connections to read before accepting new ones, about 1 ms of work; thousands may be readable together
 _READS_AT_ONCE = 16
 
-# Maximum number of connections to read per loop iteration, and the maximum seconds; the rest are read first in the next one
+# Maximum connections to read per loop iteration, and maximum seconds for it; the next iteration reads the rest first
 _MAX_READS, _READS_SECONDS = 256, 0.01
 
 

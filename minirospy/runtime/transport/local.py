@@ -64,7 +64,7 @@ def connect(name: str) -> socket.socket:
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """Connect to the server at ``host`` and ``port``; return a non-blocking socket, or None if only TCP reaches it.
+    """Connect to the Unix socket of the server at ``host`` and ``port``; return it in non-blocking mode, or None if this fails.
 
     Another user on this machine could bind the name first, so the server must belong to this user or root.
     """

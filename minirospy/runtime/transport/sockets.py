@@ -68,7 +68,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def enlarge_send_buffer(sock: socket.socket) -> None:
-    """Let a Unix socket buffer several megabytes, or as much as the kernel allows. TCP enlarges its own buffers.
+    """Enlarge a Unix socket's send buffer to several megabytes, or as far as the kernel allows. TCP enlarges its own buffers.
 
     Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process in between.
     """

@@ -18,12 +18,12 @@ __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
 _MAX_COLUMNS = 5_000  # maximum number of columns: with MAX_SERIES series, 2,000,000 points
 _MAX_SERIES = 100  # maximum number of paths per request
-_MARGIN_SECONDS = 10.0  # seconds read before a range, to find a point of the subtrahend before the minuend's
-_WIDER = 4  # factor by which the margin grows while the subtrahend has no point in it
+_MARGIN_SECONDS = 10.0  # seconds to read before a range, for an earlier point of the subtrahend
+_WIDER = 4  # factor by which this margin grows until it contains a point of the subtrahend
 
 
 class Operand(NamedTuple):
-    """A path in a bag, which is named as on the page."""
+    """A path in a bag; ``bag`` is the bag's name on the page."""
 
     bag: str
     path: str
