@@ -47,7 +47,7 @@ Above this limit, only the newest message per topic is queued.
 
 CHECK_SECONDS = 2.0  # seconds between checks of known services' types; each check takes one connection
 _QUERY_SECONDS = 2.0
-"""Timeout in seconds for querying service types, after which the graph is reported without the unknown ones."""
+"""Timeout in seconds for querying service types; types that are still unknown then are missing in the reported graph."""
 
 
 @dataclass(frozen=True)

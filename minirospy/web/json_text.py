@@ -181,7 +181,7 @@ def dump_json(value: object) -> str:
 
 
 def dump_json_in_pieces(value: object) -> str:
-    """Encode JSON like :func:`dump_json`, but without holding the GIL for long. For use in a thread beside the event loop.
+    """Encode JSON like :func:`dump_json`, but without holding the GIL for long. For use in a thread other than the loop's.
 
     Dictionary keys must be strings.
     """
@@ -238,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return the cost of encoding a value, in numbers. Stop counting when it is certain that the value is large."""
+    """Return the cost of encoding a value; a number costs 1. Stop counting once the value is certain to be large."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

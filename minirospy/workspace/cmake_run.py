@@ -79,7 +79,7 @@ def _escaped(text: str) -> str:
 
 
 def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
-    """Replace the arguments of a macro in its commands as text, as CMake does before it expands variables."""
+    """Substitute a macro's arguments in its commands as text, as CMake does before it expands variables."""
 
     def value(match: re.Match[str]) -> str:
         given = None if match[1] else values.get(match[2])

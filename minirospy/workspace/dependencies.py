@@ -120,7 +120,7 @@ class Dependencies:
         return [each for each in wanted if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies in topological order, so that each follows its own.
+        """Return a package's direct and indirect dependencies in topological order: each package follows its own dependencies.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """

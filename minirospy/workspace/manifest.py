@@ -287,7 +287,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Formats 2 and 3 do not define this tag, but packages use it in them, too.
+    # Packages in formats 2 and 3 use this tag, too, although these formats do not define it.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }

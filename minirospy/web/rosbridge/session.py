@@ -253,7 +253,7 @@ class RosbridgeSession:
         except REFUSALS as error:
             self._failed(event, error)
             return None
-        # If a fragment completes an operation, this operation has its own event.
+        # If ``event`` is a fragment that completes an operation, ``pending`` already contains that operation's event.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:

@@ -96,7 +96,7 @@ class Listener:
         return self._tls is not None
 
     async def open(self, host: str, port: int) -> None:
-        """Start listening, for port 0 on any free port. Raise BridgeError if the port cannot be opened."""
+        """Start listening; port 0 means any free port. Raise BridgeError if the port cannot be opened."""
         loop = asyncio.get_running_loop()
         try:
             sock = tcp.bind(host, port)

@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients
 # seconds of work for a client before the next client's turn: with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# number of jobs for which a client is new: each is expected to take at least as long as jobs of other new clients
+# number of jobs for which a client counts as new; their expected time is at least that of other new clients' jobs
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which a client's expected time per job decays after a shorter job
 IMMEDIATE_SHARE = 0.5  # fraction of the time that work may use without being queued
@@ -70,7 +70,7 @@ class Share:
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
         self.queue = queue  # the queue that contains the client: interactive or bulk
-        # seconds used, at least the queue's tag when the client last became active
+        # seconds used; raised to at least the queue's tag whenever the client becomes active
         self.tag = queue.served
         self.weight = 1.0  # set when the client's rights are known
         # expected seconds of the client's next job, estimated from earlier ones
