@@ -394,7 +394,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # Another goal has preempted this one in ROS 1, for which ROS 2 has no status.
+            # In ROS 1, another goal has preempted this one; ROS 2 has no status for that.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

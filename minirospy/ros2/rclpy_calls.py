@@ -218,7 +218,7 @@ class Calls:
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy an object in the executor's thread, which might otherwise be about to wait on it.
+        """Destroy an object in the executor's thread: otherwise, the executor might be about to wait on the object.
 
         May be called from any thread. rclpy's executor fails if an object is destroyed while the executor builds its wait set.
         """

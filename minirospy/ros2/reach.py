@@ -116,7 +116,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # Ignore the error, because the actual requests will fail with the same one and report it.
+            # Ignore the error: the actual requests will fail with the same error, and report it.
             await asyncio.sleep(pause)
         else:
             return True

@@ -59,7 +59,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the ROS 1 type for a ROS 2 message type: as stated in a rule, or of the same name."""
+        """Return the ROS 1 type for a ROS 2 message type: the type stated in a rule, or the type of the same name."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]

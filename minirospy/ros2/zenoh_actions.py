@@ -204,7 +204,7 @@ class ZenohActionClient:
         return accepted
 
     def cancel(self, id: bytes) -> None:
-        """Ask the server to cancel a goal, whose result will show whether it was cancelled."""
+        """Ask the server to cancel a goal; the goal's result will show whether that succeeded."""
         self._cancel_goal.call(
             self._type.message("action_msgs/srv/CancelGoal_Request", {"goal_info": _info(id)})
         )
@@ -363,7 +363,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # Another goal has preempted this one in ROS 1, for which ROS 2 has no status.
+            # In ROS 1, another goal has preempted this one; ROS 2 has no status for that.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

@@ -163,11 +163,11 @@ class Publication:
 
     @property
     def has_joined(self) -> bool:
-        """Return whether the subscribers known to the master at the registration have connected."""
+        """Return whether the subscribers that the master listed when the topic was advertised have connected."""
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait, at most a second, until the subscribers known to the master when the topic was advertised have connected.
+        """Wait, for at most a second, until the subscribers that the master listed when the topic was advertised have connected.
 
         Subscribers do not receive messages published before they connect.
         """

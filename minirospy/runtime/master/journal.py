@@ -154,7 +154,7 @@ class Journal:
             # On Windows, the file may already be closed.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # Remove the incomplete new file to free space on a full disk: appending to the old file may need it.
+            # Remove the incomplete new file, because appending to the old file may need the space on a full disk.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise
@@ -255,7 +255,7 @@ class Journal:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write the records appended since the rewrite started to the new file; return the number of bytes written.
+        """Write to the new file the records appended since the rewrite started; return the number of bytes written.
 
         Raise OSError if the disk fails.
         """

@@ -49,10 +49,10 @@ _MAX_CONCURRENT_CHECKS = 100
 QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 LOCK_SECONDS = 3.0
-# Seconds between attempts to lock the journal: the system may release a killed master's port before the lock
+# Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's lock
 _LOCK_PAUSE = 0.02
 
-# maximum age of a killed master's journal at which a new master still resumes its session
+# maximum age in seconds of a killed master's journal for a new master to resume its session
 _RESTART_SECONDS = 600.0
 
 _COLLECT_SECONDS = 60.0
@@ -289,7 +289,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover the state from the journal and start writing it; return a dict from name to URI of the nodes to check."""
+        """Recover the state from the journal and start writing the journal; return the nodes to check, keyed by name."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path

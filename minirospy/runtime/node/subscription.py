@@ -157,7 +157,7 @@ class Subscription:
         self.settling: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
         self._unreachable = unreachable or Unreachable()
-        # Limit the rate, because /rosout has as many publishers as there are nodes.
+        # Limit the rate of log lines, because /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.connecting: dict[str, asyncio.Task[None]] = {}
         # Links to publishers that have left the master's list, each with the timer that closes it.

@@ -208,7 +208,7 @@ class Connection:
             return b""
 
     def readable(self) -> None:
-        """Read, unless it is other connections' turn; in that case, the loop calls this again in its next iteration."""
+        """Read. If it is other connections' turn, return without reading; the loop calls this again in its next iteration."""
         if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 

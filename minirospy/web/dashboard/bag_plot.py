@@ -161,7 +161,7 @@ def _read(
 def _start_before(
     reader: BagReader, path: FieldPath, start: float, on_time: Callable[[float], object]
 ) -> float | None:
-    """Return a time from which reading finds a point before ``start``, or None (the bag's start) if there is no such point."""
+    """Return a time such that reading from there finds a point before ``start``; None (the bag's start) if there is none."""
     margin = _MARGIN_SECONDS
     while margin < start:
         for _ in bag_series.points(reader, [path], start - margin, start, on_time):

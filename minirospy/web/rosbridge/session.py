@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 # Bytes of memory that a parsed operation takes per byte of text, if it contains objects or lists of numbers.
 _VALUE_FACTOR = 4
 
-# maximum size of a CBOR message from a read-only client, which sends only small requests: each byte may become a value
+# maximum size of a CBOR message from a read-only client: its requests are small, and each byte may become a value
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4
@@ -264,7 +264,7 @@ class RosbridgeSession:
             self._failed(pending.event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
-        # rosbridge prefixes the operation's name, except to errors that it detects itself.
+        # rosbridge prefixes errors with the operation's name, except for errors that it detects itself.
         front = "" if isinstance(error, OperationError) else f"{_OPERATIONS[type(event)]}: "
         self.status(StatusLevel.ERROR, f"{front}{error}", event.id)
 
