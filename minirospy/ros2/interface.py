@@ -81,7 +81,7 @@ class Ros2Client(Reachable, Protocol):
     """A client for a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request as CDR; return a future for the response as CDR, which may fail with BridgeError."""
+        """Send a request as CDR; return a future for the response as CDR. The future may fail with BridgeError."""
 
     def close(self) -> None: ...
 

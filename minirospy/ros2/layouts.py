@@ -99,7 +99,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return the layout of a message, which has ROS 1's fields in ROS 2's order. Raise TypesDiffer if none fits both types."""
+    """Return the layout of a message: ROS 1's fields in ROS 2's order. Raise TypesDiffer if no layout fits both types."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -276,7 +276,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Return the ROS 2 field for each ROS 1 field, keyed by name. Raise TypesDiffer if a required one is missing."""
+    """Return the ROS 2 field for each ROS 1 field, keyed by name. Raise TypesDiffer if a required field is missing."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}

@@ -31,14 +31,14 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link to bridge, with the reason why that is impossible, or "" if it is possible."""
+    """A link that should be bridged, and the reason if that is impossible, or "" if it is possible."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Pair each link with the message of the TypesDiffer that ``check(link)`` raises, or with "" if it raises none."""
+    """Pair each link with the message of the TypesDiffer that ``check(link)`` raises, or with "" if ``check`` raises no error."""
     found = []
     for link in wanted:
         try:

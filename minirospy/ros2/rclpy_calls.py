@@ -312,7 +312,7 @@ class Client:
 
 
 class ParameterProbe:
-    """Probes nodes by requesting an empty list from their parameter services, which has no effect."""
+    """Probes nodes by requesting an empty list from their parameter services; such a request has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients

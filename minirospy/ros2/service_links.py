@@ -30,7 +30,7 @@ class ServiceLink:
 
 
 def is_bridged_type(type_: str) -> bool:
-    """Return whether to bridge services of a type (``pkg/Name``, on either side): those for tools are excluded."""
+    """Return whether to bridge services of a type (``pkg/Name``, on either side): services for ROS 2's tools are excluded."""
     return type_ not in _OF_EVERY_NODE and type_.partition("/")[0] not in _PACKAGES_OF_EVERY_NODE
 
 

@@ -288,7 +288,7 @@ class RclpySide:
             except NotAnsweredError:
                 continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
-                # Only this callback has failed, so continue with the others.
+                # Only this callback has failed, so continue with the other callbacks.
                 _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
@@ -312,7 +312,7 @@ class RclpySide:
     @staticmethod
     def message_class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
-        # The class may be a ROS 1 class from one of minirospy's packages, which does not have this method.
+        # The class may be a ROS 1 class from one of minirospy's packages; those classes do not have this method.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("MessageClass", found)

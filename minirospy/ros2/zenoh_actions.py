@@ -68,11 +68,11 @@ class ActionType:
         self._fields = fields
 
     def write(self, part: str, values: Mapping[str, object]) -> bytes:
-        """Encode a part of the action, such as ``SendGoal_Response``, as CDR."""
+        """Encode one of the action's messages, such as ``SendGoal_Response``, as CDR."""
         return encode(f"{self._name}_{part}", self._fields, values)
 
     def read(self, part: str, data: bytes) -> dict[str, object]:
-        """Decode a part of the action from CDR. Raise DeserializationError if ``data`` is invalid."""
+        """Decode one of the action's messages from CDR. Raise DeserializationError if ``data`` is invalid."""
         return decode(f"{self._name}_{part}", self._fields, data)
 
     def response(self, status: int, result: bytes | None) -> bytes:
@@ -210,7 +210,7 @@ class ZenohActionClient:
         )
 
     def result(self, id: bytes) -> Future[tuple[int, bytes]]:
-        """Return a future for a goal's status and result, which may fail with BridgeError."""
+        """Return a future for a goal's status and result. The future may fail with BridgeError."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: Future[bytes]) -> None:
@@ -287,7 +287,7 @@ class ZenohActionServer:
     def close(self) -> None:
         """Send known results, then close the action. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The first call may submit responses for goals that have just ended; the second one waits for those.
+            # The first call may submit responses for goals that have just ended; the second call waits for those responses.
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
         for server in self._servers:

@@ -312,7 +312,7 @@ _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
-"""E-mail addresses that catkin accepts; it exits with an error for others."""
+"""E-mail addresses that catkin accepts; catkin exits with an error for other addresses."""
 
 
 class _Reader:

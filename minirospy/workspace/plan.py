@@ -365,7 +365,7 @@ class _Collector:
         if self._message_depends is not None:
             self._refused(command, "generate_messages() must be called once")
         given = keyword_arguments(command.arguments, frozenset(["DEPENDENCIES", "LANGS"]))
-        # genmsg accepts the package's own name, which has no effect.
+        # genmsg accepts the package's own name here, although it has no effect.
         names = given.get("DEPENDENCIES", [])
         self._message_depends = [name for name in names if name != self._manifest.name]
         if not self._definitions:

@@ -181,7 +181,7 @@ class NetworkOptions:
 
 
 def to_endpoint(text: str, *, listens: bool = False) -> str:
-    """Convert text to a Zenoh endpoint; HOST or HOST:PORT means TCP. Raise EndpointError for one that can never work.
+    """Convert text to a Zenoh endpoint; HOST or HOST:PORT means TCP. Raise EndpointError for an endpoint that can never work.
 
     ``listens``: the port may be 0, which selects any free port.
     """

@@ -423,7 +423,7 @@ def _locked(path: Path, journal: Path) -> int:
         if sys.platform == "win32":
             import msvcrt
 
-            # Lock a byte after the process id, which other processes must be able to read.
+            # Lock a byte after the process id, because other processes must be able to read the process id.
             os.lseek(file, 64, os.SEEK_SET)
             try:
                 msvcrt.locking(file, msvcrt.LK_NBLCK, 1)

@@ -388,7 +388,7 @@ class Master(MasterApi):
             await rpc.close()
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
-        """Remove dead nodes, and send the others the notifications that they may have missed."""
+        """Remove dead nodes, and send the other nodes the notifications that they may have missed."""
         rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_MAX_CONCURRENT_CHECKS)
 
         async def check(name: str, uri: str) -> bool:

@@ -40,7 +40,7 @@ _SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starti
 # Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
 MAX_PARAMETERS = 32
 
-# maximum total size in bytes of the large calls in progress; further ones are queued
+# maximum total size in bytes of the large calls in progress; further calls are queued
 _LARGE_BYTES = 32 * 1024 * 1024
 
 # maximum bytes of a node's response to a notification; its contents are ignored

@@ -299,12 +299,12 @@ class Registrations:
                 _log.warning("the master does not know this node, and refuses to")
 
     async def register_all(self, *, again: bool = False) -> None:
-        """Register everything that the master lacks. Raise MasterUnreachableError if it does not respond."""
+        """Register everything that the master lacks. Raise MasterUnreachableError if the master does not respond."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
             if key in self.taken and self._wanted(key):
                 continue
-            # One registration that the master always refuses must not block the others.
+            # One registration that the master always refuses must not block the other registrations.
             try:
                 await self.update(key, again=again)
             except RpcError as error:
@@ -329,7 +329,7 @@ class Registrations:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
-        """Wait for the last calls to the master to finish, but give up if it stops responding.
+        """Wait for the last calls to the master to finish, but give up if the master stops responding.
 
         If many nodes shut down together, the calls of each are queued at the master. The master's response to a short
         call, which even a busy master handles quickly, shows that it is alive.

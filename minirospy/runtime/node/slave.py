@@ -103,7 +103,7 @@ class SlaveApi:
         )
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the response to one call, or the steps that compute it. Raise RpcFault if the method is unknown."""
+        """Return the response to one call, or a generator that computes it in steps. Raise RpcFault if the method is unknown."""
         return self.dispatcher.dispatch(method, args)
 
     def get_bus_stats(self, caller_id: str) -> Answer:

@@ -38,7 +38,7 @@ SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a ma
 # Number of failed connections before a publisher is reported; a publisher that is shutting down is gone by then
 _WARN_AFTER = 3
 
-# maximum number of log lines about publishers that send invalid responses; further ones are only counted
+# maximum number of log lines about publishers that send invalid responses; further lines are only counted
 _REFUSALS_LOGGED = 10
 
 _LEAVE_SECONDS = 10.0

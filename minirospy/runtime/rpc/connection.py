@@ -44,7 +44,7 @@ _LINGER_SECONDS = 2.0
 
 _SHORT_BODY = 4096  # maximum bytes of a short body; a longer one is read in steps
 
-# Maximum bytes of a request that is processed together with others; its values may take several times as much memory
+# Maximum bytes of a request that is processed together with others; the parsed values may take several times the memory
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (

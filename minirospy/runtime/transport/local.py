@@ -82,7 +82,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: object) -> UnixAddress | None:
-    """Parse the address in a publisher's response to requestTopic. Return None if it is for another protocol."""
+    """Parse the address in a publisher's response to requestTopic. Return None if the response is for another protocol."""
     match answer:
         # A peer must not be able to choose any other socket on this machine, for example a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):

@@ -198,7 +198,7 @@ class ClientActions:
             raise type_conflict(topic, wanted, known)
 
     async def _leave(self, name: str, class_: Any) -> None:
-        """Unregister an action's topics, so that it can be used with another type."""
+        """Unregister an action's topics, so that the action can be used with another type."""
         if action := self._actions.pop((name, class_), None):
             await asyncio.wait([self._session.graph.spawn(action.client.close())])
 

@@ -84,7 +84,7 @@ class OperationSession(Protocol):
         """Start a task that is cancelled when the session ends."""
 
     async def type_of(self, topic: str) -> str:
-        """Return the type of a topic in the graph. Raise BridgeError if it has none."""
+        """Return the type of a topic in the graph. Raise BridgeError if the topic has no type."""
 
     def is_allowed(self, kind: str, name: str, what: str) -> bool:
         """Return whether the globs allow a name; if not, send rosbridge's warning."""

@@ -199,7 +199,7 @@ class RosbridgeSession:
         self._is_working = False
 
     def _begin(self, data: str | bytes) -> _Pending | None:
-        """Start an operation. Return the rest if it must wait, otherwise None."""
+        """Start an operation. If the operation must wait, return the rest of its work, otherwise None."""
         self.operation_size = _VALUE_FACTOR * sys.getsizeof(data)
         if not protocol.is_quick(data):
             return self._begin_large(data)
@@ -298,7 +298,7 @@ class RosbridgeSession:
     # --- called by the handlers of operations
 
     async def type_of(self, topic: str) -> str:
-        """Return the type of a topic in the graph. Raise BridgeError if it has none."""
+        """Return the type of a topic in the graph. Raise BridgeError if the topic has no type."""
         resolved = self.graph.node.resolve(topic)
         if self.graph.snapshot.types.get(resolved, ANY) == ANY:
             await self.graph.look()

@@ -198,7 +198,7 @@ class WebClient:
         )
 
     def holds(self, count: int) -> None:
-        """Record how many bytes of memory the session uses for queued messages from the client and the current one."""
+        """Record how many bytes of memory the session uses for the client's current message and its queued messages."""
         self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:

@@ -39,7 +39,7 @@ IMMEDIATE_SHARE = 0.5  # fraction of the time that work may use without being qu
 # Maximum length of an interactive client's burst of work, in slices (1 ms in total).
 # A request takes 0.1 to 0.5 ms to handle; 64 kB of empty frames take 100 ms.
 # A new client starts with one slice, and gets one more after each short burst.
-# Therefore, if 250 new clients flood the server, its other clients are served after one slice for each of them.
+# Therefore, if 250 new clients flood the server, the other clients are served after one slice for each new client.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients, which lets interactive clients use 200 ms before bulk clients get another slice
 MAX_DEBT_TURNS = 10
@@ -182,7 +182,7 @@ class FairTurns:
         queue = self._queue_of(share)
         queue.update()
         if queue is not share.queue:
-            # The tags of one queue have no meaning in the other.
+            # The tags of one queue have no meaning in the other queue.
             share.queue = queue
             share.tag = queue.served
         share.is_queued = True
