@@ -217,7 +217,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits and treats the goal as rejected, so cancel it.
+                # The caller has stopped waiting and treats the goal as rejected, so cancel the goal.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()

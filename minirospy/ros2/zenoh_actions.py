@@ -192,7 +192,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits and treats the goal as rejected, so cancel it.
+                # The caller has stopped waiting and treats the goal as rejected, so cancel the goal.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()

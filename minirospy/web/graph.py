@@ -330,7 +330,7 @@ class SharedGraph:
         pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
-        # Check the task, because asyncio.wait_for may lose a cancellation that coincides with the event before Python 3.12.
+        # Check the task: before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the event.
         task = asyncio.current_task()
         while self._watching is task:
             self._refresh_soon.clear()
@@ -438,7 +438,7 @@ class SharedGraph:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))
 
     async def _join(self, topic: str, shared: _SharedPublisher) -> None:
-        """Wait until the subscribers known to the master and this node's own subscription are connected."""
+        """Wait until this node's own subscription, and the subscribers known to the master, are connected."""
         await shared.publisher.wait_for_expected()
         await self._join_own(topic)
 

@@ -156,7 +156,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # If the node is still waiting for a master, cancel that; otherwise, shut down the node.
+        # If the node is still waiting for a master, cancel the wait; otherwise, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:

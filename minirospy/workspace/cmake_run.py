@@ -30,7 +30,7 @@ _ROS_2 = re.compile(
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
 _MAX_LOOPS = 100_000  # maximum number of iterations of foreach() with RANGE
-# maximum nesting of files and macros; a file nested more deeply must include itself
+# maximum nesting of files and macros; a file nested more deeply must be including itself
 _MAX_DEPTH = 40
 
 

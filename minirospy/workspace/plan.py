@@ -249,7 +249,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn about an error that real catkin would report, but which does not affect this build."""
+        """Warn about an error that catkin would report, but which does not affect this build."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:

@@ -287,7 +287,7 @@ class Connection:
             self._set_deadline()
 
     def _answer(self, message: HttpMessage) -> None:
-        """Respond to a request immediately, or start a task or steps if that would take longer."""
+        """Respond to a request immediately or, if that would take longer, in a task or in steps."""
         if message.method != "POST":
             self.refuse(405, "this is an XML-RPC server: send POST")
             return

@@ -20,7 +20,7 @@ __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answe
 PROTOCOL = "UNIXROS"
 _PREFIX = "minirospy-"  # the prefix of socket names
 
-TRUSTED_USERS = frozenset({0})  # ids of the users that are trusted in addition to this process's own: root
+TRUSTED_USERS = frozenset({0})  # trusted user ids in addition to this process's own: root
 
 
 class UnixAddress(NamedTuple):

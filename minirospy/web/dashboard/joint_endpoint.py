@@ -327,7 +327,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints' positions, after the joints themselves if they have been reloaded."""
+        """Send the joints' positions; if the joints have been reloaded, send the joints first."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())

@@ -114,7 +114,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Check whether the node has exited before reading: the file then contains everything that it wrote.
+        # Check whether the node has exited before reading: the file then contains everything that the node wrote.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:

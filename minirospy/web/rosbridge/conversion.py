@@ -139,7 +139,7 @@ def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return a call's arguments, a dictionary or a list in field order, as a dictionary of the request's fields.
+    """Return a call's arguments (a dictionary, or a list in field order) as a dictionary of the request's fields.
 
     For other arguments, return no fields.
     """

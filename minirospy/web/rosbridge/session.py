@@ -119,7 +119,7 @@ class RosbridgeSession:
         self._publications.close()
         self._services.close()
         self._actions.close()
-        # Release memory now: the session is in reference cycles, so the garbage collector would do it later.
+        # Release memory now: the session is in reference cycles, so the garbage collector would release it only later.
         self._inbox.clear()
         self._fragments.clear()
         for task in list(self._tasks):

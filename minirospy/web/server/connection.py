@@ -205,7 +205,7 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
-        # Release memory now: the connection is in reference cycles, so the garbage collector would do it later.
+        # Release memory now: the connection is in reference cycles, so the garbage collector would release it only later.
         self._jobs.clear()
         self._output.end()
         self.site.account.close(self.share)
