@@ -37,7 +37,7 @@ def send_goal_service(action: str) -> str:
 def action_links(
     ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
 ) -> list[ActionLink]:
-    """Return the actions to bridge: those with a server on only one side, ignoring those that bridges offer.
+    """Return the actions to bridge: those with a server on only one side, not counting servers of bridges.
 
     ``ros2_services`` maps services to their types. ``partner(type, direction)`` returns the type on the side that sends goals.
     """

@@ -144,7 +144,7 @@ class GoalsToRos1:
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # Cancel the future even if the task is cancelled before its first step.
+        # The task may be cancelled before it starts; cancel the future in that case, too.
         task.add_done_callback(lambda _: accepted.cancel())
 
     async def _send(
@@ -177,7 +177,7 @@ class GoalsToRos1:
         return goal if is_accepted else None
 
     async def _connected(self) -> None:
-        """Wait until the server is connected in both directions, because an earlier goal would be lost."""
+        """Wait until the server is connected in both directions; a goal sent earlier would be lost."""
         await self._heard.wait()
         for publisher in (self._goal, self._cancel):
             await publisher.wait_for_subscribers()
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Process feedback that has already arrived first, because it uses another connection.
+        # Feedback uses another connection, so first process the feedback that has already arrived.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

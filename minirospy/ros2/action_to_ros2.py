@@ -41,10 +41,10 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 REACH_SECONDS = 2.0
-"""Maximum time in seconds that opening this link may delay other links while it waits for the server."""
+"""Maximum seconds to wait for the server when this link is opened, which delays the opening of other links."""
 ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
-"""Seconds to delay a response: Python's actionlib drops one that arrives before its send_goal has returned."""
+"""Seconds to delay a response: Python's actionlib drops a response that arrives before its send_goal() has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
 """Maximum number of sent goals that are not accepted yet. A server queues only 10, and further goals would be lost."""

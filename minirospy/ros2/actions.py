@@ -39,11 +39,11 @@ class ActionBridge:
         await self._table.close()
 
     def pairs(self, snapshot: Snapshot) -> list[Pair]:
-        """Return the actions to bridge, with the reason for each that cannot be bridged."""
+        """Return the actions that should be bridged, each with the reason if that is impossible."""
         return pairs(self._wanted(snapshot), self._codec)
 
     async def look(self, snapshot: Snapshot) -> bool:
-        """Open and close actions to match both graphs. Return whether any of them changed."""
+        """Open and close actions to match both graphs. Return whether any action was opened or closed."""
         return await self._table.update(self._wanted(snapshot))
 
     def _wanted(self, snapshot: Snapshot) -> list[ActionLink]:

@@ -49,16 +49,16 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
-"""Connection header field of publishers whose data comes from ROS 2, so that no bridge to that domain returns it."""
+"""Connection header field of the bridge's publishers: the domain their data comes from. Bridges to that domain ignore them."""
 _MIN_REFRESH_INTERVAL = 0.25
 QUERY_SECONDS = 3.0
-"""Timeout in seconds for querying publishers, after which topics are bridged without their responses."""
+"""Timeout in seconds for querying publishers; after that, topics are bridged even if their publishers have not responded."""
 JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
 _ROS1_QUEUE = 1000
-"""Queue size in messages for all types but images: enough to bridge a pause on a busy machine."""
+"""Queue size in messages for all types but images: large enough that a busy machine may pause without losing messages."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return the links to bridge, without opening them, and the reason for each that cannot be bridged.
+        """Return the links that should be bridged, without opening them, each with the reason if that is impossible.
 
         Raise the same errors as :meth:`look`.
         """
@@ -189,7 +189,7 @@ class Ros2Bridge:
             await self._changed.wait()
 
     async def look(self) -> bool:
-        """Open and close links to match the graphs. Return whether any of them changed.
+        """Open and close links to match the graphs. Return whether any link was opened or closed.
 
         Raise MasterUnreachableError or RpcError if a call to the master fails.
         """
@@ -237,7 +237,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """If a topic has ROS 2 subscribers, query its new ROS 1 publishers for their definitions and latching."""
+        """If a topic has ROS 2 subscribers, ask its new ROS 1 publishers for their definitions, and whether they latch."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()

@@ -66,7 +66,7 @@ class _Reader:
         if count is None:
             count = self._length()
         if count > len(self._data) - self._at:
-            # Each element takes at least one byte, so the message has too few bytes for that many elements.
+            # Each element takes at least one byte, so the message is too short for this number of elements.
             raise DeserializationError("the message ends too early")
         if base not in _LETTERS:
             return [self._one(base) for _ in range(count)]

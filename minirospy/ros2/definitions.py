@@ -18,7 +18,7 @@ from minirospy.ros2.rules import Rules, snake_case
 
 __all__ = ["NO_HASH", "Definitions"]
 
-NO_HASH = "TypeHashNotSupported"  # in place of a hash in the keys of ROS 2 Humble, which has no type hashes
+NO_HASH = "TypeHashNotSupported"  # stands for a hash in the keys of ROS 2 Humble, which has no type hashes
 
 _TIME = {"sec": "int32", "nanosec": "uint32"}
 _STAMP = "builtin_interfaces/Time"

@@ -42,7 +42,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Reordered:
-    """A message with reordered fields: ``fields`` are in the input's order; ``order`` lists their indices as in the output."""
+    """A message with reordered fields: ``fields`` are in input order, ``order`` lists their indices in output order."""
 
     fields: tuple[Node, ...]
     order: tuple[int, ...]
@@ -52,7 +52,7 @@ Node: TypeAlias = Fixed | Text | Array | Reordered
 
 
 def inverse(node: Node) -> Node:
-    """Return the node that reverses a reordering."""
+    """Return the node that undoes the reordering of ``node``."""
     if isinstance(node, Array):
         return Array(inverse(node.element), node.length)
     if isinstance(node, Reordered):

@@ -50,14 +50,14 @@ class Ros2Handle(Protocol):
 
 
 class Ros2Probe(Protocol):
-    """Sends requests that have no effect to a client's servers. Methods may be called from any thread."""
+    """Sends requests without side effects to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request; return a future for the response. Once that has arrived, no response to the client is lost any more."""
+        """Send a request; return a future that completes with its response: from then on, no response to the client is lost."""
 
     def close(self) -> None: ...
 
@@ -71,17 +71,17 @@ class Reachable(Protocol):
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the IDs of the existing servers, to detect lost responses, or None if none can be lost."""
+        """Return the IDs of the existing servers, or None if their responses cannot be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return a probe for the servers, or None if they have no request that is without effect."""
+        """Return a probe for the servers, or None if every request to them would have side effects."""
 
 
 class Ros2Client(Reachable, Protocol):
     """A client for a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request as CDR; return a future for the response as CDR, which may fail with BridgeError."""
+        """Send a request as CDR; return a future for the response as CDR. The future may fail with BridgeError."""
 
     def close(self) -> None: ...
 
@@ -186,7 +186,7 @@ class Ros2Side(Protocol):
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action. A thread calls ``accept`` with each goal, and a function that sends the goal's feedback."""
+        """Offer an action. For each goal, a thread calls ``accept`` with the goal and a function that sends its feedback."""
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
         """Offer the ROS 1 parameters as parameters of this node."""

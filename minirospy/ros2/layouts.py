@@ -99,7 +99,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return the layout of a message, which has ROS 1's fields in ROS 2's order. Raise TypesDiffer if none fits both types."""
+    """Return the layout of a message: ROS 1's fields in ROS 2's order. Raise TypesDiffer if no layout fits both types."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -139,7 +139,7 @@ class _Pairing:
         for skipped in ros2.fields[place:]:
             items += self._alone(skipped.type, Side.ROS2, around)
         if not ros2.fields:
-            # rosidl adds a member to empty structs, which CDR does not allow.
+            # CDR does not allow empty structs, so rosidl adds a member to them.
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)
@@ -276,7 +276,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Return the ROS 2 field for each ROS 1 field, keyed by name. Raise TypesDiffer if a required one is missing."""
+    """Return the ROS 2 field for each ROS 1 field, keyed by name. Raise TypesDiffer if a required field is missing."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}

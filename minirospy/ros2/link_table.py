@@ -31,14 +31,14 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link to bridge, with the reason why that is impossible, or "" if it is possible."""
+    """A link that should be bridged, and the reason if that is impossible, or "" if it is possible."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Pair each link with the message of the TypesDiffer that ``check(link)`` raises, or with "" if it raises none."""
+    """Pair each link with the message of the TypesDiffer that ``check(link)`` raises, or with "" if ``check`` raises no error."""
     found = []
     for link in wanted:
         try:
@@ -51,7 +51,7 @@ def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
 
 
 class LinkTable(Generic[_L, _O]):
-    """The open links, and the reasons why others could not be opened. ``make(link)`` may raise TypesDiffer.
+    """The open links, and the reasons why other wanted links could not be opened. ``make(link)`` may raise TypesDiffer.
 
     Runs on the node's loop.
     """
@@ -64,7 +64,7 @@ class LinkTable(Generic[_L, _O]):
         self._make: Callable[[_L], _O] = make
 
     async def update(self, wanted: Collection[_L]) -> bool:
-        """Close links that are no longer wanted, and open new ones. Return whether any of them changed."""
+        """Close links that are no longer wanted, and open new ones. Return whether any link was opened or closed."""
         gone = [link for link in self.links if link not in wanted]
         for link in gone:
             await self._close(link)

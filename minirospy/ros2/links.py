@@ -83,7 +83,7 @@ def links(
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
-    """Return the topics to bridge: those with endpoints other than bridges' on both sides.
+    """Return the topics to bridge: those with endpoints on both sides, not counting endpoints of bridges.
 
     ``is_latched(topic, node)`` returns whether a ROS 1 publisher latches. ``ros1_type(ros2_type)`` returns the ROS 1 type for
     a ROS 1 subscriber to any type, such as `rostopic echo`.
@@ -117,7 +117,7 @@ def links(
 
 
 def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
-    """Return the type of a topic. If endpoints differ, prefer ROS 1's type name, then the alphabetically first one."""
+    """Return the type of a topic. If its endpoints' types differ, prefer ROS 1's type name, then the alphabetically first one."""
     types = sorted({end.type for end in ends})
     return ros1_type if ros1_type in types else types[0]
 

@@ -53,7 +53,7 @@ class Ros1Parameters:
         return found
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error message for each, or "" if it succeeded.
+        """Set or delete parameters; return a string for each parameter: an error message, or "" on success.
 
         If ``atomically``, change no parameter if any of them is rejected.
         """

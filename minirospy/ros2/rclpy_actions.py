@@ -217,7 +217,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits and treats the goal as rejected, so cancel it.
+                # The caller has stopped waiting and treats the goal as rejected, so cancel the goal.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -237,7 +237,7 @@ class ActionClient:
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The goal ID has 16 bytes, so the data that follows stays aligned after its removal.
+        # The goal ID has 16 bytes, so removing it keeps the data that follows aligned.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
@@ -265,7 +265,7 @@ def _uuid_message(id: bytes) -> object:
 
 
 def _client_class() -> Callable[..., _RclpyActionClient]:
-    """Return rclpy's action client class, extended by a lock as a class attribute.
+    """Return a subclass of rclpy's action client that has a lock as a class attribute.
 
     rclpy's constructor adds the client to the executor before it creates the lock, and the executor's thread would fail
     without the lock.
@@ -394,7 +394,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # Another goal has preempted this one in ROS 1, for which ROS 2 has no status.
+            # In ROS 1, another goal has preempted this one; ROS 2 has no status for that.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

@@ -197,7 +197,7 @@ class Calls:
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return a probe for the nodes of a service, or None if one is unknown or offers no parameter services.
+        """Return a probe for the nodes that offer a service, or None if a node is unknown or offers no parameter services.
 
         May be called from any thread.
         """
@@ -218,14 +218,14 @@ class Calls:
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy an object in the executor's thread, which might otherwise be about to wait on it.
+        """Destroy an object in the executor's thread: otherwise, the executor might be about to wait on the object.
 
         May be called from any thread. rclpy's executor fails if an object is destroyed while the executor builds its wait set.
         """
         self.executor.create_task(destroy)
 
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
-        """Await a future of another thread in a coroutine of the executor; return its result.
+        """Wait, in a coroutine of the executor, for a future that another thread completes; return its result.
 
         If ``after_tasks``, return it only after the tasks that the other thread has already submitted to the executor.
         """
@@ -312,7 +312,7 @@ class Client:
 
 
 class ParameterProbe:
-    """Probes nodes by requesting an empty list from their parameter services, which has no effect."""
+    """Probes nodes by requesting an empty list from their parameter services; such a request has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients

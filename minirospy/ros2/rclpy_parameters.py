@@ -35,7 +35,7 @@ class ParameterStore(Protocol):
         """Return the values of parameters. The type is 0 if a parameter is not set, or if its name is a namespace."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error message for each, or "" if it succeeded."""
+        """Set or delete parameters; return a string for each parameter: an error message, or "" on success."""
 
 
 class ParameterServer:

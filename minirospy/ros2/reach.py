@@ -24,7 +24,7 @@ _LOOK_SECONDS = 0.02
 AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait if the servers cannot be probed
 MAX_SECONDS = 10.0
-"""Maximum seconds to wait for responses to a probe; after that, requests are sent without them."""
+"""Maximum seconds to wait for responses to a probe; after that, requests are sent anyway."""
 
 
 class Reach:
@@ -116,7 +116,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # Ignore the error, because the actual requests will fail with the same one and report it.
+            # Ignore the error: the actual requests will fail with the same error, and report it.
             await asyncio.sleep(pause)
         else:
             return True

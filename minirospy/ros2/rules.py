@@ -21,7 +21,7 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 
 @dataclass(frozen=True)
 class TypeRule:
-    """The exceptions in how a ROS 1 type corresponds to a ROS 2 type.
+    """How a ROS 1 type differs from the corresponding ROS 2 type.
 
     ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields. If
     ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side
@@ -59,7 +59,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the ROS 1 type for a ROS 2 message type: as stated in a rule, or of the same name."""
+        """Return the ROS 1 type for a ROS 2 message type: the type stated in a rule, or the type of the same name."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]
@@ -165,7 +165,7 @@ _KEYS = {
 
 
 def parse_rules(text: str, where: str) -> Rules:
-    """Parse a file of rules. If one is invalid, raise BridgeError with the reason and its number."""
+    """Parse a file of rules. If a rule is invalid, raise BridgeError with its number and the reason."""
     try:
         loaded = safe_load(text)
     except yaml.YAMLError as error:

@@ -30,7 +30,7 @@ class ServiceLink:
 
 
 def is_bridged_type(type_: str) -> bool:
-    """Return whether to bridge services of a type (``pkg/Name``, on either side): those for tools are excluded."""
+    """Return whether to bridge services of a type (``pkg/Name``, on either side): services for ROS 2's tools are excluded."""
     return type_ not in _OF_EVERY_NODE and type_.partition("/")[0] not in _PACKAGES_OF_EVERY_NODE
 
 
@@ -45,7 +45,7 @@ def service_links(
     ros2: Mapping[str, str],
     partner: Callable[[str, Direction], str],
 ) -> list[ServiceLink]:
-    """Return the services to bridge: those that only one side offers, ignoring those that bridges offer.
+    """Return the services to bridge: those with a server on only one side, not counting servers of bridges.
 
     ``ros1`` maps services to their nodes, ``ros1_types`` to their types if known. ``ros2`` maps services to their types.
     ``partner(type, direction)`` returns the type on the calling side.

@@ -149,11 +149,11 @@ class ServiceBridge:
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return the services to bridge, with the reason for each that cannot be bridged, given the services in ROS 1."""
+        """Return the services that should be bridged, each with the reason if that is impossible. ``ros1``: ROS 1's services."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
-        """Open and close services to match both graphs. Return whether any of them changed."""
+        """Open and close services to match both graphs. Return whether any service was opened or closed."""
         return await self._table.update(await self._wanted(ros1))
 
     async def _wanted(self, ros1: Mapping[str, tuple[str, ...]]) -> list[ServiceLink]:
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # Makes the running calls fail with an error.
+        # Make the calls in progress fail with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -318,7 +318,7 @@ class _InRos2:
         task = asyncio.ensure_future(self._pass_on(request, answered))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
-        # Cancel the future even if the task is cancelled before its first step.
+        # The task may be cancelled before it starts; cancel the future in that case, too.
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:

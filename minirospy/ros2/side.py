@@ -39,7 +39,7 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Maximum number of messages to read per executor callback, which costs more than reading a message."""
+"""Maximum number of messages to read per executor callback; a callback costs more time than reading a message."""
 
 
 # --- interfaces of the parts of rclpy that are used (untyped, because rclpy may not be installed)
@@ -288,7 +288,7 @@ class RclpySide:
             except NotAnsweredError:
                 continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
-                # Only this callback has failed, so continue with the others.
+                # Only this callback has failed, so continue with the other callbacks.
                 _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
@@ -312,7 +312,7 @@ class RclpySide:
     @staticmethod
     def message_class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
-        # The class may be a ROS 1 class from one of minirospy's packages, which does not have this method.
+        # The class may be a ROS 1 class from one of minirospy's packages; those classes do not have this method.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("MessageClass", found)
@@ -386,7 +386,7 @@ class TopicSubscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message and those queued behind it: the executor is slow, because it delivers one per iteration."""
+        """Deliver a message and those queued behind it, because the executor delivers only one per iteration, which is slow."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:

@@ -68,11 +68,11 @@ class ActionType:
         self._fields = fields
 
     def write(self, part: str, values: Mapping[str, object]) -> bytes:
-        """Encode a part of the action, such as ``SendGoal_Response``, as CDR."""
+        """Encode one of the action's messages, such as ``SendGoal_Response``, as CDR."""
         return encode(f"{self._name}_{part}", self._fields, values)
 
     def read(self, part: str, data: bytes) -> dict[str, object]:
-        """Decode a part of the action from CDR. Raise DeserializationError if ``data`` is invalid."""
+        """Decode one of the action's messages from CDR. Raise DeserializationError if ``data`` is invalid."""
         return decode(f"{self._name}_{part}", self._fields, data)
 
     def response(self, status: int, result: bytes | None) -> bytes:
@@ -159,7 +159,7 @@ class ZenohActionClient:
 
     @property
     def is_ready(self) -> bool:
-        """Return whether there is a server with all its endpoints."""
+        """Return whether all endpoints of a server are known."""
         publishers = self._graph.of_name(self._ends.feedback.name, Kind.PUBLISHER)
         clients = (self._send_goal, self._get_result, self._cancel_goal)
         return bool(publishers) and all(each.is_ready for each in clients)
@@ -192,7 +192,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits and treats the goal as rejected, so cancel it.
+                # The caller has stopped waiting and treats the goal as rejected, so cancel the goal.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -204,13 +204,13 @@ class ZenohActionClient:
         return accepted
 
     def cancel(self, id: bytes) -> None:
-        """Ask the server to cancel a goal, whose result will show whether it was cancelled."""
+        """Ask the server to cancel a goal; the goal's result will show whether that succeeded."""
         self._cancel_goal.call(
             self._type.message("action_msgs/srv/CancelGoal_Request", {"goal_info": _info(id)})
         )
 
     def result(self, id: bytes) -> Future[tuple[int, bytes]]:
-        """Return a future for a goal's status and result, which may fail with BridgeError."""
+        """Return a future for a goal's status and result. The future may fail with BridgeError."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: Future[bytes]) -> None:
@@ -287,7 +287,7 @@ class ZenohActionServer:
     def close(self) -> None:
         """Send known results, then close the action. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The first call may submit responses for goals that have just ended; the second one waits for those.
+            # The first call may submit responses for goals that have just ended; the second call waits for those responses.
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
             self._thread.submit(lambda: None).result(CLOSE_SECONDS)
         for server in self._servers:
@@ -363,7 +363,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # Another goal has preempted this one in ROS 1, for which ROS 2 has no status.
+            # In ROS 1, another goal has preempted this one; ROS 2 has no status for that.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

@@ -69,7 +69,7 @@ class ZenohClient:
         """Return None, because the servers need no probe."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request as CDR; return a future for the response as CDR, which may fail with BridgeError."""
+        """Send a request as CDR; return a future for the response as CDR. The future may fail with BridgeError."""
         answered: Future[bytes] = Future()
         name = self._end.name
 

@@ -53,7 +53,7 @@ class Qos:
     depth: int = 10
 
     def __str__(self) -> str:
-        """Return the settings in the format of a token, which lists only those that differ from rmw_zenoh's defaults."""
+        """Return the settings in a token's format, in which only settings that differ from rmw_zenoh's defaults are listed."""
         depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
         return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
 

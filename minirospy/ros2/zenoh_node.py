@@ -108,7 +108,7 @@ class ZenohNode:
     def entity(
         self, kind: Kind, name: str = "", type_: str = "", hash_: str = "", qos: Qos | None = None
     ) -> Entity:
-        """Return a new entity of this node: first the node itself, then endpoints, whose tokens a :class:`Handle` declares."""
+        """Return a new entity: the first is the node itself, the others are its endpoints, which a :class:`Handle` declares."""
         id = next(self._ids)
         return Entity(self.domain, self._zid, id, kind, self._name, "/", name, type_, hash_, qos or Qos())
 
@@ -122,7 +122,7 @@ class ZenohNode:
             self.session.close()
 
     def handler(self, function: Callable[..., object], ended: Callable[[], object] | None = None) -> object:
-        """Return a handler that Zenoh calls in its own thread; by default it starts a thread for each handler."""
+        """Return a handler that runs in Zenoh's own thread; by default, Zenoh's Python API starts a thread for each handler."""
         return self.zenoh.handlers.Callback(function, ended, indirect=False)
 
     def _opened(self, options: NetworkOptions) -> Session:

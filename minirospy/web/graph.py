@@ -47,7 +47,7 @@ Above this limit, only the newest message per topic is queued.
 
 CHECK_SECONDS = 2.0  # seconds between checks of known services' types; each check takes one connection
 _QUERY_SECONDS = 2.0
-"""Timeout in seconds for querying service types, after which the graph is reported without the unknown ones."""
+"""Timeout in seconds for querying service types; types that are still unknown then are missing in the reported graph."""
 
 
 @dataclass(frozen=True)
@@ -163,11 +163,11 @@ class Publication:
 
     @property
     def has_joined(self) -> bool:
-        """Return whether the subscribers known to the master at the registration have connected."""
+        """Return whether the subscribers that the master listed when the topic was advertised have connected."""
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait, at most a second, until the subscribers known to the master when the topic was advertised have connected.
+        """Wait, for at most a second, until the subscribers that the master listed when the topic was advertised have connected.
 
         Subscribers do not receive messages published before they connect.
         """
@@ -330,7 +330,7 @@ class SharedGraph:
         pause = MIN_REFRESH_INTERVAL
         is_reported = False
 
-        # Check the task, because asyncio.wait_for may lose a cancellation that coincides with the event before Python 3.12.
+        # Check the task: before Python 3.12, asyncio.wait_for may lose a cancellation that coincides with the event.
         task = asyncio.current_task()
         while self._watching is task:
             self._refresh_soon.clear()
@@ -376,11 +376,11 @@ class SharedGraph:
         self._check_after = now + CHECK_SECONDS
         self._unchecked = [key for key in self._unchecked if key in wanted] or [*wanted]
         if self._unchecked:
-            # Check the service last in the master's list first, because the list reveals changes of all others.
+            # The master moves a service that is offered again to the end of its list. The last one cannot move: check it first.
             self._service_types.refresh(self._unchecked.pop())
 
     def check_service(self, service: str) -> None:
-        """Query the type of a service again, because a call has shown that it changed."""
+        """Query a service's type again, because a call has shown that the type has changed."""
         self._service_types.refresh((service, self.snapshot.services.get(service, ())))
 
     async def _service_type(self, key: ServiceKey) -> ServiceInfo:
@@ -432,13 +432,13 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def subscribed_own(self, topic: str) -> None:
-        """Delay messages of this node's publisher until this node's own, new subscription is connected."""
+        """Hold back this node's messages on a topic until this node's own, new subscription to the topic is connected."""
         shared = self.publishers.get(topic)
         if shared:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))
 
     async def _join(self, topic: str, shared: _SharedPublisher) -> None:
-        """Wait until the subscribers known to the master and this node's own subscription are connected."""
+        """Wait until this node's own subscription, and the subscribers known to the master, are connected."""
         await shared.publisher.wait_for_expected()
         await self._join_own(topic)
 
@@ -451,7 +451,7 @@ class SharedGraph:
             await own.wait_for_publisher(self.node.name)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Record that a client has stopped publishing a topic. Unadvertise the topic if it was the last one."""
+        """Record that a client has stopped publishing a topic. Unadvertise the topic if that was its last client."""
         shared.clients -= 1
         if not shared.clients and self.publishers.get(topic) is shared:
             del self.publishers[topic]

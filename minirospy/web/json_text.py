@@ -25,11 +25,11 @@ __all__ = [
 ]
 
 _MAX_VALUES = 4_000_000  # maximum number of values in a JSON string; if they are numbers, they take 160 MB
-# maximum number of strings in a JSON string, including field names, which take 150 MB
+# maximum number of strings, including field names, in a JSON string; they take 150 MB
 _MAX_STRINGS = 2_000_000
-# maximum number of lists and objects in a JSON string, which take 100 to 240 MB
+# maximum number of lists and objects in a JSON string; they take 100 to 240 MB
 _MAX_COLLECTIONS = 1_000_000
-# maximum length of any JSON string parsed on the event loop, which takes at most 2 ms
+# maximum length of any JSON string parsed on the event loop; parsing it takes at most 2 ms
 MAX_QUICK_CHARACTERS = 64 * 1024
 # maximum length of a JSON string with few values, such as a base64 image, parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024
@@ -181,7 +181,7 @@ def dump_json(value: object) -> str:
 
 
 def dump_json_in_pieces(value: object) -> str:
-    """Encode JSON like :func:`dump_json`, but without holding the GIL for long. For use in a thread beside the event loop.
+    """Encode JSON like :func:`dump_json`, but without holding the GIL for long. For use in a thread other than the loop's.
 
     Dictionary keys must be strings.
     """
@@ -238,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return the cost of encoding a value, in numbers. Stop counting when it is certain that the value is large."""
+    """Return the cost of encoding a value; a number costs 1. Stop counting once the value is certain to be large."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

@@ -101,7 +101,7 @@ class PlayerBridge:
         self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), reporter))
 
     async def _tick(self, bridge: Bridge) -> None:
-        """Send the time in the bag and, if a client or a key has changed it, the player's state."""
+        """Send the time in the bag. Send the player's state, too, if a client or a pressed key has changed it."""
         shown: tuple[object, ...] = ()
         time = -1
         while True:

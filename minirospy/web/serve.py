@@ -40,7 +40,7 @@ LIBRARIES = (
 )  # packages that the dashboard and the bridges need, and on which minirospy depends
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Minimum size in bytes of freed blocks to return to the system, larger than camera images, for which that is too slow."""
+"""Minimum size in bytes of freed blocks to return to the system. Camera images are smaller: returning them is too slow."""
 
 
 class Part(Protocol):
@@ -156,7 +156,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # If the node is still waiting for a master, cancel that; otherwise, shut down the node.
+        # If the node is still waiting for a master, cancel the wait; otherwise, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:

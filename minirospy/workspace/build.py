@@ -198,7 +198,7 @@ def build(
 
 
 def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...]) -> SetUp:
-    """Return the data for the setup files, as they apply to this minirospy installation."""
+    """Return the data for the setup files of a workspace that uses this minirospy installation."""
     return SetUp(
         prefix=prefix,
         sources=sources,
@@ -320,7 +320,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of the messages in other workspaces, which changes if one of those is rebuilt."""
+        """Return a fingerprint of the messages in other workspaces; it changes if one of those workspaces is rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -425,7 +425,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages whose messages the messages of ``names`` may use, directly or indirectly."""
+        """Return the packages that define messages used, directly or indirectly, by messages of the packages ``names``."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -446,7 +446,7 @@ class _Builder:
 
 
 def _option_files(plan: Plan) -> set[Path]:
-    """Return a package's .cfg files, and the modules in the same folders, which they may import."""
+    """Return a package's .cfg files, and the modules in the same folders, which the .cfg files may import."""
     folders = {path.parent for path in plan.options}
     return {*plan.options, *(module for folder in folders for module in folder.glob("*.py"))}
 

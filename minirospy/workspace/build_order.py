@@ -77,7 +77,7 @@ def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[
 
 
 def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """Return the names in a cycle, each before a dependency of it. The alphabetically first name is both first and last.
+    """Return the names in a cycle, each followed by one of its dependencies, from the alphabetically first name to itself.
 
     ``nodes`` is graphlib's cycle: each name before a package that depends on it, with the first name repeated at the end.
     """

@@ -30,7 +30,7 @@ _ROS_2 = re.compile(
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
 _MAX_LOOPS = 100_000  # maximum number of iterations of foreach() with RANGE
-# maximum nesting of files and macros; a file nested more deeply must include itself
+# maximum nesting of files and macros; a file nested more deeply must be including itself
 _MAX_DEPTH = 40
 
 
@@ -79,7 +79,7 @@ def _escaped(text: str) -> str:
 
 
 def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
-    """Replace the arguments of a macro in its commands as text, as CMake does before it expands variables."""
+    """Substitute a macro's arguments in its commands as text, as CMake does before it expands variables."""
 
     def value(match: re.Match[str]) -> str:
         given = None if match[1] else values.get(match[2])

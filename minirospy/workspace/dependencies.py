@@ -24,7 +24,7 @@ _RUNNING = ("run_depend", "exec_depend", "depend")
 
 
 class CircularDependencyError(MinirospyError):
-    """Raised if packages depend on each other. ``circle`` lists them, and ends with its first package."""
+    """Raised if packages depend on each other. ``circle`` lists the cycle; its first package is also its last."""
 
     def __init__(self, circle: tuple[str, ...]) -> None:
         super().__init__(circle)
@@ -120,7 +120,7 @@ class Dependencies:
         return [each for each in wanted if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies in topological order, so that each follows its own.
+        """Return a package's direct and indirect dependencies in topological order: each package follows its own dependencies.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """
@@ -138,7 +138,7 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield (dependency, depth) for each dependency, after the package that has it. Depths start at 0.
+        """Yield (dependency, depth) for each dependency, after the package that depends on it. Depths start at 0.
 
         A dependency of several packages is yielded several times. Raise the same exceptions as :meth:`all`.
         """
@@ -155,12 +155,12 @@ class Dependencies:
         return found
 
     def dependents(self, name: str) -> list[str]:
-        """Return the packages that depend on this one directly, sorted. Raise NotFoundError if it does not exist."""
+        """Return the packages that depend directly on ``name``, sorted. Raise NotFoundError if that package does not exist."""
         self.folder(name)
         return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
 
     def all_dependents(self, name: str) -> list[str]:
-        """Return the packages that depend on this one directly or indirectly, sorted.
+        """Return the packages that depend on ``name`` directly or indirectly, sorted.
 
         Raise NotFoundError if it does not exist.
         """

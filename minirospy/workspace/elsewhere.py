@@ -176,7 +176,7 @@ SUBMODULES = {
 
 
 def advice(name: str) -> str:
-    """Return one line about a ROS 1 package or module that minirospy lacks, and its replacement; "" if it is unknown."""
+    """Return one line about a ROS 1 package or module that minirospy lacks, and its replacement; "" if the name is unknown."""
     if name in CPP:
         what = f"{CPP[name]}, which minirospy does not have"
         there = _RUN_IT_THERE.format(conda=name.replace("_", "-"))

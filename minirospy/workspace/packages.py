@@ -186,7 +186,7 @@ class Packages:
 
 
 class CrawlTime(NamedTuple):
-    """The time in seconds that searching a folder and its subfolders takes, and whether it contains a package."""
+    """The time in seconds that searching a folder and its subfolders takes, and whether the folder contains a package."""
 
     folder: Path
     seconds: float
@@ -369,7 +369,7 @@ _PROGRAM = re.compile(r"\badd_executable\s*\(\s*([^\s)]+)")
 
 
 def is_compiled_program(folder: Path, name: str) -> bool:
-    """Return whether CMakeLists.txt in ``folder`` defines a C++ program of this name, which catkin_make skips."""
+    """Return whether CMakeLists.txt in ``folder`` defines a C++ program of this name; catkin_make skips such programs."""
     try:
         text = (folder / "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -249,7 +249,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn about an error that real catkin would report, but which does not affect this build."""
+        """Warn about an error that catkin would report, but which does not affect this build."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
@@ -365,7 +365,7 @@ class _Collector:
         if self._message_depends is not None:
             self._refused(command, "generate_messages() must be called once")
         given = keyword_arguments(command.arguments, frozenset(["DEPENDENCIES", "LANGS"]))
-        # genmsg accepts the package's own name, which has no effect.
+        # genmsg accepts the package's own name here, although it has no effect.
         names = given.get("DEPENDENCIES", [])
         self._message_depends = [name for name in names if name != self._manifest.name]
         if not self._definitions:

@@ -21,7 +21,7 @@ def workspace_of(package: Path) -> Path | None:
 
 
 def stale_definitions(package: Path) -> list[Path]:
-    """Return the definitions in a package that are newer than the classes generated from them, and differ from them."""
+    """Return the definitions in a package that are newer than, and differ from, the classes generated from them."""
     workspace = workspace_of(package)
     if workspace is None:
         return []

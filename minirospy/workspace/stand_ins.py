@@ -55,7 +55,7 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
 
 
 def _modules(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the modules that replace extension modules, after the packages that contain them, except the outermost."""
+    """Yield the modules that replace extension modules, each after the packages that contain it (except the outermost one)."""
     top = _OVERLAY / plan.name
     for path in sorted(top.rglob("*.py")):
         if path.stem in plan.compiled and path.parent.name != "__pycache__":

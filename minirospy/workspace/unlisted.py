@@ -27,7 +27,7 @@ def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
 
     Raise DefinitionError if a definition is invalid.
     """
-    # Find the unlisted messages first: most workspaces have none, so that no definition need be read.
+    # Find the unlisted messages first: most workspaces have none, and then no definition needs to be read.
     unlisted = {
         f"{plan.name}/{path.stem}": path
         for plan in plans.values()

@@ -31,13 +31,13 @@ MAX_PORT = 65_535
 _MAX_PORT_DIGITS = 5
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
-"""Link protocols of Zenoh. Zenoh itself reports an error if it was built without one."""
+"""Link protocols of Zenoh. Zenoh itself reports an error if it was built without a protocol that is used."""
 _HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
 _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
 _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in _POOLS.items())})"
-"""Value of ZENOH_RUNTIME. Many threads, because Zenoh's SO_LINGER of 10 s makes each closing of a dead link block one.
+"""Value of ZENOH_RUNTIME. Many threads, because Zenoh sets SO_LINGER to 10 s: closing a dead link blocks a thread.
 
 Measured: the simultaneous loss of 100 robots is noticed after 30 s with 32 threads in each pool, and after 11 s with 128
 threads in rx. The lease is 10 s.
@@ -181,7 +181,7 @@ class NetworkOptions:
 
 
 def to_endpoint(text: str, *, listens: bool = False) -> str:
-    """Convert text to a Zenoh endpoint; HOST or HOST:PORT means TCP. Raise EndpointError for one that can never work.
+    """Convert text to a Zenoh endpoint; HOST or HOST:PORT means TCP. Raise EndpointError for an endpoint that can never work.
 
     ``listens``: the port may be 0, which selects any free port.
     """

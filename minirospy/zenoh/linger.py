@@ -23,7 +23,7 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 LOOKS = 10
-"""Number of polls that examine a new file descriptor, because Zenoh sets SO_LINGER some time after the connection."""
+"""Number of polls in which a new file descriptor is examined: Zenoh sets SO_LINGER only some time after connecting."""
 
 
 class LingerRemover:

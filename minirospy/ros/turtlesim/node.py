@@ -42,7 +42,7 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2  # after a suspension longer than this, in seconds, skip the missed steps
+_LATE_SECONDS = 0.2  # in seconds; after a longer suspension, the missed steps are skipped
 
 _T = TypeVar("_T")
 
@@ -75,7 +75,7 @@ def _has_terminal() -> bool:
 
 
 def _background() -> Color:
-    """Return the background colour set by the parameters. If one is not an integer, return ROS's default."""
+    """Return the background colour set by the parameters. If a parameter is not an integer, return ROS's default colour."""
     values = [rospy.get_param(f"~background_{part}", usual) for part, usual in BACKGROUND._asdict().items()]
     chosen = [
         value & 255 if isinstance(value, int) and not isinstance(value, bool) else usual
@@ -100,7 +100,7 @@ class Simulator:
 
     def start(self) -> None:
         """Advertise the services and add the first turtle."""
-        with self._changing:  # a program that calls /spawn meanwhile gets the second turtle
+        with self._changing:  # so that a concurrent call of /spawn adds the second turtle
             self._services = [
                 rospy.Service("clear", Empty, self._clear),
                 rospy.Service("reset", Empty, self._reset),

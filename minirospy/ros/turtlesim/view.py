@@ -85,7 +85,7 @@ class Picture:
 
 
 def cells(canvas: Canvas, rows: int, *, is_ascii: bool = False) -> tuple[list[str], list[list[Color]]]:
-    """Return the canvas as ``rows`` lines of 2 * ``rows`` characters, and the mean colour of the lines in each character."""
+    """Return the canvas as ``rows`` lines of 2 * ``rows`` characters, and the mean colour of the pen lines in each character."""
     dots = _blocks(canvas.marks, 4 * rows, 4 * rows) > 0
     # A Braille character has four rows of two dots each.
     dots = dots.reshape(rows, 4, 2 * rows, 2)

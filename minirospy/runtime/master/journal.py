@@ -50,7 +50,7 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state recovered from a killed master's journal. ``age``: seconds since its last write.
+    """The state recovered from a killed master's journal. ``age``: seconds since the journal was last written.
 
     ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
     """
@@ -94,7 +94,7 @@ class Journal:
         # During an incremental rewrite: the records appended since it started, and the new file's descriptor.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Number of incremental rewrites finished or abandoned; a rewrite that sees it change has been abandoned.
+        # Number of finished or abandoned incremental rewrites. If it changes during a rewrite, that rewrite was abandoned.
         self._rewrites = 0
 
     @property
@@ -154,7 +154,7 @@ class Journal:
             # On Windows, the file may already be closed.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # Remove the incomplete new file to free space on a full disk: appending to the old file may need it.
+            # Remove the incomplete new file, because appending to the old file may need the space on a full disk.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise
@@ -255,7 +255,7 @@ class Journal:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write the records appended since the rewrite started to the new file; return the number of bytes written.
+        """Write to the new file the records appended since the rewrite started; return the number of bytes written.
 
         Raise OSError if the disk fails.
         """
@@ -423,7 +423,7 @@ def _locked(path: Path, journal: Path) -> int:
         if sys.platform == "win32":
             import msvcrt
 
-            # Lock a byte after the process id, which other processes must be able to read.
+            # Lock a byte after the process id, because other processes must be able to read the process id.
             os.lseek(file, 64, os.SEEK_SET)
             try:
                 msvcrt.locking(file, msvcrt.LK_NBLCK, 1)

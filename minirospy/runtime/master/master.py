@@ -49,10 +49,10 @@ _MAX_CONCURRENT_CHECKS = 100
 QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 LOCK_SECONDS = 3.0
-# Seconds between attempts to lock the journal: the system may release a killed master's port before the lock
+# Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's lock
 _LOCK_PAUSE = 0.02
 
-# maximum age of a killed master's journal at which a new master still resumes its session
+# maximum age in seconds of a killed master's journal for a new master to resume its session
 _RESTART_SECONDS = 600.0
 
 _COLLECT_SECONDS = 60.0
@@ -135,7 +135,7 @@ class Master(MasterApi):
     def session(self) -> str:
         """The /run_id of the continued session; "" if the session is new."""
         found = self.parameters.get("/run_id") if self.parameters.has("/run_id") else ""
-        # Check the id, which any node may have set: it becomes a folder name.
+        # Any node may have set the id, and it becomes a folder name, so accept only harmless characters.
         return found if isinstance(found, str) and re.fullmatch(r"[\w-]{1,64}", found) else ""
 
     @property
@@ -184,7 +184,7 @@ class Master(MasterApi):
                 self._journal.remove()
 
     def attach(self, node: Node) -> None:
-        """Notify ``node``, which runs on this loop, of publishers directly, without an XML-RPC call."""
+        """From now on, report publishers to ``node``, which runs on this loop, by a direct call instead of XML-RPC."""
         self.notifier.here[node.uri] = node.publishers_changed
 
     def serve(self, method: str, args: Sequence[object]) -> object:
@@ -220,7 +220,7 @@ class Master(MasterApi):
         return state
 
     def notify(self, action: Notice) -> None:
-        """Send the notification to its node."""
+        """Send a notification to the node that it is for."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
@@ -289,7 +289,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover the state from the journal and start writing it; return a dict from name to URI of the nodes to check."""
+        """Recover the state from the journal and start writing the journal; return the nodes to check, keyed by name."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
@@ -361,7 +361,7 @@ class Master(MasterApi):
         self.news.append(f"journal: recovered {what}")
 
     def _collect(self) -> None:
-        """Restrict the garbage collector to the youngest objects. If there are few objects, occasionally collect all of them.
+        """Restrict the garbage collector to young objects. If there are only few objects, collect all of them once in a while.
 
         Examining all objects would block a master with many registrations, which hardly ever has cyclic garbage.
         """
@@ -388,7 +388,7 @@ class Master(MasterApi):
             await rpc.close()
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
-        """Remove dead nodes, and send the others the notifications that they may have missed."""
+        """Remove dead nodes, and send the other nodes the notifications that they may have missed."""
         rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_MAX_CONCURRENT_CHECKS)
 
         async def check(name: str, uri: str) -> bool:

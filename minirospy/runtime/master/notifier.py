@@ -40,10 +40,10 @@ _SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starti
 # Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
 MAX_PARAMETERS = 32
 
-# maximum total size in bytes of the large calls in progress; further ones are queued
+# maximum total size in bytes of the large calls in progress; further calls are queued
 _LARGE_BYTES = 32 * 1024 * 1024
 
-# maximum size in bytes of a node's response to a notification, whose contents are ignored
+# maximum bytes of a node's response to a notification; its contents are ignored
 _MAX_ANSWER = 65536
 
 
@@ -120,7 +120,7 @@ class Notifier:
         self._is_writing = False
 
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notifications to a node whose pending response contains the current state of a topic, or of PARAMETERS.
+        """Delay notifications to a node about a topic (or PARAMETERS) whose current state a pending response will tell it.
 
         Otherwise a rospy node might receive the update before the response, and apply the older response last.
         """

@@ -125,7 +125,7 @@ class Publication:
 
         for other in self.links:
             if other.peer == link.peer and other.waiting:
-                # A node has only one connection per topic, so it has lost the old link and no longer receives frames on it.
+                # A node keeps only one connection per topic, so this subscriber has lost the old one and no longer reads it.
                 other.close()
         # A subscriber that has received the header expects all messages published from then on.
         # The link must therefore accept frames before the header is sent.

@@ -89,7 +89,7 @@ class Registrations:
         self._environment = environment
         self._tables = tables
         self.rpc = rpc
-        # If no thread can be started, keep the functions queued, and continue to watch the master.
+        # Runs functions in order. If no thread can be started, they stay queued, and watching the master continues.
         self._again = InOrder(workers)
         self.watch_seconds = watch_seconds
 
@@ -109,7 +109,7 @@ class Registrations:
         self.watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
-        """Unregister everything, and refuse further registrations. The first call is sent before anything else is done.
+        """Unregister everything, and refuse further registrations. Sends the first call to the master at once.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
         response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this is slow.
@@ -194,7 +194,7 @@ class Registrations:
         self._registering.discard(task)
         if not task.cancelled():
             # Retrieve the task's exception, because asyncio logs exceptions that are never retrieved.
-            # A waiting caller also receives the exception. Without one, ignore it, because the call will be retried.
+            # If a caller is waiting, it receives the exception as well. If not, ignore it, because the call will be retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -277,7 +277,7 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # A missing entry proves nothing if the name has been unregistered since.
+                # A missing entry proves nothing if the name has been unregistered since the look-up started.
                 # It also proves nothing for an illegal name, which the master always refuses.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
@@ -299,12 +299,12 @@ class Registrations:
                 _log.warning("the master does not know this node, and refuses to")
 
     async def register_all(self, *, again: bool = False) -> None:
-        """Register everything that the master lacks. Raise MasterUnreachableError if it does not respond."""
+        """Register everything that the master lacks. Raise MasterUnreachableError if the master does not respond."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
             if key in self.taken and self._wanted(key):
                 continue
-            # One registration that the master always refuses must not block the others.
+            # One registration that the master always refuses must not block the other registrations.
             try:
                 await self.update(key, again=again)
             except RpcError as error:
@@ -329,7 +329,7 @@ class Registrations:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
-        """Wait for the last calls to the master to finish, but give up if it stops responding.
+        """Wait for the last calls to the master to finish, but give up if the master stops responding.
 
         If many nodes shut down together, the calls of each are queued at the master. The master's response to a short
         call, which even a busy master handles quickly, shows that it is alive.

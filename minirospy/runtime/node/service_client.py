@@ -159,7 +159,7 @@ def parse_service_uri(uri: str) -> tuple[str, int]:
 
 
 class PeerEndedError(WireError):
-    """The peer closed the connection ``received`` bytes into an incomplete read."""
+    """Raised if the peer closed the connection in the middle of the expected data, after ``received`` bytes."""
 
     def __init__(self, received: int) -> None:
         super().__init__(received)

@@ -103,7 +103,7 @@ class SlaveApi:
         )
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the response to one call, or the steps that compute it. Raise RpcFault if the method is unknown."""
+        """Return the response to one call, or a generator that computes it in steps. Raise RpcFault if the method is unknown."""
         return self.dispatcher.dispatch(method, args)
 
     def get_bus_stats(self, caller_id: str) -> Answer:
@@ -213,7 +213,7 @@ class SlaveApi:
         return [SUCCESS, "shutdown", 0]
 
     def _large_messages(self, link: OutLink) -> str:
-        """Return the end of a connection's text: how its large messages are sent, or "" if there were none."""
+        """Return the last part of a connection's description: how its large messages are sent, or "" if there were none."""
         if not link.large:
             return ""
         chosen = self._node.environment.transport

@@ -35,10 +35,10 @@ _log = logging.getLogger(__name__)
 
 SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a master that has lost its state
 
-# Number of failures before a publisher that refuses connections is reported; one that is shutting down is gone by then
+# Number of failed connections before a publisher is reported; a publisher that is shutting down is gone by then
 _WARN_AFTER = 3
 
-# maximum number of log lines about publishers that send invalid responses; further ones are only counted
+# maximum number of log lines about publishers that send invalid responses; further lines are only counted
 _REFUSALS_LOGGED = 10
 
 _LEAVE_SECONDS = 10.0
@@ -51,7 +51,7 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options to deliver a subscription's messages of up to ``most`` bytes in steps on the loop. ``start`` runs the steps.
+    """Options for delivering a subscription's messages of up to ``most`` bytes in steps on the loop. ``start`` runs the steps.
 
     A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """
@@ -157,7 +157,7 @@ class Subscription:
         self.settling: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
         self._unreachable = unreachable or Unreachable()
-        # Limit the rate, because /rosout has as many publishers as there are nodes.
+        # Limit the rate of log lines, because /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.connecting: dict[str, asyncio.Task[None]] = {}
         # Links to publishers that have left the master's list, each with the timer that closes it.

@@ -13,7 +13,7 @@ __all__ = ["Unreachable", "advice"]
 
 _log = logging.getLogger(__name__)
 
-# maximum number of log lines about unreachable publishers; further ones are only counted
+# maximum number of log lines about unreachable publishers; further lines are only counted
 _MAX_LINES = 10
 
 # seconds within which a publisher's unreachable topics are combined in one log line

@@ -487,7 +487,7 @@ def _parts(uri: str) -> tuple[str, int, str]:
 
 
 def _literal(host: str) -> str:
-    """Return the IPv4 address if ``host`` is one or is known to resolve to one, else ""."""
+    """Return ``host`` if it is an IPv4 address, the IPv4 address that it is known to resolve to, or ""."""
     if host == "localhost":
         return "127.0.0.1"
     try:

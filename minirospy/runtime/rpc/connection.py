@@ -44,11 +44,11 @@ _LINGER_SECONDS = 2.0
 
 _SHORT_BODY = 4096  # maximum bytes of a short body; a longer one is read in steps
 
-# Maximum bytes of a request that is processed together with others; its values may take several times as much memory
+# Maximum bytes of a request that is processed together with others; the parsed values may take several times the memory
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (
-    # transferred bytes after which the time limit starts again, because a large value takes long on a slow radio link
+    # transferred bytes after which the time limit starts again: a large value takes a long time on a slow radio link
     65536
 )
 
@@ -208,7 +208,7 @@ class Connection:
             return b""
 
     def readable(self) -> None:
-        """Read, unless it is other connections' turn; in that case, the loop calls this again in its next iteration."""
+        """Read. If it is other connections' turn, return without reading; the loop calls this again in its next iteration."""
         if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 
@@ -287,7 +287,7 @@ class Connection:
             self._set_deadline()
 
     def _answer(self, message: HttpMessage) -> None:
-        """Respond to a request immediately, or start a task or steps if that would take longer."""
+        """Respond to a request immediately or, if that would take longer, in a task or in steps."""
         if message.method != "POST":
             self.refuse(405, "this is an XML-RPC server: send POST")
             return

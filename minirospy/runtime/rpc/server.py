@@ -49,18 +49,18 @@ while connecting, then up to 25 s for its request.
 
 _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 1024, 0.015
 _READ_SECONDS = 0.003
-"""Seconds per loop iteration for reading from connections that were just accepted. The constants above limit how many
-connections are accepted per iteration, and for how many seconds.
+"""Seconds per loop iteration for reading from connections that were just accepted. The line above sets the limits for
+accepting: the number of connections, and the seconds per iteration.
 
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
 _ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from them
 
-# Number of connections to read before accepting new ones, which takes about 1 ms; thousands may be readable together
+# Number of connections to read before accepting new ones, about 1 ms of work; thousands may be readable together
 _READS_AT_ONCE = 16
 
-# Maximum number of connections to read per loop iteration, and the maximum seconds; the rest are read first in the next one
+# Maximum connections to read per loop iteration, and maximum seconds for it; the next iteration reads the rest first
 _MAX_READS, _READS_SECONDS = 256, 0.01
 
 
@@ -226,7 +226,7 @@ class RpcServer:
         number = 0
         while (self._late_new or self._late) and self._may_read():
             # Alternate between new and other connections, so that many of one kind do not delay the other kind.
-            # The others are idle ones that disconnect, and busy ones.
+            # The other connections are idle ones that disconnect, and busy ones.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:

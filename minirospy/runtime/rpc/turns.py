@@ -107,7 +107,7 @@ class Turns:
         return False
 
     def _claim(self, steps: Steps[None]) -> bool:
-        """Return whether ``steps`` may run alone now; if not, queue it."""
+        """Return whether ``steps`` may run alone now; if not, queue them."""
         if self._alone is None:
             self._alone = steps
         if self._alone is steps:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Access", "listening_lines", "own_addresses"]
 
 _SIOCGIFCONF = 0x8912  # the ioctl that lists IPv4 addresses, see netdevice(7)
-_MAX_ADDRESSES = 1024  # IPv4 addresses that are read; a host of many containers has some hundred
+_MAX_ADDRESSES = 1024  # maximum IPv4 addresses to read; a host with many containers has several hundred
 
 
 class Access:
@@ -113,7 +113,7 @@ def _linux_ipv4_addresses() -> list[str]:
     import socket
     import struct
 
-    # A struct ifreq is an interface's name, and a union that contains a struct sockaddr_in; a struct ifmap is its largest member.
+    # A struct ifreq is an interface's name and a union. One member is a struct sockaddr_in; the largest is a struct ifmap.
     record_size = 16 + (24 if struct.calcsize("P") == 8 else 16)
     address_at = 16 + 4
     records = array.array("B", bytes(record_size * _MAX_ADDRESSES))

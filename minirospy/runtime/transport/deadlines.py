@@ -31,7 +31,7 @@ class Deadlines(Generic[_T]):
         return iter(self._ends)
 
     def set(self, each: _T, seconds: float) -> None:
-        """Limit ``each`` to this many seconds from now; replaces its previous limit."""
+        """Set the time limit of ``each`` to ``seconds`` from now, replacing its previous limit."""
         loop = asyncio.get_running_loop()
         end = self._ends[each] = loop.time() + seconds
         if self._timer is None or end < self._next:

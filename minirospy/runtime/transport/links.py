@@ -29,7 +29,7 @@ __all__ = ["OutLink"]
 _GATHER = 64
 # seconds for which a publishing thread itself tries to write a large message to the socket
 _PUSH_SECONDS = 0.005
-_PUSH_WAIT_MS = 1  # milliseconds per wait during that time
+_PUSH_WAIT_MS = 1  # milliseconds per wait for space in the socket's buffer
 
 # a frame in an outbox: the whole frame, or the buffers that are not sent yet
 _Waiting = bytes | list[bytes | memoryview]
@@ -65,8 +65,8 @@ class OutLink:
         self.sent_bytes = len(header)
         self.sent = 0
         self.dropped = 0
-        self.large = 0  # number of messages that are long enough for shared memory
-        self._last_large = 0  # size in bytes of the last such message
+        self.large = 0  # number of large messages: long enough for shared memory
+        self._last_large = 0  # size in bytes of the last large message
         self.ring = ring  # this end of the shared memory, or None if the subscriber cannot read any
 
         self._is_same_host = sock.family not in FAMILIES

@@ -20,7 +20,7 @@ __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answe
 PROTOCOL = "UNIXROS"
 _PREFIX = "minirospy-"  # the prefix of socket names
 
-TRUSTED_USERS = frozenset({0})  # ids of the users that are trusted in addition to this process's own: root
+TRUSTED_USERS = frozenset({0})  # trusted user ids in addition to this process's own: root
 
 
 class UnixAddress(NamedTuple):
@@ -64,7 +64,7 @@ def connect(name: str) -> socket.socket:
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """Connect to the server at ``host`` and ``port``; return a non-blocking socket, or None if only TCP reaches it.
+    """Connect to the Unix socket of the server at ``host`` and ``port``; return it in non-blocking mode, or None if this fails.
 
     Another user on this machine could bind the name first, so the server must belong to this user or root.
     """
@@ -82,7 +82,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: object) -> UnixAddress | None:
-    """Parse the address in a publisher's response to requestTopic. Return None if it is for another protocol."""
+    """Parse the address in a publisher's response to requestTopic. Return None if the response is for another protocol."""
     match answer:
         # A peer must not be able to choose any other socket on this machine, for example a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):

@@ -85,8 +85,8 @@ class LoopThread:
         return functools.partial(self._wait, tasks, pending)
 
     def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
-        # Do not use concurrent.futures.Future: its caller holds a lock that the loop needs to set the result.
-        # A signal handler that waits for the loop while it interrupts that caller would deadlock.
+        # Do not use concurrent.futures.Future: its result() takes a lock that the loop needs to set the result.
+        # A signal handler that interrupts result() and then waits for the loop would deadlock.
         try:
             if not pending.acquire(timeout=-1 if timeout is None else timeout):
                 raise TimeoutError

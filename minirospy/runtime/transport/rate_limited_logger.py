@@ -37,7 +37,7 @@ class RateLimitedLogger:
         self._write(logging.INFO, text, args)
 
     def close_later(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Schedule :meth:`close` for the end of the current ten seconds if the last line was the first one omitted."""
+        """If exactly one line has been omitted so far, schedule :meth:`close` for the end of the current ten-second window."""
         if self._omitted == 1:
             loop.call_later(max(0.0, self._end - time.monotonic()), self.close)
 

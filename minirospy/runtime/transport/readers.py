@@ -41,7 +41,8 @@ from minirospy.runtime.transport.sockets import (
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096  # bytes per receive, and per connection's buffer, for frames that are read in steps
+# bytes per receive for frames that are read in steps; each connection has a buffer of this size
+_TURN_CHUNK = 4096
 
 _DRAIN_BYTES = 64 * 1024 * 1024
 # maximum bytes to allocate per receive, so that a large length prefix alone cannot make this process allocate much memory
@@ -105,7 +106,7 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop, for receivers so fast that a thread per receiver would cost more.
+    """Read frames on the loop, for callbacks so short that a thread per connection would cost more time.
 
     ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
@@ -239,8 +240,8 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # The flag is also False if bytes were ready but this thread had to wait for the GIL.
-        # Other threads in this process then need the GIL.
+        # The flag is also False if bytes were ready but this thread had to wait for the GIL:
+        # busy-polling would then slow down the other threads, which need the GIL.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count
@@ -254,14 +255,14 @@ class _FrameSource:
             yield from self._follow(length)
             if not self._rest:
                 return
-            # Words about shared memory are short, so other frames may have arrived with them.
+            # Control messages about shared memory are short, so other frames may have arrived with them.
             rest, self._rest = self._rest, b""
             self._was_large = False
             reader.put_back(rest)
             yield from reader.received(0)
 
     def _follow(self, word: int) -> tuple[Frame, ...]:
-        """Return the frame that follows a length over ``CHUNK``, or the result of a word about shared memory."""
+        """Return the frame of length ``word``, or handle ``word`` if it is the code of a control message about shared memory."""
         if not self._ring or word < ring.PREPARE_WORD:
             return (self._large(word),)
         if word == ring.PLACE_WORD:

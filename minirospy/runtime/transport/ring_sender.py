@@ -30,7 +30,7 @@ QUIET_SECONDS = 5.0  # seconds without a large message after which a ring's memo
 
 # Seconds for which a publishing thread waits for a subscriber to release a place: the same as for a full socket.
 _WAIT_SECONDS = 0.005
-_WAIT_MS = 1  # milliseconds per wait during that time
+_WAIT_MS = 1  # milliseconds per wait for a subscriber to release a place
 
 _log = logging.getLogger(__name__)
 
@@ -147,7 +147,7 @@ class SharedRing:
         self.give_back_retired()
 
     def release_at_exit(self, memory: RingMemory, sender: RingSender, process: int) -> None:
-        """Release a closed connection's places when its subscriber exits, because until then it may read them.
+        """Release a closed connection's places when its subscriber exits; until then, the subscriber may still read them.
 
         Call this on the loop, with the lock held.
         """
@@ -275,7 +275,7 @@ class Sharing:
     def __init__(self, shared: SharedRing, frame: LargeFrame) -> None:
         self.frame = frame
         self._ring = shared
-        # the place and its memory, which may meanwhile have been replaced by another one
+        # the message's place, and the memory that contains it, which may no longer be the ring's current memory
         self._memory: RingMemory | None = None
         self._place = 0
 
@@ -300,7 +300,7 @@ class Sharing:
         return place
 
     def close(self) -> None:
-        """Release the place. Subscribers hold it until they have read it."""
+        """Release this object's hold on the place. Each subscriber holds the place until it has read the message."""
         memory, self._memory = self._memory, None
         if memory:
             with self._ring.lock:
@@ -392,7 +392,7 @@ class RingSender:
             self._turn_off("the subscriber has released more than it held")
 
     def close(self) -> None:
-        """Forget the connection. If the subscriber holds places, replace the ring, because it may still read them.
+        """Forget the connection. If the subscriber holds places, replace the ring, because the subscriber may still read them.
 
         Call this on the loop.
         """
@@ -436,7 +436,7 @@ class RingSender:
         return True
 
     def _wait_for_room(self, places: Places, size: int) -> bool:
-        """Wait briefly for the subscriber to release a place; return whether it may now hold one more.
+        """Wait briefly for the subscriber to release a place; return whether the subscriber may now hold another one.
 
         Return False immediately if the subscriber released no place during the last wait, and none since.
         """

@@ -52,6 +52,6 @@ def why_impossible() -> str:
 
 
 def ascii_text(error: Exception) -> str:
-    """Return an error's text in ASCII, since other processes parse it; the system's texts may be translated."""
+    """Return an error's text in ASCII, because other processes parse it; the system's messages may be translated."""
     text = getattr(error, "strerror", None) or str(error)
     return text.encode("ascii", "replace").decode()

@@ -36,7 +36,7 @@ BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process
 KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence before probing (on macOS called TCP_KEEPALIVE), seconds between probes, number of probes."""
 
-# Buffer size to request for a Unix socket, in bytes; as much as TCP buffers.
+# Buffer size to request for a Unix socket, in bytes; TCP sockets buffer as much.
 # Linux limits it to net.core.wmem_max (208 kB by default).
 _SEND_BUFFER = 4 * 1024 * 1024
 
@@ -68,7 +68,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def enlarge_send_buffer(sock: socket.socket) -> None:
-    """Let a Unix socket buffer several megabytes, or as much as the kernel allows. TCP enlarges its own buffers.
+    """Enlarge a Unix socket's send buffer to several megabytes, or as far as the kernel allows. TCP enlarges its own buffers.
 
     Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process in between.
     """

@@ -199,7 +199,7 @@ class BagSession(JsonSession):
         try:
             bag = self._bag = await asyncio.wrap_future(future)
         except asyncio.CancelledError:
-            # The page was closed while the bag was being opened, so close it as soon as it is open.
+            # The page was closed while the bag was being opened, so close the bag once it is open.
             future.add_done_callback(_close_opened)
             raise
         start, end = bag.span
@@ -246,7 +246,7 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # A step publishes all messages with the same time. After a seek, those at the current time have not been published yet.
+        # A step publishes all messages with the same time. After a seek, the messages at the current time are still unpublished.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:

@@ -18,12 +18,12 @@ __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
 _MAX_COLUMNS = 5_000  # maximum number of columns: with MAX_SERIES series, 2,000,000 points
 _MAX_SERIES = 100  # maximum number of paths per request
-_MARGIN_SECONDS = 10.0  # seconds read before a range, to find a point of the subtrahend before the minuend's
-_WIDER = 4  # factor by which the margin grows while the subtrahend has no point in it
+_MARGIN_SECONDS = 10.0  # seconds to read before a range, for an earlier point of the subtrahend
+_WIDER = 4  # factor by which this margin grows until it contains a point of the subtrahend
 
 
 class Operand(NamedTuple):
-    """A path in a bag, which is named as on the page."""
+    """A path in a bag; ``bag`` is the bag's name on the page."""
 
     bag: str
     path: str
@@ -92,7 +92,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
     budget = Budget()
     by_bag: dict[str, list[BagPath]] = {}
     for each in request.paths:
-        # Read all paths in a bag together. A difference needs two readers of the same bag, which may be at different positions.
+        # Read all paths in a bag together. A difference needs two readers of the same bag, because their positions may differ.
         place = each.operand.bag if each.minus is None else f"{each.key}\0"
         by_bag.setdefault(place, []).append(each)
     for done, group in enumerate(by_bag.values()):
@@ -161,7 +161,7 @@ def _read(
 def _start_before(
     reader: BagReader, path: FieldPath, start: float, on_time: Callable[[float], object]
 ) -> float | None:
-    """Return a time from which reading finds a point before ``start``, or None (the bag's start) if there is no such point."""
+    """Return a time such that reading from there finds a point before ``start``; None (the bag's start) if there is none."""
     margin = _MARGIN_SECONDS
     while margin < start:
         for _ in bag_series.points(reader, [path], start - margin, start, on_time):

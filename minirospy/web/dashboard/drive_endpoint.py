@@ -279,7 +279,7 @@ class _Driven:
         held: Held,
         stopped: Callable[[str], None],
     ) -> None:
-        """Advertise the topic. Raise BridgeError if clients may not publish it, or its type is different."""
+        """Advertise the topic. Raise BridgeError if clients may not publish it, or if the topic has a different type."""
         self.kind = type(held)
         self._graph = graph
         self._guard = guard

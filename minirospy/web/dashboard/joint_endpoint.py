@@ -67,7 +67,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.always_publishes = always_publishes
         self.joints: JointStates | None = None
         self.parameters: JointParameters | None = None
-        self.why = ""  # why there are no joints, or ""
+        self.why = ""  # the reason why there are no joints, or ""
         self.warnings: list[str] = []
         self.kinds: dict[str, str] = {}
         self.robot = ""
@@ -327,7 +327,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints' positions, after the joints themselves if they have been reloaded."""
+        """Send the joints' positions; if the joints have been reloaded, send the joints first."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())
@@ -376,7 +376,7 @@ def _described(
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:
-    """Return the robot's name, and a dict from joint to type, which determines its unit."""
+    """Return the robot's name, and a dict from joint name to joint type; the type determines the unit of a position."""
     root = parse_xml(description, "robot_description")
     kinds = {
         joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")

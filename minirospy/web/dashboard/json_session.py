@@ -322,7 +322,7 @@ class JsonEndpoint(Generic[_S]):
 async def wait_until(event: asyncio.Event, end: float) -> None:
     """Wait for an event, or until the loop's clock is past ``end``."""
     # Do not use asyncio.wait_for: before Python 3.12, it may lose a cancellation that coincides with the event.
-    # Loops may run timers early by the clock's resolution: without adding it, callers that compare times would spin.
+    # A loop may run a timer early, by up to the clock's resolution: add it, or callers that compare times would spin.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + CLOCK_SECONDS, event.set) if end < math.inf else None
     try:

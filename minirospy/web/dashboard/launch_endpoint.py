@@ -114,7 +114,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Check whether the node has exited before reading: the file then contains everything that it wrote.
+        # Check whether the node has exited before reading: the file then contains everything that the node wrote.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -129,7 +129,7 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # The data may end within a character, so return complete lines, except for a very long or a last line.
+        # The data may end within a character, so return only complete lines, unless a line is very long or the last one.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]
@@ -162,7 +162,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches if any of them has changed, and new lines of the shown log."""
-        # Check this before sending, so that a change during the sending causes another call.
+        # Read this before sending: if a launch ends while data is being sent, another call must send its final state.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -232,7 +232,7 @@ class LaunchSession(JsonSession):
             self.client.send_text_message("launches", text.encode(), newest_only=True)
 
     async def _send_log(self) -> bool:
-        """Send new lines of the shown log. Return whether to poll it again even if no launch changes."""
+        """Send new lines of the shown log. Return whether the log must be polled again even if no launch changes."""
         tail = self._tail
         if tail is None:
             return False

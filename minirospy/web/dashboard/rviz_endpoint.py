@@ -105,7 +105,7 @@ class RvizSession(JsonSession):
         return name, fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`. Sends nothing until the client requests it."""
+        """See :meth:`JsonSession.started`. Sends nothing before the client's first request."""
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
         """See :meth:`JsonSession.in_thread`. Runs the function in the endpoint's thread."""

@@ -133,7 +133,7 @@ def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[s
 
 
 def _after(start: str, value: object, separator: str, depth: int) -> Iterator[str]:
-    """Yield the lines of a value that follows ``start``, a key or a dash."""
+    """Yield the lines of ``start``, which is a key or a dash, and of the value that follows it."""
     if not isinstance(value, dict | list) or not value:
         yield f"{start} {_word(value)}"
         return

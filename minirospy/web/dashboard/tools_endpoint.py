@@ -106,7 +106,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # A single thread delays the next survey until a cancelled one has ended.
+                # Use a single thread: the next survey then starts only after a cancelled one has ended.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}
@@ -164,7 +164,7 @@ class ToolsSession(JsonSession):
         return text_of(fields, "do"), fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`. Sends nothing until the client requests it."""
+        """See :meth:`JsonSession.started`. Sends nothing before the client's first request."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """See :meth:`JsonSession.dispatch`."""

@@ -41,13 +41,13 @@ class Assets:
             raise BridgeError(f"'{error.pattern!s}' is not a regular expression: {error}") from error
 
     def open(self, uri: str) -> tuple[BinaryIO, int]:
-        """Open a file; return it and its size. Raise BridgeError, with the reason, if it may not or cannot be read."""
+        """Open a file; return it and its size. Raise BridgeError with the reason if reading it is not allowed or fails."""
         try:
             file = self._path(uri).open("rb")
         except OSError as error:
             raise BridgeError(f"{uri}: {error.strerror}") from None
         except ValueError:
-            # A file name cannot contain such a character, for example an unpaired surrogate.
+            # A file name cannot contain certain characters, such as an unpaired surrogate.
             raise BridgeError(f"Asset URI not allowed: {uri[:200]!a}") from None
         size = os.fstat(file.fileno()).st_size
         if size > self._max_bytes:

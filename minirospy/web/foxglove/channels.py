@@ -14,7 +14,7 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout in seconds for querying types that are not installed; short, because the channels of all clients wait for it."""
+"""Timeout in seconds for querying types that are not installed; short, because all clients wait for their channels meanwhile."""
 
 
 class Channels:

@@ -64,7 +64,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _capabilities(names: Sequence[str]) -> list[str]:
-    """Return the capabilities with the configured names. As in the real bridge, "time" depends on /use_sim_time."""
+    """Return the configured capabilities except "time", which depends on /use_sim_time, as in foxglove_bridge."""
     unknown = [name for name in names if name not in (*CAPABILITIES, "time")]
     if unknown:
         raise BridgeError(f"~capabilities: {', '.join(unknown)}: known are {', '.join(CAPABILITIES)}")

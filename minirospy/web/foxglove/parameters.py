@@ -126,7 +126,7 @@ class Parameters:
             self._graph.spawn(self._report(tuple(again), emptied))
 
     async def _report(self, names: tuple[str, ...], emptied: str) -> None:
-        """Send current values to the subscribers, and ``emptied`` to clients that subscribe to all parameters."""
+        """Send current values to the subscribers. Clients that subscribe to all parameters get only the parameter ``emptied``."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
             mine = [each for each in found if each.name in (wanted or (emptied,))]

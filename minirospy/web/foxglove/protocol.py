@@ -100,7 +100,7 @@ class ServiceOffer(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """A parameter. ``is_set`` is False if it is not set, or is to be deleted."""
+    """A parameter. ``is_set`` is False if the parameter is not set, or is to be deleted."""
 
     name: str
     value: object = None

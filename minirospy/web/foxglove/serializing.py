@@ -155,7 +155,7 @@ def service_call_failure(service_id: int, call_id: int, message: str) -> str:
 def connection_graph_update(
     changed: GraphTables, removed_topics: Iterable[str], removed_services: Iterable[str]
 ) -> str:
-    """Return the message with changed entries of the graph's tables, each complete, and the removed names."""
+    """Return the message that updates the graph: the complete entries that have changed, and the names that were removed."""
 
     def listed(table: Mapping[str, Sequence[str]], key: str) -> list[dict[str, object]]:
         return [{"name": name, key: list(nodes)} for name, nodes in table.items()]
@@ -223,7 +223,7 @@ def _parameter_fields(parameter: Parameter) -> dict[str, object]:
 
 
 def _json_value(value: object) -> object:
-    """Convert a parameter's value for JSON: bytes to base64, and numbers that JSON does not have to strings."""
+    """Convert a parameter's value for JSON: bytes to base64, and numbers that JSON cannot represent to strings."""
     if isinstance(value, dict):
         return {str(key): _json_value(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -45,7 +45,7 @@ _MAX_CALLS = 200
 """maximum number of concurrent calls and requests per client"""
 
 _MAX_CHANNELS = 1000
-"""Maximum number of topics that a client may publish, and of its subscriptions, each of which gets every message."""
+"""Maximum number of topics that a client may publish, and maximum number of its subscriptions, which all get every message."""
 
 _MAX_PARAMETERS = 10_000
 """maximum number of parameters that a client may subscribe to by name"""

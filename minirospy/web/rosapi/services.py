@@ -197,7 +197,7 @@ class Rosapi:
         return {"type": await self._type_of(self.node.resolve(request.service))}
 
     async def _service_providers(self, request: ServiceProvidersRequest) -> object:
-        """Return the nodes that provide services of a type, which the request calls ``service``."""
+        """Return the nodes that provide services of a type; the request's field for the type is called ``service``."""
         found = await self._services_of(request.service)
         return {"providers": [node for _, nodes in found for node in nodes]}
 

@@ -39,7 +39,7 @@ class TypeDefinition:
 
 
 def describe(class_: type[Message], find: Callable[[str], type[Message]]) -> list[TypeDefinition]:
-    """Describe a type, and each type that it uses once. ``find`` maps a type's name to its class."""
+    """Describe a type and, once each, the types that it uses. ``find`` maps a type's name to its class."""
     return list(_walk(_described(class_), find, {_name_of(class_)}))
 
 

@@ -43,7 +43,7 @@ _STATUSES = {
 
 @dataclass
 class _Running:
-    """A goal without a result. ``goal`` is set once it can be sent; ``is_cancelled`` is set on a cancel request."""
+    """A goal without a result. ``goal`` is set once the goal can be sent; ``is_cancelled`` is set on a cancel request."""
 
     goal: ClientGoal[Message, Message] | None = None
     is_cancelled: bool = False
@@ -198,7 +198,7 @@ class ClientActions:
             raise type_conflict(topic, wanted, known)
 
     async def _leave(self, name: str, class_: Any) -> None:
-        """Unregister an action's topics, so that it can be used with another type."""
+        """Unregister an action's topics, so that the action can be used with another type."""
         if action := self._actions.pop((name, class_), None):
             await asyncio.wait([self._session.graph.spawn(action.client.close())])
 
@@ -258,7 +258,7 @@ class ClientActions:
 async def _cancel_without_server(
     client: ActionClient[Any, Message, Message], goal: ClientGoal[Message, Message]
 ) -> Exception | None:
-    """Wait for a server. If there is none in time, cancel the goal, so that it is not sent later; return the error."""
+    """Wait for a server. If none appears in time, cancel the goal, so that it is not sent later; return the error."""
     try:
         await client.wait_for_server(SERVER_SECONDS)
     except Exception as error:  # noqa: BLE001 - the caller raises it once the goal has ended

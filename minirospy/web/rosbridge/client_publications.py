@@ -76,7 +76,7 @@ class ClientPublications:
             self._session.count()
 
     def _release(self, published: _Published) -> None:
-        """Release a publication after a delay, so that it can be advertised again meanwhile.
+        """Release a publication after a delay, so that the client can advertise its topic again in the meantime.
 
         Release it immediately if it stores a large message.
         """

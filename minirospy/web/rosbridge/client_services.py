@@ -79,7 +79,7 @@ class ClientServices:
         self._session.send_encoded(messages)
 
     async def _encoded(self, event: protocol.CallService, response: Response) -> list[str | bytes]:
-        """Encode a response as one or more messages. Encode a large response in a thread."""
+        """Encode a response as one or more messages; a large response is encoded in a thread."""
         shared = self._session.shared
         size = event.fragment_size or shared.options.fragment_size
 

@@ -57,7 +57,7 @@ class ClientSubscriptions:
         self._add(event)
 
     async def _subscribe_unknown(self, event: protocol.Subscribe, error: BridgeError) -> None:
-        """Subscribe with a type that is not installed, if the topic has this type: its publishers send the definition."""
+        """Subscribe with a type that is not installed, if the topic has this type: the topic's publishers send the definition."""
         with contextlib.suppress(BridgeError):
             if await self._session.type_of(event.topic) == event.type:
                 self._add(event)

@@ -51,7 +51,7 @@ class ClientTopics:
                 await publisher.close()
 
     def changed(self, sessions: Sequence[RosbridgeSession]) -> None:
-        """Publish the clients of the open sessions."""
+        """Publish the new list of connected clients, given the open sessions."""
         self._sessions = sessions
         self._publish()
 

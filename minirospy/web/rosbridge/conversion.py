@@ -139,7 +139,7 @@ def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return a call's arguments, a dictionary or a list in field order, as a dictionary of the request's fields.
+    """Return a call's arguments (a dictionary, or a list in field order) as a dictionary of the request's fields.
 
     For other arguments, return no fields.
     """
@@ -222,7 +222,7 @@ def _from_time(
         if type(part) is not int:
             raise _mismatch(root, (*path, name), "int32", part)
         setattr(present, name, part)
-    # Clients may send a second or more in nanoseconds, and C++ nodes do not normalize received times.
+    # Clients may send times with 1e9 or more nanoseconds, and C++ nodes do not normalize the times that they receive.
     present.canon()  # type: ignore[attr-defined]
     return present
 

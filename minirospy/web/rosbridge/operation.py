@@ -38,14 +38,14 @@ MAX_TOPICS = 1000
 MAX_WAITING_BYTES = 64_000_000
 
 REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, MessageException)
-"""Exceptions of an operation that are reported to the client."""
+"""Exceptions that are reported to the client if an operation raises them."""
 
 Work = Coroutine[object, object, None]
 """The remaining work of an operation that must wait, for example for the graph."""
 
 
 class OperationSession(Protocol):
-    """The session of the client that has sent the operation, as the handlers use it."""
+    """The interface of a client's session that the handlers of its operations use."""
 
     @property
     def client(self) -> WebClient: ...
@@ -84,7 +84,7 @@ class OperationSession(Protocol):
         """Start a task that is cancelled when the session ends."""
 
     async def type_of(self, topic: str) -> str:
-        """Return the type of a topic in the graph. Raise BridgeError if it has none."""
+        """Return the type of a topic in the graph. Raise BridgeError if the topic has no type."""
 
     def is_allowed(self, kind: str, name: str, what: str) -> bool:
         """Return whether the globs allow a name; if not, send rosbridge's warning."""
@@ -101,7 +101,7 @@ def check_name(kind: str, name: str) -> None:
 
 
 def type_conflict(topic: str, wanted: str, known: str) -> BridgeError:
-    """Return the error that a topic has another type in the graph, with rosbridge's message."""
+    """Return the error, in rosbridge's words, for a topic that has another type in the graph."""
     return BridgeError(
         f"Tried to register topic {topic} with type {wanted} but it is already established with type {known}"
     )

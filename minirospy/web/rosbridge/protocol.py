@@ -231,7 +231,7 @@ def decode(data: str | bytes) -> Fields:
 
 
 def decode_in_pieces(data: str | bytes) -> Fields:
-    """Decode an operation like :func:`decode`, but without holding the GIL for long. For use in a thread beside the loop."""
+    """Decode an operation like :func:`decode`, but without holding the GIL for long. For use outside the loop's thread."""
     return _decode(data, load_json_in_pieces)
 
 
@@ -294,8 +294,8 @@ def _text_of(value: object, most: int) -> str:
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Cut off a JSON or CBOR value after as many items as may be visible: each takes at least one character of output."""
-    # Python chooses a string's quotes by the quotes in it, so keep those in the part that is cut off.
+    """Shorten a JSON or CBOR value: keep only as many items as can be visible, because each takes at least one character."""
+    # Which quotes Python puts around a string depends on the quotes in it, so keep the quotes of the part that is cut off.
     if isinstance(value, str) and len(value) > most:
         return value[:most] + "".join(quote for quote in "'\"" if quote in value)
     if isinstance(value, bytes) and len(value) > most:

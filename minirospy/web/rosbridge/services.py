@@ -67,7 +67,7 @@ async def call(
 
 
 async def _type_of(graph: SharedGraph, service: str) -> str:
-    """Query the type of a service. Raise BridgeError if it does not exist, ServiceException if it cannot be reached."""
+    """Query the type of a service. Raise BridgeError if the service does not exist, ServiceException if it cannot be reached."""
     try:
         return (await service_header(graph.node, service)).get("type", "")
     except ServiceException as error:

@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 # Bytes of memory that a parsed operation takes per byte of text, if it contains objects or lists of numbers.
 _VALUE_FACTOR = 4
 
-# maximum size of a CBOR message from a read-only client, which sends only small requests: each byte may become a value
+# maximum size of a CBOR message from a read-only client: its requests are small, and each byte may become a value
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4
@@ -119,7 +119,7 @@ class RosbridgeSession:
         self._publications.close()
         self._services.close()
         self._actions.close()
-        # Release memory now: the session is in reference cycles, so the garbage collector would do it later.
+        # Release memory now: the session is in reference cycles, so the garbage collector would release it only later.
         self._inbox.clear()
         self._fragments.clear()
         for task in list(self._tasks):
@@ -199,7 +199,7 @@ class RosbridgeSession:
         self._is_working = False
 
     def _begin(self, data: str | bytes) -> _Pending | None:
-        """Start an operation. Return the rest if it must wait, otherwise None."""
+        """Start an operation. If the operation must wait, return the rest of its work, otherwise None."""
         self.operation_size = _VALUE_FACTOR * sys.getsizeof(data)
         if not protocol.is_quick(data):
             return self._begin_large(data)
@@ -253,7 +253,7 @@ class RosbridgeSession:
         except REFUSALS as error:
             self._failed(event, error)
             return None
-        # If a fragment completes an operation, this operation has its own event.
+        # If ``event`` is a fragment that completes an operation, ``pending`` already contains that operation's event.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:
@@ -264,7 +264,7 @@ class RosbridgeSession:
             self._failed(pending.event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
-        # rosbridge prefixes the operation's name, except to errors that it detects itself.
+        # rosbridge prefixes errors with the operation's name, except for errors that it detects itself.
         front = "" if isinstance(error, OperationError) else f"{_OPERATIONS[type(event)]}: "
         self.status(StatusLevel.ERROR, f"{front}{error}", event.id)
 
@@ -298,7 +298,7 @@ class RosbridgeSession:
     # --- called by the handlers of operations
 
     async def type_of(self, topic: str) -> str:
-        """Return the type of a topic in the graph. Raise BridgeError if it has none."""
+        """Return the type of a topic in the graph. Raise BridgeError if the topic has no type."""
         resolved = self.graph.node.resolve(topic)
         if self.graph.snapshot.types.get(resolved, ANY) == ANY:
             await self.graph.look()

@@ -59,7 +59,7 @@ class _LargeWork:
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
         """Run ``work`` in the thread; return its result."""
-        # Do not queue work in the executor, so that its message is freed immediately if the client leaves while it waits here.
+        # Wait here instead of in the executor's queue: if the client leaves meanwhile, the message of the work is freed at once.
         async with self._is_busy:
             if self._is_closed:
                 raise asyncio.CancelledError
@@ -103,7 +103,7 @@ class RosbridgeShared:
         self._encoded.clear()
 
     def release(self, publication: Publication) -> None:
-        """Release a publication after a delay, so that clients can advertise it again meanwhile."""
+        """Release a publication after a delay, so that clients can advertise its topic again in the meantime."""
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
 
     def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:

@@ -24,11 +24,11 @@ __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 
 # seconds that a client has to send its request; browsers open some connections in advance
 SILENT_SECONDS = 5.0
-# maximum number of connections per address within SILENT_SECONDS and without a request; a browser opens six
+# maximum number of connections per address that have not sent a request yet; a browser opens six
 MAX_SILENT = 16
 # seconds without traffic after which a client counts as idle; the dashboard's pages always have traffic sooner
 IDLE_SECONDS = 30.0
-FEW = 8  # an address has few connections if it has less than an eighth of all
+FEW = 8  # an address has few connections if it has less than one in this many of all connections
 
 
 class Rank(IntEnum):

@@ -143,7 +143,7 @@ class ClientConnection(Protocol):
 
 
 class WebClient:
-    """A WebSocket client, as its session uses it."""
+    """A WebSocket client, with the methods that its session uses."""
 
     def __init__(
         self, connection: ClientConnection, request: HttpRequest, grant: Grant, subprotocol: str | None
@@ -198,7 +198,7 @@ class WebClient:
         )
 
     def holds(self, count: int) -> None:
-        """Record how many bytes of memory the session uses for queued messages from the client and the current one."""
+        """Record how many bytes of memory the session uses for the client's current message and its queued messages."""
         self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
@@ -211,7 +211,7 @@ class WebClient:
         self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
 
     def send_texts(self, key: Hashable, texts: Sequence[str], *, newest_only: bool = False) -> None:
-        """Send a message of a stream as several text messages, which are queued or dropped together."""
+        """Send one message of a stream as several text messages; these are queued or dropped together."""
         pieces: list[Piece] = []
         for text in texts:
             data = text.encode()
@@ -230,7 +230,7 @@ class WebClient:
         self._connection.in_turn(work, message)
 
     def hold_work(self, *, is_held: bool) -> None:
-        """Stop running the functions passed to :meth:`in_turn`, or continue.
+        """Stop running the functions passed to :meth:`in_turn` if ``is_held``, otherwise continue running them.
 
         Used to preserve the order while the last one continues in a thread.
         """

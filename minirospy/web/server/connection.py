@@ -144,7 +144,7 @@ class Connection:
         self._are_jobs_held = False  # whether a job continues in a thread; see hold_jobs()
         self._held = 0  # bytes of memory that the session uses for the client; see session_holds()
         self._is_in_turn = False  # whether _work() is running
-        # Calls _handshake_late at first, later the periodic check of the open connection or, while closing, _abort.
+        # The timer first calls _handshake_late, later the periodic check of the open connection or, while closing, _abort.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
 
     @property
@@ -205,7 +205,7 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
-        # Release memory now: the connection is in reference cycles, so the garbage collector would do it later.
+        # Release memory now: the connection is in reference cycles, so the garbage collector would release it only later.
         self._jobs.clear()
         self._output.end()
         self.site.account.close(self.share)
@@ -214,7 +214,7 @@ class Connection:
     # --- output
 
     def answer(self, pieces: tuple[Piece, ...]) -> None:
-        """Send a message to the client that must not be dropped."""
+        """Send to the client a message that must not be dropped."""
         if not self.is_open:
             return
         # Check the limit before appending: a single response, such as a mesh, may exceed it.
@@ -227,14 +227,14 @@ class Connection:
         self._output.schedule()
 
     def answer_file(self, answer: FileAnswer) -> None:
-        """Send a file to the client, which must not be dropped."""
+        """Send to the client a file that must not be dropped."""
         if self.is_open:
             self.queue.put_file(answer)
             self._count()
             self._output.schedule()
 
     def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None:
-        """Send a message to the client that may be dropped."""
+        """Send to the client a message that may be dropped."""
         if self.is_open:
             self.queue.put(key, pieces, newest_only=newest_only)
             if self._output.is_full:
@@ -271,7 +271,7 @@ class Connection:
     # --- called by the client's session
 
     def hold(self, *, is_held: bool) -> None:
-        """Stop handling frames while the session processes a message, or continue. Unread data stays in the socket's buffer."""
+        """If ``is_held``, stop handling frames, because the session is processing a message; otherwise continue handling them."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()
@@ -298,7 +298,7 @@ class Connection:
             self._count()
 
     def hold_jobs(self, *, are_held: bool) -> None:
-        """Stop running queued work for the client while the last function continues in a thread, or continue."""
+        """If ``are_held``, stop running queued work for the client while its last job runs in a thread; otherwise continue."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
             self.site.turns.start(self.turn)

@@ -96,7 +96,7 @@ class Listener:
         return self._tls is not None
 
     async def open(self, host: str, port: int) -> None:
-        """Start listening, for port 0 on any free port. Raise BridgeError if the port cannot be opened."""
+        """Start listening; port 0 means any free port. Raise BridgeError if the port cannot be opened."""
         loop = asyncio.get_running_loop()
         try:
             sock = tcp.bind(host, port)
@@ -253,7 +253,7 @@ class Listener:
         now = asyncio.get_running_loop().time()
         while found := displaced(peer, rank, occupants, now):
             if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):
-                found.rank = Rank.OWN  # determined only here, because it is rarely needed and slow
+                found.rank = Rank.OWN  # determine this only here: it is slow, and rarely needed
                 continue
             _log.info("%s gives way to %s", found.peer, peer)
             found.give_way()

@@ -44,7 +44,7 @@ class Liveness:
         """Return what to do with the client now."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
-        # After a suspension of the machine, the last data is old even if no ping is unanswered, so check for a ping.
+        # A suspension of the machine makes the last data old, too, so a client counts as silent only if a ping is unanswered.
         if self._is_pinged and now - self.received > self._silent_seconds:
             return Verdict.SILENT
         if is_full:

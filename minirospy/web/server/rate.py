@@ -9,7 +9,7 @@ from typing import NamedTuple
 __all__ = ["MAX_ADDRESSES", "ConnectionRate"]
 
 MAX_ADDRESSES = 1000
-"""Maximum number of stored addresses; beyond it, the address with the oldest last connection is forgotten."""
+"""Maximum number of stored addresses; above it, the address that has not connected for the longest time is forgotten."""
 
 
 class _Bucket(NamedTuple):

@@ -32,14 +32,14 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients
 # seconds of work for a client before the next client's turn: with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# number of jobs for which a client is new: each is expected to take at least as long as jobs of other new clients
+# number of jobs for which a client counts as new; their expected time is at least that of other new clients' jobs
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which a client's expected time per job decays after a shorter job
 IMMEDIATE_SHARE = 0.5  # fraction of the time that work may use without being queued
 # Maximum length of an interactive client's burst of work, in slices (1 ms in total).
 # A request takes 0.1 to 0.5 ms to handle; 64 kB of empty frames take 100 ms.
 # A new client starts with one slice, and gets one more after each short burst.
-# Therefore, if 250 new clients flood the server, its other clients are served after one slice for each of them.
+# Therefore, if 250 new clients flood the server, the other clients are served after one slice for each new client.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients, which lets interactive clients use 200 ms before bulk clients get another slice
 MAX_DEBT_TURNS = 10
@@ -70,7 +70,7 @@ class Share:
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
         self.queue = queue  # the queue that contains the client: interactive or bulk
-        # seconds used, at least the queue's tag when the client last became active
+        # seconds used; raised to at least the queue's tag whenever the client becomes active
         self.tag = queue.served
         self.weight = 1.0  # set when the client's rights are known
         # expected seconds of the client's next job, estimated from earlier ones
@@ -182,7 +182,7 @@ class FairTurns:
         queue = self._queue_of(share)
         queue.update()
         if queue is not share.queue:
-            # The tags of one queue have no meaning in the other.
+            # The tags of one queue have no meaning in the other queue.
             share.queue = queue
             share.tag = queue.served
         share.is_queued = True

@@ -63,7 +63,7 @@ def _distance(one: Vector3, other: Vector3) -> float:
 
 
 def _angle(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle between two quaternions. As in the real node, it is half the angle of rotation."""
+    """Return the angle between two quaternions: half the angle of the rotation between them, as in tf2_web_republisher."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)
     if not norm:

@@ -87,7 +87,7 @@ class Republisher:
             await self.node.sleep(period)
 
     async def _republish(self, request: RepublishTFsRequest) -> object:
-        """Publish transforms on a separate topic until it has had no subscribers for a time of ``timeout``."""
+        """Publish transforms on a separate topic until it has had no subscribers for the duration ``timeout``."""
         if len(self._requests) >= _MAX_REQUESTS:
             raise ServiceException(f"{_MAX_REQUESTS} requests are served: no more")
         try:

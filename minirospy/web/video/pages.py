@@ -22,9 +22,9 @@ __all__ = ["VideoPages"]
 
 SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
-"""Maximum number of concurrent feeds, one per topic and encoding, each of which encodes every image."""
+"""Maximum number of concurrent feeds (one per topic and encoding); each feed encodes every image of its topic."""
 _MAX_KEPT = 32_000_000
-"""Maximum total size in bytes of the encoded images that are stored for new clients; further ones are not stored."""
+"""Maximum total size in bytes of the encoded images that are stored for new clients; further images are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 

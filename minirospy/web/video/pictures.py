@@ -34,7 +34,7 @@ _AS_COLORS = {"8UC4": "bgr8", "16UC3": "bgr16", "16UC4": "bgr16"}
 _STAMPED = 12  # bytes of a header before the length of its frame_id: seq and stamp
 # Number of bytes in which to search for the image's size, which may follow other data, such as a preview.
 _HEAD_BYTES = 100_000
-# number of rows of a numeric image scaled per step, as 64-bit numbers that take eight times the memory
+# number of rows of a numeric image to scale per step: the 64-bit numbers used take eight times the image's memory
 _ROWS = 256
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 

@@ -163,7 +163,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # Guards opening and closing the input, so that it is reopened if a subscriber arrives while it is being closed.
+        # Guards opening and closing the input: a subscriber that arrives while the input is being closed then reopens it.
         self._lock = threading.Lock()
 
         self._output = Output(

@@ -18,7 +18,7 @@ _WARN_SECONDS = 5
 
 
 class MetaLazyTransport(type):
-    """A metaclass that calls ``_post_init`` after the constructors of all subclasses have created their publishers."""
+    """A metaclass that calls ``_post_init`` on each new object after its constructors have created the publishers."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
@@ -90,7 +90,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         return publisher
 
     def _subscribe_once(self) -> None:
-        # The constructor's thread and the listener's thread may reach this at the same time.
+        # The constructor's thread and the listener's thread may run this at the same time.
         with self._changing:
             if self._connection_status is not True:
                 self.subscribe()

@@ -21,7 +21,7 @@ from minirospy.command.command import run
 __all__ = ["main"]
 
 _ALWAYS = {"--xacro-ns", "--check-order"}
-"""Options that ROS accepts without effect: their behaviour has always been enabled since Melodic."""
+"""Options that are accepted without effect, as in ROS: since Melodic, xacro always does what they ask for."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -47,7 +47,7 @@ def _xacro(words: Sequence[str]) -> int:
     evaluate = xacro.eval_extension
 
     def eval_extension(text: str) -> object:
-        """Evaluate `$(...)`. Shorten the error about a missing package, which xacro would print twice, with a class name."""
+        """Evaluate `$(...)`. If a package is missing, shorten the error, which xacro would print twice and with a class name."""
         try:
             return evaluate(text)
         except xacro.XacroException as error:

@@ -60,7 +60,7 @@ class ParseError(Exception):
 
 
 class Codec(Generic[_V]):
-    """Converts a value to and from an element, or an attribute's string."""
+    """Converts values to and from XML elements or the strings of XML attributes."""
 
     def from_string(self, text: str) -> _V:
         """Convert a string to a value. Raise ValueError if the string is invalid."""
@@ -96,13 +96,13 @@ class Number(Codec[float]):
 
 
 class VectorOf(Codec[Iterable[float]]):
-    """A codec for a list that contains a fixed number of numbers."""
+    """A codec for a fixed-length list of numbers."""
 
     def __init__(self, count: int) -> None:
         self._count = count
 
     def from_string(self, text: str) -> list[float]:
-        """Convert a string to numbers. Raise AssertionError if their number is wrong, ValueError if one is invalid."""
+        """Convert a string to numbers. Raise AssertionError if there are too few or too many, ValueError if one is invalid."""
         words = text.split()
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")
@@ -150,7 +150,7 @@ class Raw(Codec[ET.Element]):
 
 
 class ObjectOf(Codec["Object"]):
-    """A codec for an element that an object of a given class represents."""
+    """A codec that converts an element to an object of a given class, and back."""
 
     def __init__(self, kind: type[Object]) -> None:
         self.kind = kind
