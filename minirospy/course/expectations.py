@@ -338,7 +338,7 @@ def _log_entry(line: Line) -> tuple[float, str] | None:
 
 
 def _in_order(expected: list[str], texts: list[str]) -> list[int] | None:
-    """Return the indexes at which the expected texts occur in ``texts``, in this order, or None if they do not."""
+    """Return the indexes at which the expected texts occur in ``texts`` in the expected order, or None if they do not."""
     places: list[int] = []
     for each in expected:
         start = places[-1] + 1 if places else 0
@@ -458,7 +458,7 @@ def _printed(trial: Trial) -> list[Line]:
 
 
 def _or_ended(trial: Trial, fits: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a condition that is also true if all the student's programs have exited and their output is complete."""
+    """Return a condition that holds if ``fits`` does, or if all the student's programs have exited and their output was read."""
 
     def holds() -> bool:
         has_ended = bool(trial.work) and all(each.status is not None for each in trial.work)

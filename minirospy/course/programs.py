@@ -129,7 +129,7 @@ class Program:
         self._kill()
 
     def fault(self) -> str:
-        """Describe an error found in the program's output: a traceback, or a launch file's node that died.
+        """Describe an error found in the program's output: a traceback, or roslaunch's message that a node has died.
 
         Return an empty string if there is none.
         """

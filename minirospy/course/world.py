@@ -171,7 +171,7 @@ class World:
         return True
 
     def _work_has_ended(self) -> bool:
-        """Return whether all student programs have exited although at least one should be running."""
+        """Return whether all student programs have exited, although the trial expects them to keep running."""
         work = [program for program in self.programs if program.is_work]
         return bool(work) and not self._work_ends and all(each.status is not None for each in work)
 
@@ -195,7 +195,7 @@ class World:
         )
 
     def publish(self, topic: str, type_: str, values: object, rate: float) -> None:
-        """Publish a message at ``rate`` Hz until the next one on this topic. If the rate is 0, publish it once and latched.
+        """Publish a message at ``rate`` Hz until the next call for this topic. If the rate is 0, publish it once and latched.
 
         Raise NotFoundError if the type does not exist, MessageException if the values do not match it.
         """
@@ -238,7 +238,7 @@ class World:
             tempfile.TemporaryDirectory(prefix="minirospy-check-", ignore_cleanup_errors=True)
         )
         name = f"check-{os.getpid()}-{next(_numbers)}"
-        # This variable makes the board's server exit with its last client. The programs inherit it.
+        # This variable, which the programs inherit, makes the board's server exit with its last client.
         os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
         self._stack.callback(os.environ.pop, "MINIROSPY_BOARD_TEMPORARY", None)
         environ = {
@@ -276,7 +276,7 @@ class World:
     def _open_guardian(self) -> None:
         """Start the guardian script, which stops the programs if this process is killed."""
         if sys.platform == "win32":
-            return  # guard_children() covers this case
+            return  # guard_children() stops the programs on Windows
         words = [
             sys.executable,
             "-IS",

@@ -21,7 +21,7 @@ __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused"
 
 MAX_GATEWAYS = 5_000
 MAX_NAMES = 2_000  # maximum number of topics, and of services, that a gateway may announce
-# maximum number of topics and services of all gateways, which use about 100 MiB
+# maximum number of topics and services of all gateways together; this many use about 100 MiB
 MAX_TOKENS = 200_000
 
 

@@ -46,7 +46,7 @@ class FrameRewriter:
     """Rewrites the frame ids in messages of one type."""
 
     def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
-        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid; pass on errors of ``lookup``."""
+        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid. Exceptions from ``lookup`` propagate."""
         self._steps = _trimmed(_steps(spec, lookup))
 
     @property

@@ -14,7 +14,7 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # seconds to hold a name: Zenoh's default lease, after which it closes a silent link
+HOLD_SECONDS = 10.0  # the name of a robot that has left is reserved this long: Zenoh's lease of silent links
 # maximum number of held names of robots that have left; limited because peers choose the names
 MAX_HOLDS = 5_000
 
@@ -93,7 +93,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return the seconds until the next of these names is released, or None if none of their holders has left."""
+        """Return the seconds until the first of ``names`` is released, or None if none of their holders has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names

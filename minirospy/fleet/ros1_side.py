@@ -50,7 +50,7 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""A topic to which each gateway that uses zenoh-bridge-ros1's keys subscribes first, so that they detect each other."""
+"""The topic to which gateways that use zenoh-bridge-ros1's keys subscribe first, so that they detect each other."""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
 _BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default node names of zenoh-bridge-ros1
 _AGGREGATE = "/rosout_agg"

@@ -28,7 +28,7 @@ __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
 MAX_BATCH = 2_000  # maximum number of messages per batch
-MAX_CELLS = 8_000_000  # maximum number of table cells per batch; each takes at least one byte of a message
+MAX_CELLS = 8_000_000  # maximum number of table cells per batch; each takes at least one byte of its message
 _MAX_ELEMENTS = 10_000  # maximum number of array elements that get separate columns
 _SECOND = 10**9
 _MAX_INT64 = (1 << 63) - 1

@@ -202,7 +202,7 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Copy the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
+    """Copy the messages for which ``keep`` is true to a new bag; pass the value of ``show`` for each message to ``on_shown``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.

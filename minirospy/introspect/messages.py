@@ -130,7 +130,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """Return a one-line error that ``values``, entered by the user, do not match the message. List the message's fields."""
+    """Return a one-line error saying that ``values``, entered by the user, do not match the message, and listing its fields."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Number of messages in a window without a limit: bounds the memory of a long measurement."""
+"""Maximum number of messages in a window of unlimited size, which bounds the memory of a long measurement."""
 
 
 _NOTHING = "no new messages"

@@ -99,7 +99,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
 
 
 def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
-    """Yield problems for nodes that do not respond, with one finding for all nodes of a machine that fail alike."""
+    """Yield problems for nodes that do not respond. Nodes on the same machine with the same kind of fault share one finding."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
         if answer.trouble:

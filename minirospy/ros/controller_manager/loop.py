@@ -71,7 +71,7 @@ class ControlLoop:
             limits = limits_of_parameters(hardware, self.manager.namespace)
         self._limits = LimitEnforcer(hardware.joints.values(), limits)
         self._times = CycleTimes(round(_BILLION / rate))
-        self._invalid: dict[str, None] = {}  # joints with non-finite commands since the last report, as keys
+        self._invalid: dict[str, None] = {}  # keys: joints with non-finite commands since the last report
         self._stop = SignalSafeEvent()
         self._ended = SignalSafeEvent()
         self._status = 0
@@ -208,7 +208,7 @@ class ControlLoop:
                 self._log_invalid()
         except rospy.ROSException:
             return  # the node is shutting down
-        if not rospy.is_shutdown_requested():  # otherwise rospy's shutdown unregisters all topics together
+        if not rospy.is_shutdown_requested():  # during a shutdown, rospy unregisters all topics at once
             publisher.unregister()
 
     def _log_invalid(self) -> None:

@@ -96,7 +96,7 @@ class _Spawner:
         self._loaded: list[str] = []
 
     def wait_for_services(self, timeout: float | None) -> bool:
-        """Return whether every service appears within ``timeout`` seconds; wait longer until the first /clock message."""
+        """Return whether all services appear within ``timeout`` seconds, excluding the time before the first /clock message."""
         while True:
             try:
                 for name in _SERVICES:

@@ -87,7 +87,7 @@ def cvtColorForDisplay(
 
 
 def _guessed(encoding: str) -> str:
-    """Return bgr8, the default output encoding. Raise RuntimeError if an image with this encoding cannot be displayed."""
+    """Return bgr8, the default output encoding. Raise RuntimeError if an image in ``encoding`` cannot be displayed."""
     bits = 0
     try:
         number = type_of_encoding(encoding)

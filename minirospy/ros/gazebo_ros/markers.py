@@ -115,7 +115,7 @@ def model_markers(model: SimModel) -> list[Marker]:
 
 @functools.cache
 def _uri(path: str) -> str:
-    """Return a file's URI: package:// if it is in a package, because the dashboard can read that."""
+    """Return a file's URI: package:// if the file is in a package, because the dashboard can read such URIs."""
     file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may contain relative folders
     for folder in file.parents:
         if name := package_name(folder):
@@ -159,7 +159,7 @@ def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker
 def _add_triangles(
     marker: Marker, shape: MeshShape | Polyline | Heightmap, *, is_colored: bool
 ) -> Marker | None:
-    """Return the marker with a shape's triangles added. If it has none, log that once and return None."""
+    """Return the marker with a shape's triangles added. If they cannot be read, log the reason once and return None."""
     try:
         points, colors = _triangle_points(shape)
     except MeshError as error:

@@ -148,7 +148,7 @@ class PluginBase:
         return text_of(self.element, tag, default)
 
     def required(self, tag: str, title: str) -> str:
-        """Return a parameter's text. If it is missing or empty, raise PluginError with a text that starts with the title."""
+        """Return a parameter's text. If it is missing or empty, raise PluginError with a message that starts with ``title``."""
         if not (text := self.text(tag)):
             raise PluginError(f"{title} missing <{tag}>, cannot proceed".lstrip())
         return text
@@ -242,7 +242,7 @@ class ModelPlugin(PluginBase):
         return joint
 
     def link(self, name: str) -> tuple[SimLink, Pose]:
-        """Return a link and the named link's pose in it, because a fixed joint may have merged the named link into another.
+        """Return a link, and the pose in it of the link ``name``, which a fixed joint may have merged into the returned link.
 
         Raise PluginError if the link does not exist.
         """

@@ -118,7 +118,7 @@ class Window:
                     self._publish_slow()
             except LoopClosed:
                 return
-            except SimulationError as error:  # such as an error from a ray with a NaN pose
+            except SimulationError as error:  # for example, because a ray's pose is NaN
                 rospy.logerr_throttle(10, "the window: %s", error)
             if now >= next_state and _has_subscribers(self._state):
                 next_state = now + STATE_SECONDS

@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The file name without suffix, the minimum occupancy of occupied cells, and the maximum of free cells."""
+    """The file name without suffix, the occupancy from which a cell counts as occupied, and the one up to which it is free."""
 
     name: str = "map"
     occupied: int = 65

@@ -127,7 +127,7 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
 
 
 class MapServer:
-    """Serves a map on two latched topics and through two services. Raise MapError if the map cannot be loaded."""
+    """Serves a map on two latched topics and through two services. ``__init__`` raises MapError if the map cannot be loaded."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))

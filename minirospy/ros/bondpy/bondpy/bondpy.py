@@ -62,7 +62,7 @@ class Timeout:
             self.timer.cancel()
 
     def left(self) -> times.Duration:
-        """Return the remaining time."""
+        """Return the time until the deadline, or zero if it has passed."""
         return rospy.Duration.from_sec(max(0.0, self.deadline - time.monotonic()))
 
 

@@ -182,7 +182,7 @@ class Export(_Conditional):
 
 
 class License(str):
-    """A license; ``file`` is the name of the file with its text, or None."""
+    """The name of a license; ``file`` is the name of the file that contains the license text, or None."""
 
     file: str | None = None
 

@@ -139,7 +139,7 @@ def filter_by_resources(
     hardware_interface: str | None = None,
     match_any: bool = False,
 ) -> list[ControllerState]:
-    """Return the controllers that claim all these resources through one hardware interface (default: any).
+    """Return the controllers that claim all these resources through the given hardware interface (None: through any one).
 
     ``match_any``: one matching resource is enough.
     """
@@ -156,7 +156,7 @@ def filter_by_resources(
 
 
 def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
-    """Return the sorted names of the controllers in a namespace: names that contain a parameter ``type``."""
+    """Return the sorted names of the controllers in a namespace, recognized by their parameter ``NAME/type``."""
     prefix = namespace if namespace.endswith("/") else namespace + "/"
     below = [name.split(prefix, 1)[1].split("/") for name in list_params(namespace) if prefix in name]
     return sorted(parts[0] for parts in below if len(parts) == 2 and parts[1] == "type")

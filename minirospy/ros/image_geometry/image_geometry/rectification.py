@@ -120,7 +120,7 @@ def _coefficients(D: Distortion) -> list[float]:
 
 
 def _tilt(tau_x: float, tau_y: float) -> Values:
-    """Return the matrix for a sensor tilted relative to the lens."""
+    """Return the matrix by which OpenCV models a sensor that is tilted relative to the lens."""
     import numpy as np
 
     cx, sx, cy, sy = math.cos(tau_x), math.sin(tau_x), math.cos(tau_y), math.sin(tau_y)
