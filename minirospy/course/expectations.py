@@ -233,7 +233,7 @@ def _rate(trial: Trial, step: Step) -> Outcome:
             each.time for each in world.arrivals(topic) if each.time >= max(start, time.monotonic() - seconds)
         ]
         found = (len(window) - 1) / (window[-1] - window[0]) if len(window) > 1 else 0.0
-        # Measure over the full time, so that a short burst does not pass.
+        # Do not pass before the full time has been measured: a short burst of messages must not be enough.
         return time.monotonic() - start >= seconds and len(window) > 2 and bool(low <= found <= high)
 
     if world.wait_until(fits, max(step.within, seconds + 1)):

@@ -99,7 +99,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway whose only name was rejected, because nothing would remove it.
+        # Do not store a gateway without names, because no removal of a token would remove it.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed

@@ -21,7 +21,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
-    """A fixed number of bytes without a frame id, to skip."""
+    """A run of ``size`` bytes that contains no frame id and is skipped."""
 
     size: int
 

@@ -23,7 +23,7 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Call ``question`` with a new fleet session; return its result.
+    """Open a fleet session, call ``question`` with it, and return the result of that call.
 
     Raise BridgeError if neither a gateway nor a router is reached.
     """

@@ -402,7 +402,7 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in its own thread; by default it starts a thread for each handler."""
+        """Return a handler that Zenoh calls in its own thread. By default, Zenoh would start one more thread per handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(

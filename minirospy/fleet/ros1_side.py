@@ -242,7 +242,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was suspended, and beacons sent meanwhile have not been delivered yet.
+                    # The process was suspended. Beacons sent meanwhile arrive later, so let the resources expire later, too.
                     self.sightings.extend(late, now)
                 has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:

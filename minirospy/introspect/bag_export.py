@@ -249,7 +249,7 @@ class _Cells:
         self.is_large = False  # set if a value exceeds a signed 64-bit integer
 
     def widen(self, column: Column) -> None:
-        """Add the types of a batch's values."""
+        """Add the types in a batch's values to the known types."""
         self.kind = column.kind
         self.types |= {*map(type, column.values)} - {type(None)}
         if int in self.types and not self.is_large:

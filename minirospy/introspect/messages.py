@@ -105,7 +105,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
 
 def words_of(nanoseconds: int) -> dict[str, object]:
-    """Return the values of the keywords: ``now`` is the time, and ``auto`` a header with this stamp."""
+    """Return the values of the keywords ``now`` (this time) and ``auto`` (a header with this time as its stamp)."""
     from minirospy.base.times import Time
     from minirospy.core.idl.load import get_message_class
 

@@ -40,7 +40,7 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Return the rate in Hz, if the times are the periods between messages."""
+        """Return the mean rate in Hz. The times must be periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 

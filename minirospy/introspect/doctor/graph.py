@@ -329,7 +329,7 @@ def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
 
 
 def _is_of_action(topic: str, state: SystemState) -> bool:
-    """Return whether this is the goal or cancel topic of an action server, which often has no publisher."""
+    """Return whether a topic is an action server's goal or cancel topic; such a topic often has no publishers."""
     name, _, end = topic.rpartition("/")
     return end in ("goal", "cancel") and f"{name}/status" in state.publishers
 

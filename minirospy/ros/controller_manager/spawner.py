@@ -25,7 +25,7 @@ from minirospy.ros.rosparam.rosparam import RosParamException, load_file, set_pa
 __all__ = ["main", "new_parser"]
 
 _SERVICES = ("load_controller", "switch_controller", "unload_controller")
-_MESSAGE_SECONDS = 1.0  # seconds for the manager's log to appear before the spawner's, as in ROS
+_MESSAGE_SECONDS = 1.0  # seconds to wait, so that the manager's log appears before the spawner's, as in ROS
 
 
 def new_parser() -> argparse.ArgumentParser:

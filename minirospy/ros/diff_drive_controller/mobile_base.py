@@ -209,7 +209,7 @@ def enabled(flag: bool) -> str:
 
 
 def _covariance(parameters: Parameters, key: str) -> list[float]:
-    """Return the covariance matrix with six diagonal values from a parameter. If they are missing, ROS aborts the process."""
+    """Return the covariance matrix whose diagonal is a parameter's list of six numbers. ROS aborts the process without them."""
     diagonal = parameters.numbers(key)
     if diagonal is None or len(diagonal) != 6:
         raise ControllerError(f"Parameter '{parameters.namespace}/{key}' must be a list of 6 numbers")

@@ -101,21 +101,21 @@ class ControllerLister:
 def filter_by_name(
     ctrl_list: Controllers, ctrl_name: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers whose name equals, or contains, a string."""
+    """Return the controllers whose name is ``ctrl_name`` or, with ``match_substring``, contains it."""
     return _filter(ctrl_list, "name", ctrl_name, match_substring)
 
 
 def filter_by_type(
     ctrl_list: Controllers, ctrl_type: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers whose type equals, or contains, a string."""
+    """Return the controllers whose type is ``ctrl_type`` or, with ``match_substring``, contains it."""
     return _filter(ctrl_list, "type", ctrl_type, match_substring)
 
 
 def filter_by_state(
     ctrl_list: Controllers, ctrl_state: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers whose state equals, or contains, a string."""
+    """Return the controllers whose state is ``ctrl_state`` or, with ``match_substring``, contains it."""
     return _filter(ctrl_list, "state", ctrl_state, match_substring)
 
 

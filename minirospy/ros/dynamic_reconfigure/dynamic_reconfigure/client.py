@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Client", "ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv"]
 
-_SLICE_SECONDS = 0.25  # seconds between checks whether the node is shutting down
+_SLICE_SECONDS = 0.25  # seconds between checks for a shutdown of the node
 
 _TYPES: dict[str, type] = {"int": int, "double": float, "str": str, "bool": bool}
 _TRUE = ("yes", "true", "t", "1")

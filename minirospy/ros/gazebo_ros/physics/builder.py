@@ -99,7 +99,7 @@ class Builder:
                 self._add_mimics(built, model, name)
         except Exception as error:
             self.delete(built)
-            self.shapes.warnings.clear()  # otherwise the next model would report these warnings
+            self.shapes.warnings.clear()  # otherwise the next model added would report these, too
             if isinstance(error, SimulationError):
                 raise SimulationError(f"model '{name}': {error}") from error.__cause__
             if isinstance(error, (ValueError, TypeError, OSError)):
