@@ -381,7 +381,7 @@ def _exits(trial: Trial, step: Step) -> Outcome:
 
 
 def _package(trial: Trial, step: Step) -> Outcome:
-    # Create a new Packages each time, because it caches the folders that it finds.
+    # Create a new Packages each time, because a Packages caches the folders that it finds.
     is_there = step.options["is"]
     holds = trial.world.wait_until(lambda: (step.subject in Packages().names()) == is_there, step.within)
     return Outcome(holds, f"it is {'still there' if not is_there else 'not there'}")

@@ -155,7 +155,7 @@ class World:
                     self._tell_guardian(f"-{program.process.pid}")
 
     def wait_until(self, holds: Callable[[], bool], seconds: float, *, needs_work: bool = True) -> bool:
-        """Poll ``holds()`` until it is true, or ``seconds`` multiplied by the patience have passed. Return its last value.
+        """Poll ``holds()`` until it is true, or ``seconds`` multiplied by the patience have passed. Return the last result.
 
         Stop earlier if all of the student's programs have exited, unless they are expected to, or the condition does not need
         them (``needs_work``).

@@ -215,7 +215,7 @@ class DiscardAnalyzer(GenericAnalyzer):
 
 
 class IgnoreAnalyzer:
-    """An analyzer that matches no statuses and reports nothing. As an analyzer's type, it disables that analyzer."""
+    """An analyzer that matches no statuses and reports nothing. Given as an analyzer's type, it disables that analyzer."""
 
     path = name = ""
 

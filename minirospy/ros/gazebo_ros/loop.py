@@ -79,7 +79,7 @@ class SimulationLoop:
         has_ended = SignalSafeEvent()
         future.add_done_callback(lambda _: has_ended.set())
         self._submit(function, future)
-        # Do not wait in result(): a signal handler that interrupts it would hold the future's lock, which the loop needs.
+        # Do not wait in result(): a signal handler that interrupts it may hold the future's lock, which the loop needs.
         wait_for_event(has_ended, None)
         return future.result()
 

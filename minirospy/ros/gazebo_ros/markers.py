@@ -180,7 +180,7 @@ def _warn_once(error: str) -> None:
 
 @functools.lru_cache(maxsize=64)
 def _triangle_points(shape: MeshShape | Polyline | Heightmap) -> tuple[list[Point], list[ColorRGBA]]:
-    """Return the corners and colours of a shape's triangles. Cached, because each change of the world needs them again."""
+    """Return the corners and colours of a shape's triangles. Cached, because they are needed at each change of the world."""
     found = read_triangles(shape)
     colors = [] if found.colors is None else [ColorRGBA(*color) for color in found.colors.tolist()]
     return [Point(x, y, z) for x, y, z in found.corners.tolist()], colors

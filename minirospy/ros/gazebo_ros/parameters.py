@@ -33,7 +33,7 @@ def text_of(element: XmlElement | None, tag: str, default: str = "") -> str:
 
 
 def number_of(element: XmlElement | None, tag: str, default: float) -> float:
-    """Return a child element's number, or the default. Raise PluginError if it is not a number or out of the tag's range."""
+    """Return a child element's number, or the default. Raise PluginError if the text is not a number within the tag's range."""
     text = text_of(element, tag)
     return _number(tag, text, text) if text else default
 

@@ -154,7 +154,7 @@ class PluginBase:
         return text
 
     def number(self, tag: str, default: float) -> float:
-        """Return a parameter's number. Raise PluginError if it is not a number or out of the tag's range.
+        """Return a parameter's number. Raise PluginError if the text is not a number, or the number is outside the tag's range.
 
         As in Gazebo, a negative rate means each step; a warning names it.
         """

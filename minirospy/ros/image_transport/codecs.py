@@ -82,7 +82,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed(message: CompressedImage) -> Image:
-    """Decode a compressed image to the encoding named in its format.
+    """Decode a compressed image to the encoding that the message's ``format`` names.
 
     Raise CodecError if the data is not a valid image in that format.
     """

@@ -97,7 +97,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 
 
 def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
-    """Return the folder to run a test in. If it is the package's build folder, create it.
+    """Return the folder in which to run a test. Create the folder if it is the package's build folder.
 
     As in catkin, ``nosetests --where=FOLDER`` runs in the given folder; other programs run in the build folder.
     """

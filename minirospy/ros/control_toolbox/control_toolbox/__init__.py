@@ -24,7 +24,7 @@ __all__ = ["Pid", "PidGains"]
 
 
 class Pid(pid.Pid):
-    """A PID controller. After :meth:`serve`, dynamic_reconfigure can change its gains, and its terms may be published."""
+    """A PID controller. :meth:`serve` lets dynamic_reconfigure change its gains and, if so configured, publishes its terms."""
 
     _server: Server | None = None
     _state: RealtimePublisher[PidState] | None = None
