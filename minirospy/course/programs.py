@@ -25,7 +25,7 @@ _MAX_LINES = 20_000  # maximum number of output lines to keep, because a program
 _DIED = re.compile(r"\[([\w/.-]+?)(?:-\d+)?\] process has died \[pid \d+, exit code (-?\d+)")
 _LINE_OF_FILE = re.compile(r'^\s+File "(.+)", line (\d+)')
 _EXCEPTION = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Exit|Interrupt|Warning)?(:|$)")
-_KILL_SECONDS = 5.0  # timeout for a killed process to exit, and for its output to end
+_KILL_SECONDS = 5.0  # timeout in seconds for a killed process to exit, and for its output to end
 
 
 class Line(NamedTuple):

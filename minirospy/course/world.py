@@ -43,8 +43,8 @@ __all__ = ["Arrival", "World"]
 _POLL_SECONDS = 0.02
 LAST_EFFECT_SECONDS = 1.0  # seconds after a program's exit in which its last actions can still take effect
 _KEPT_MESSAGES = 5000  # messages kept per topic: one minute at 80 Hz
-_STOP_SECONDS = 10.0  # timeout for a program after Ctrl-C
-_LAUNCH_STOP_SECONDS = 25.0  # timeout for roslaunch, which itself gives a node up to 15 s after Ctrl-C
+_STOP_SECONDS = 10.0  # timeout in seconds for a program to exit after Ctrl-C
+_LAUNCH_STOP_SECONDS = 25.0  # timeout in seconds for roslaunch, which gives a node up to 15 s after Ctrl-C
 # ROS variables that the tested programs inherit. All others would describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (

@@ -30,7 +30,7 @@ class Holders:
     """Decides which of several claims holds a name, and remembers the decision."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Create the object without any holders. ``clock`` returns monotonic seconds."""
+        """Create an instance in which no name is held. ``clock`` returns monotonic seconds."""
         self.machines: Mapping[str, str] = {}
         """The machines that the operator has chosen, keyed by robot name."""
         self._clock = clock

@@ -310,7 +310,7 @@ class FleetNetwork:
     async def query(
         self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
     ) -> bytes:
-        """Send a query and return the first reply. Raise QueryFailed if there is no reply, or it is an error.
+        """Send a query and return the first reply. Raise QueryFailed if there is no reply, or if the reply is an error.
 
         If ``of_others``, query only other sessions; if several sessions match, query the best match.
         """

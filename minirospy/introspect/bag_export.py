@@ -241,7 +241,7 @@ def _elements(name: str, arrays: Sequence[Sequence[object] | None]) -> Iterator[
 
 
 class _Cells:
-    """The kind and types of a column's values in all batches."""
+    """The kind of a column, and the types of its values in all batches."""
 
     def __init__(self) -> None:
         self.kind = Kind.PLAIN
@@ -320,7 +320,7 @@ def _seconds(nanoseconds: int) -> str:
 
 
 class _ParquetWriter(_Writer):
-    """Writes Parquet. Times become UTC timestamps, and durations become durations, both in nanoseconds."""
+    """Writes Parquet, with times as UTC timestamps and durations as durations, both in nanoseconds."""
 
     def __init__(self, pyarrow: Any, schema: Any, writer: Any) -> None:
         self._pyarrow = pyarrow

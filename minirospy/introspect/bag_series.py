@@ -205,7 +205,7 @@ class Sampler:
         self._start = start
         self._width = max(end - start, 1e-9) / max(columns, 1)
         self._budget = budget or Budget()
-        self._columns: dict[int, list[float]] | None = None  # column -> (low, time, high, time)
+        self._columns: dict[int, list[float]] | None = None  # column -> (low, its time, high, its time)
 
     @property
     def is_exact(self) -> bool:

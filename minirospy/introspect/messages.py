@@ -50,7 +50,7 @@ class MessageClasses:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """Return the class for a publisher's connection header: the installed class if its md5sum is the same.
+        """Return the class for a publisher's connection header: the installed class or, if its md5sum differs, a generated one.
 
         Raise NotFoundError if the type is not installed and the publisher sent no definition, or DefinitionError if the
         definition cannot be parsed.

@@ -31,8 +31,8 @@ from minirospy.ros.controller_manager.manager import ControllerManager, find_des
 __all__ = ["ControlLoop", "limits_of_parameters", "run"]
 
 _BILLION = 1_000_000_000
-_END_SECONDS = 5.0  # maximum wait for the loop to finish at shutdown, in case a driver hangs
-_SLEEP_SECONDS = 0.1  # maximum sleep, so that a slow loop notices a stop request
+_END_SECONDS = 5.0  # maximum seconds to wait for the loop to finish at shutdown, in case a driver hangs
+_SLEEP_SECONDS = 0.1  # maximum seconds of one sleep, so that a slow loop notices a stop request
 _REPORT_SECONDS = 1.0
 _WARN_SECONDS = 10.0  # seconds between warnings about overruns or non-finite commands
 _WARN_SHARE = 0.05  # largest share of overrun cycles without a warning; a busy computer delays a few

@@ -55,7 +55,7 @@ def log(level: int, line: str) -> None:
 
 
 class ControllerManager:
-    """Loads, starts and stops the controllers of one robot, on request through its services.
+    """Loads, starts and stops the controllers of one robot, as requested through the services that it offers.
 
     The node calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``, as
     :func:`controller_manager.run` does. Each service returns after the loop's next update. ``namespace``: for the services and

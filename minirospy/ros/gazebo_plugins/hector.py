@@ -82,7 +82,7 @@ class _HectorPlugin(PeriodicPlugin):
         self._last_ns = self.simulation.time_ns
 
     def reset(self) -> None:
-        """Restart the update period."""
+        """Start a new update period."""
         super().reset()
         self._last_ns = self.simulation.time_ns
 

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 __all__ = ["WorldMarkers", "has_moved", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
-RATE_HZ = 10.0  # simulated-time rate for publishing moving models
+RATE_HZ = 10.0  # Hz of simulated time, for publishing moving models
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
-MAX_PLANE = 100.0  # m; size at which larger planes are drawn
+MAX_PLANE = 100.0  # size in m at which larger planes are drawn
 PLANE_THICKNESS = 0.001  # m
 MIN_CHANGE = 1e-5  # smallest visible change, in m or quaternion units; resting bodies tremble less
 
@@ -66,7 +66,7 @@ class WorldMarkers:
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        """Return the markers of all models. Reuse those of models that have not moved."""
+        """Return the markers of all models. Reuse the existing markers of models that have not moved."""
         self._published = poses = self._simulation.body_poses()
         known, self._known = self._known, {}
         for model in self._simulation.models.values():

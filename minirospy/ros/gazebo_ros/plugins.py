@@ -256,7 +256,7 @@ class ModelPlugin(PluginBase):
 
 
 class Timer:
-    """Reports when a period of simulated time has elapsed. Rate 0 means every step."""
+    """Reports when a period of simulated time has elapsed. With a rate of 0, each step is a period."""
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate > 0 else 0
@@ -318,7 +318,7 @@ class PeriodicPlugin(ModelPlugin):
                 self.sense()
 
     def reset(self) -> None:
-        """Restart the update period."""
+        """Start a new update period."""
         self._timer = None
         self.due_ns = 0
 

@@ -65,7 +65,7 @@ def _threshold(text: str, name: str, least: int) -> int:
 
 
 def main() -> int:
-    """Save one map; return the exit status, 1 if saving fails."""
+    """Save one map; return the exit status, which is 1 if saving fails."""
     try:
         options = parse_options(rospy.myargv()[1:])
     except UsageError as error:

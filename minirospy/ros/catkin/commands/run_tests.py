@@ -113,7 +113,7 @@ def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
-    """Return the CMake targets that run a package's tests, or one test.
+    """Return the CMake targets that run all tests of a package or, if ``test`` is given, only that test.
 
     :func:`_flat` has replaced the separators in their names.
     """

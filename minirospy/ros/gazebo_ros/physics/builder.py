@@ -141,7 +141,7 @@ class Builder:
                 row.type = names.get(light.kind, kinds.mjLIGHT_POINT)
 
     def add_visuals(self, built: BuiltModel, model: Model, name: str) -> list[str]:
-        """Add a model's visuals. Return a warning for each unreadable one, which is left out."""
+        """Add a model's visuals. Leave out unreadable ones, and return a warning for each of these."""
         warnings: list[str] = []
         for link in model.links.values():
             for visual in link.visuals:

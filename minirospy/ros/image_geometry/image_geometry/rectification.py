@@ -29,7 +29,7 @@ _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
 def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Values) -> Values:
-    """Return a raw pixel's rectified pixel. Raise ValueError if D has an unsupported number of coefficients."""
+    """Convert a pixel from the raw to the rectified image. Raise ValueError if D has an unsupported number of coefficients."""
     import numpy as np
 
     k = _coefficients(D)

@@ -287,7 +287,7 @@ class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
 class _ClosedLoopController(JointTrajectoryController):
     """Commands ``velocity_ff/JOINT`` times the desired velocities plus the output of a PID controller with ``gains/JOINT``."""
 
-    command: ClassVar[str]  # the joint's attribute for the command
+    command: ClassVar[str]  # name of the joint attribute for the command
 
     def read_gains(self, context: ControllerContext) -> None:
         """Read the gains and make them configurable with dynamic_reconfigure."""
