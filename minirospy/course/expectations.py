@@ -233,7 +233,7 @@ def _rate(trial: Trial, step: Step) -> Outcome:
             each.time for each in world.arrivals(topic) if each.time >= max(start, time.monotonic() - seconds)
         ]
         found = (len(window) - 1) / (window[-1] - window[0]) if len(window) > 1 else 0.0
-        # Measure over the full time, so that a short burst does not pass.
+        # Do not pass before the full time has been measured: a short burst of messages must not be enough.
         return time.monotonic() - start >= seconds and len(window) > 2 and bool(low <= found <= high)
 
     if world.wait_until(fits, max(step.within, seconds + 1)):
@@ -338,7 +338,7 @@ def _log_entry(line: Line) -> tuple[float, str] | None:
 
 
 def _in_order(expected: list[str], texts: list[str]) -> list[int] | None:
-    """Return the indexes at which the expected texts occur in ``texts``, in this order, or None if they do not."""
+    """Return the indexes at which the expected texts occur in ``texts`` in the expected order, or None if they do not."""
     places: list[int] = []
     for each in expected:
         start = places[-1] + 1 if places else 0
@@ -381,7 +381,7 @@ def _exits(trial: Trial, step: Step) -> Outcome:
 
 
 def _package(trial: Trial, step: Step) -> Outcome:
-    # Create a new Packages each time, because it caches the folders that it finds.
+    # Create a new Packages each time, because a Packages caches the folders that it finds.
     is_there = step.options["is"]
     holds = trial.world.wait_until(lambda: (step.subject in Packages().names()) == is_there, step.within)
     return Outcome(holds, f"it is {'still there' if not is_there else 'not there'}")
@@ -458,7 +458,7 @@ def _printed(trial: Trial) -> list[Line]:
 
 
 def _or_ended(trial: Trial, fits: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a condition that is also true if all the student's programs have exited and their output is complete."""
+    """Return a condition that holds if ``fits`` does, or if all the student's programs have exited and their output was read."""
 
     def holds() -> bool:
         has_ended = bool(trial.work) and all(each.status is not None for each in trial.work)

@@ -21,11 +21,11 @@ __all__ = ["Line", "Program", "find_command"]
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
-_MAX_LINES = 20_000  # maximum number of output lines kept, for a program that prints endlessly
+_MAX_LINES = 20_000  # maximum number of output lines to keep, because a program may print endlessly
 _DIED = re.compile(r"\[([\w/.-]+?)(?:-\d+)?\] process has died \[pid \d+, exit code (-?\d+)")
 _LINE_OF_FILE = re.compile(r'^\s+File "(.+)", line (\d+)')
 _EXCEPTION = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Exit|Interrupt|Warning)?(:|$)")
-_KILL_SECONDS = 5.0  # timeout for a killed process to exit, and for its output to end
+_KILL_SECONDS = 5.0  # timeout in seconds for a killed process to exit, and for its output to end
 
 
 class Line(NamedTuple):
@@ -36,7 +36,7 @@ class Line(NamedTuple):
 
 
 def find_command(word: str, packages: Packages) -> list[str]:
-    """Return the command that starts a FILE or a PACKAGE/PROGRAM, through roslaunch for a launch file.
+    """Return the command that starts FILE or PACKAGE/PROGRAM. A launch file is started with roslaunch.
 
     Raise NotFoundError, with similar names, if it does not exist, or UsageError if it is not a program.
     """
@@ -129,7 +129,7 @@ class Program:
         self._kill()
 
     def fault(self) -> str:
-        """Describe an error found in the program's output: a traceback, or a launch file's node that died.
+        """Describe an error found in the program's output: a traceback, or roslaunch's message that a node has died.
 
         Return an empty string if there is none.
         """

@@ -39,11 +39,11 @@ __all__ = [
 
 CLASS_PARAMETER = "/minirospy_class"
 _MAX_FAILURES = 5  # maximum number of sentences about a failed check that the teacher sees
-_MAX_LETTERS = 300  # maximum length of such a sentence
-_MAX_NAME = 60  # maximum length of a student's name
-MAX_KEY = 64  # maximum length of the parameter's last part; the page's classroom.js ignores longer ones
-_MAX_TIME = 4e9  # seconds since 1970, up to the year 2096: time.localtime rejects far larger values
-_SECONDS = 3.0  # timeout for the class's master, whose computer may have been shut down
+_MAX_LETTERS = 300  # maximum length of such a sentence, in characters
+_MAX_NAME = 60  # maximum length of a student's name, in characters
+MAX_KEY = 64  # maximum length of a parameter name's last part; the page's classroom.js ignores longer ones
+_MAX_TIME = 4e9  # year 2096 in Unix time: time.localtime rejects far larger values
+_SECONDS = 3.0  # timeout in seconds for the class's master, whose computer may have been shut down
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Result:
 
 @dataclass
 class Record:
-    """This computer's results, the student's name, and the URI of the class's master (empty: see `class_master`)."""
+    """This computer's results, the student's name, and the URI of the class's master (if empty, `class_master` chooses it)."""
 
     path: Path
     student: str = ""
@@ -71,7 +71,7 @@ class Record:
 
     @classmethod
     def read(cls, environment: Environment) -> Record:
-        """Read the record. Treat an unreadable file as empty, so that it does not make a check fail."""
+        """Read the record. An unreadable file counts as empty, so that the check itself does not fail."""
         record = cls(environment.home / "minirospy_class.json")
         try:
             found = json.loads(record.path.read_text(encoding="utf-8"))

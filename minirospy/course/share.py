@@ -26,11 +26,11 @@ __all__ = ["share"]
 _POLL_SECONDS = 0.2  # seconds between pin readings; changes are missed if an LED blinks faster than 2.5 Hz
 _BEAT_SECONDS = 3.0  # seconds between heartbeats; the page marks a computer as gone after missing three
 _ASK_SECONDS = 2.0  # timeout in seconds for calls to a master
-_TOPIC = CLASS_PARAMETER  # the page's classroom.js finds it below the names of a fleet's robots, too
+_TOPIC = CLASS_PARAMETER  # the page's classroom.js also finds this topic with a fleet robot's name before it
 
 
 def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:
-    """Send the results, the state of the board and the nodes until ``ended()`` is true, or `rosnode kill` stops this.
+    """Send the results, the board's state and the nodes until ``ended()`` is true or `rosnode kill` stops the sender.
 
     Raise MasterUnreachableError if the class's master does not respond at the start; later failures are retried.
     """
@@ -63,7 +63,7 @@ def share(record: Record, environment: Environment, ended: Callable[[], bool] = 
 
 
 class _OwnMaster:
-    """The student's own master, with the topic. It need not run: each heartbeat tries again to connect."""
+    """Publishes the topic on the student's own master. If that does not run, each heartbeat tries again to connect to it."""
 
     def __init__(self, environment: Environment) -> None:
         self._environment = environment

@@ -82,7 +82,7 @@ def _pack(archive: zipfile.ZipFile, listed: list[tuple[Path, list[Path]]], left_
     for number, (root, files) in enumerate(listed, 1):
         prefix = root.parent.name if len(listed) == 1 else f"{number}_{root.parent.name}"
         for path in files:
-            # Read the whole file first, so that a file that vanishes or changes does not leave half an entry.
+            # Read the whole file first: if it vanishes or changes meanwhile, the zip file contains no incomplete entry.
             try:
                 name = f"{prefix}/{path.relative_to(root).as_posix()}"
                 name.encode()

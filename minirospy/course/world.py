@@ -43,8 +43,8 @@ __all__ = ["Arrival", "World"]
 _POLL_SECONDS = 0.02
 LAST_EFFECT_SECONDS = 1.0  # seconds after a program's exit in which its last actions can still take effect
 _KEPT_MESSAGES = 5000  # messages kept per topic: one minute at 80 Hz
-_STOP_SECONDS = 10.0  # timeout for a program after Ctrl-C
-_LAUNCH_STOP_SECONDS = 25.0  # timeout for roslaunch, which itself gives a node up to 15 s after Ctrl-C
+_STOP_SECONDS = 10.0  # timeout in seconds for a program to exit after Ctrl-C
+_LAUNCH_STOP_SECONDS = 25.0  # timeout in seconds for roslaunch, which gives a node up to 15 s after Ctrl-C
 # ROS variables that the tested programs inherit. All others would describe the student's own master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (
@@ -155,7 +155,7 @@ class World:
                     self._tell_guardian(f"-{program.process.pid}")
 
     def wait_until(self, holds: Callable[[], bool], seconds: float, *, needs_work: bool = True) -> bool:
-        """Poll ``holds()`` until it is true, or ``seconds`` multiplied by the patience have passed. Return its last value.
+        """Poll ``holds()`` until it is true, or ``seconds`` multiplied by the patience have passed. Return the last result.
 
         Stop earlier if all of the student's programs have exited, unless they are expected to, or the condition does not need
         them (``needs_work``).
@@ -171,7 +171,7 @@ class World:
         return True
 
     def _work_has_ended(self) -> bool:
-        """Return whether all student programs have exited although at least one should be running."""
+        """Return whether all student programs have exited, although the trial expects them to keep running."""
         work = [program for program in self.programs if program.is_work]
         return bool(work) and not self._work_ends and all(each.status is not None for each in work)
 
@@ -195,7 +195,7 @@ class World:
         )
 
     def publish(self, topic: str, type_: str, values: object, rate: float) -> None:
-        """Publish a message at ``rate`` Hz until the next one on this topic. If the rate is 0, publish it once and latched.
+        """Publish a message at ``rate`` Hz until the next call for this topic. If the rate is 0, publish it once and latched.
 
         Raise NotFoundError if the type does not exist, MessageException if the values do not match it.
         """
@@ -238,7 +238,7 @@ class World:
             tempfile.TemporaryDirectory(prefix="minirospy-check-", ignore_cleanup_errors=True)
         )
         name = f"check-{os.getpid()}-{next(_numbers)}"
-        # This variable makes the board's server exit with its last client. The programs inherit it.
+        # This variable, which the programs inherit, makes the board's server exit with its last client.
         os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
         self._stack.callback(os.environ.pop, "MINIROSPY_BOARD_TEMPORARY", None)
         environ = {
@@ -276,7 +276,7 @@ class World:
     def _open_guardian(self) -> None:
         """Start the guardian script, which stops the programs if this process is killed."""
         if sys.platform == "win32":
-            return  # guard_children() covers this case
+            return  # guard_children() stops the programs on Windows
         words = [
             sys.executable,
             "-IS",

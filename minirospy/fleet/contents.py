@@ -21,7 +21,7 @@ __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused"
 
 MAX_GATEWAYS = 5_000
 MAX_NAMES = 2_000  # maximum number of topics, and of services, that a gateway may announce
-# maximum number of topics and services of all gateways, which use about 100 MiB
+# maximum number of topics and services of all gateways together; this many use about 100 MiB
 MAX_TOKENS = 200_000
 
 
@@ -99,7 +99,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway whose only name was rejected, because nothing would remove it.
+        # Do not store a gateway without names, because no removal of a token would remove it.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed

@@ -85,7 +85,7 @@ class Definitions:
         return self._known.get((name, md5sum), "")
 
     async def interface(self, name: str, md5sum: str, gateway: str) -> InterfaceType:
-        """Return a type, with its definition if this gateway or ``gateway`` ("" for none) knows it.
+        """Return a type, with its definition if it is known here or at the peer ``gateway`` ("": ask no peer).
 
         Messages are forwarded even if the definition is not known.
         """
@@ -121,7 +121,7 @@ class Definitions:
         if share is None:
             share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
         try:
-            # Acquire the gateway's own share first, so that an unresponsive gateway cannot occupy all query slots.
+            # Acquire the peer's semaphore first, so that an unresponsive gateway cannot occupy all query slots.
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]

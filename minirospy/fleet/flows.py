@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Flow(Generic[_T]):
-    """The queue of one flow, limited to ``max_waiting`` messages and ``max_bytes`` bytes. One larger message is accepted."""
+    """The queue of one flow, limited to ``max_waiting`` messages and ``max_bytes`` bytes. A single message may be larger."""
 
     max_waiting: int
     max_bytes: int

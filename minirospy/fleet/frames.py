@@ -21,7 +21,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
-    """A fixed number of bytes without a frame id, to skip."""
+    """A run of ``size`` bytes that contains no frame id and is skipped."""
 
     size: int
 
@@ -46,7 +46,7 @@ class FrameRewriter:
     """Rewrites the frame ids in messages of one type."""
 
     def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
-        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid; pass on errors of ``lookup``."""
+        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid. Exceptions from ``lookup`` propagate."""
         self._steps = _trimmed(_steps(spec, lookup))
 
     @property

@@ -14,7 +14,7 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # seconds to hold a name: Zenoh's default lease, after which it closes a silent link
+HOLD_SECONDS = 10.0  # seconds to reserve a departed robot's name: Zenoh closes a silent link after as long
 # maximum number of held names of robots that have left; limited because peers choose the names
 MAX_HOLDS = 5_000
 
@@ -30,7 +30,7 @@ class Holders:
     """Decides which of several claims holds a name, and remembers the decision."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Create the object without any holders. ``clock`` returns monotonic seconds."""
+        """Create an instance in which no name is held. ``clock`` returns monotonic seconds."""
         self.machines: Mapping[str, str] = {}
         """The machines that the operator has chosen, keyed by robot name."""
         self._clock = clock
@@ -93,7 +93,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return the seconds until the next of these names is released, or None if none of their holders has left."""
+        """Return the seconds until the first of ``names`` is released, or None if none of their holders has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names

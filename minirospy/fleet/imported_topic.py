@@ -145,7 +145,7 @@ class ImportedTopic:
         return True
 
     def look(self, snapshot: Snapshot | None) -> None:
-        """Match the topic to the current local graph."""
+        """Update the topic to match the current local graph."""
         if self._is_closed:
             return
         if self.needs_snapshot and snapshot is not None:
@@ -263,7 +263,7 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # Ignore a step back or a huge step forward: the sequence numbers restart when the robot reopens the topic.
+            # Ignore a step back or a huge step forward in the sequence numbers: they restart when the robot reopens the topic.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()

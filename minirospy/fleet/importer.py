@@ -46,7 +46,7 @@ _MAX_PING = 64  # maximum size in bytes of a reply to a ping; a valid reply has 
 _CALL_SECONDS = 3600.0
 # timeout in seconds for a name's holder to reply after another gateway on its machine has claimed the name
 CHALLENGE_SECONDS = 2.0
-# return memory to the system after removing this many names (about 4 MB) and this delay, because links close late
+# after removing this many names (about 4 MB), wait this long, then return free memory to the system
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names per robot; all robots share _MAX_IMPORTED
 # maximum number of a robot's names to close concurrently: each needs a task and a call to the master
@@ -409,7 +409,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Schedule returning the memory of removed names to the system, with a delay because links close late."""
+        """Once many names were removed, schedule returning free memory to the system: later, because links close with a delay."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()

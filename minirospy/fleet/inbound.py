@@ -177,7 +177,7 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher.wait_for_expected()
-        # Publish buffered messages before newer ones, which the receiver's thread meanwhile passes to `keep` on this loop.
+        # Publish the buffered messages first: the receiver's thread passes newer ones to `keep`, which runs on this loop.
         for body in self._held:
             self._put(publisher, body)
         self._held.clear()

@@ -23,7 +23,7 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Call ``question`` with a new fleet session; return its result.
+    """Open a fleet session, call ``question`` with it, and return the result of that call.
 
     Raise BridgeError if neither a gateway nor a router is reached.
     """
@@ -81,7 +81,7 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
 
 
 async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
-    """Return the claim that control rooms show for a robot's name.
+    """Return the claim to a robot's name, or None if there is none.
 
     If there are several claims, return the one that the control rooms show; raise BridgeError if the control rooms disagree.
     """

@@ -187,7 +187,7 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of a robot's token or, if ``kind`` is "control", of a control room's, whose name may be ``-``."""
+    """Return the key of a robot's token. If ``kind`` is "control", the token is a control room's, whose name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 

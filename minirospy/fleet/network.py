@@ -62,9 +62,9 @@ _T = TypeVar("_T")
 
 # maximum size in bytes of a query or reply, such as a service's response or a definition
 MAX_TEXT = 16 << 20
-# maximum number of replies to a query: peers choose it, and a fleet has at most 5,000 gateways
+# maximum number of replies to a query: peers could send any number, and a fleet has at most 5,000 gateways
 MAX_REPLIES = 10_000
-# fraction of the timeout: if a query ends sooner without a reply, the link was lost
+# a query that ends without a reply before this fraction of its timeout has lost its link
 EARLY_SHARE = 0.9
 RETRY_SECONDS = 1.0
 LINGER_SECONDS = 2.0
@@ -81,7 +81,7 @@ The limit is separate so that blocked service calls do not delay them.
 
 
 async def _remove_linger() -> None:
-    """Periodically remove SO_LINGER from all of Zenoh's links, more often than their lease of 10 s."""
+    """Remove SO_LINGER from all of Zenoh's links every LINGER_SECONDS, which is less than the links' lease of 10 s."""
     remover = LingerRemover()
     while True:
         remover.look()
@@ -93,7 +93,7 @@ class QueryFailed(MinirospyError):
 
 
 class FleetNetwork:
-    """A Zenoh session, created by :meth:`open`. Handlers are called on the loop that called it."""
+    """A Zenoh session, created by :meth:`open`. Handlers are called on the event loop on which :meth:`open` was called."""
 
     def __init__(
         self, session: Session, loop: asyncio.AbstractEventLoop, *, has_many_links: bool = False
@@ -310,7 +310,7 @@ class FleetNetwork:
     async def query(
         self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
     ) -> bytes:
-        """Send a query and return the first reply. Raise QueryFailed if there is no reply, or it is an error.
+        """Send a query and return the first reply. Raise QueryFailed if there is no reply, or if the reply is an error.
 
         If ``of_others``, query only other sessions; if several sessions match, query the best match.
         """
@@ -337,7 +337,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return the replies, keyed by their key: at most ``most`` replies of at most ``size`` bytes each.
+        """Return a dict from key to reply, with at most ``most`` replies of at most ``size`` bytes each.
 
         Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """
@@ -402,7 +402,7 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in its own thread; by default it starts a thread for each handler."""
+        """Return a handler that Zenoh calls in its own thread. By default, Zenoh would start one more thread per handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(

@@ -43,8 +43,8 @@ PERIOD = 1.0  # seconds between beacons of a resource
 LOST_SECONDS = 5.0
 """Seconds without a beacon after which a resource counts as lost.
 
-If a bridge exits, a silent bridge needs up to three periods to resume its beacons. zenoh-bridge-ros1 itself takes 3 to 6
-s to detect the loss.
+A bridge sends no beacons while another bridge sends the same ones. If the other bridge exits, the first needs up to three
+periods to resume its beacons. zenoh-bridge-ros1 itself takes 3 to 6 s to detect the loss.
 """
 MAX_RESOURCES = 9_000
 """Maximum number of remote resources to track; the master accepts at most 10,000 names per node."""
@@ -228,7 +228,7 @@ class Sightings:
         return is_new
 
     def extend(self, seconds: float, now: float) -> None:
-        """Let all resources expire ``seconds`` later, but not later than those whose beacon arrives now."""
+        """Extend the expiry of all resources by ``seconds``, at most to that of a resource whose beacon arrives now."""
         self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
 
     def forget_lost(self, now: float) -> bool:

@@ -50,7 +50,7 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""A topic to which each gateway that uses zenoh-bridge-ros1's keys subscribes first, so that they detect each other."""
+"""The topic to which gateways that use zenoh-bridge-ros1's keys subscribe first, so that they detect each other."""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
 _BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default node names of zenoh-bridge-ros1
 _AGGREGATE = "/rosout_agg"
@@ -242,7 +242,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was suspended, and beacons sent meanwhile have not been delivered yet.
+                    # The process was suspended. Beacons sent meanwhile arrive later, so let the resources expire later, too.
                     self.sightings.extend(late, now)
                 has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:

@@ -112,7 +112,7 @@ class Ros1Topic:
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Zenoh reports all readers; beacons do not, because silent bridges and third-party programs send none.
+        # Use Zenoh to detect readers: it reports all of them, whereas silent bridges and third-party programs send no beacons.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:

@@ -60,7 +60,7 @@ _BULK_TYPES = {
 }
 
 
-# seconds without a command before zero velocity is published; more frequent commands count as a stream
+# seconds without a command before zero velocity is published; commands at shorter intervals form one stream
 STOP_SECONDS = 0.5
 
 

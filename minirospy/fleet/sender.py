@@ -235,7 +235,7 @@ class Receiver(_Worker):
         message: bytes,
         attachment: bytes,
     ) -> None:
-        """Queue a call of ``deliver(message, attachment)`` in the receiver's thread."""
+        """Queue a message; the receiver's thread then calls ``deliver(message, attachment)``."""
         with self._lock:
             if not self._is_closed:
                 self._queue.add(flow, (deliver, message, attachment), len(message))

@@ -21,7 +21,7 @@ BRACKETS = r"\(([^()]*(?:\([^()]*\)[^()]*)*)\)"  # matches (...) after `rad`, wi
 _MAX_LENGTH = (
     200  # maximum length of an expression, in characters; longer ones may exceed limits of Python's parser
 )
-_MAX_BITS = 1_100  # maximum size of an integer; larger than any float, so it is an error in ROS, too
+_MAX_BITS = 1_100  # maximum number of bits of an integer; longer ones exceed any float, an error in ROS, too
 _MAX_PLACES = 400  # maximum argument of round(): a float has fewer decimal places
 
 _CONSTANTS = ("e", "inf", "nan", "tau")  # names from the math module; `pi` is handled separately
@@ -191,7 +191,7 @@ class _Evaluator:
         return True
 
     def _connected(self, values: Sequence[ast.expr], *, until: bool) -> Number:
-        """Return the first value whose truth value is ``until``; if there is none, return the last value."""
+        """Evaluate ``and`` or ``or``: return the first value with the truth value ``until``, or else the last value."""
         for node in values:
             value = self.value(node)
             if bool(value) is until:

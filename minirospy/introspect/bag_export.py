@@ -28,7 +28,7 @@ __all__ = ["FORMATS", "Exported", "export", "file_name"]
 
 FORMATS = ("csv", "parquet")
 MAX_BATCH = 2_000  # maximum number of messages per batch
-MAX_CELLS = 8_000_000  # maximum number of table cells per batch; each takes at least one byte of a message
+MAX_CELLS = 8_000_000  # maximum number of table cells per batch; each takes at least one byte of its message
 _MAX_ELEMENTS = 10_000  # maximum number of array elements that get separate columns
 _SECOND = 10**9
 _MAX_INT64 = (1 << 63) - 1
@@ -241,7 +241,7 @@ def _elements(name: str, arrays: Sequence[Sequence[object] | None]) -> Iterator[
 
 
 class _Cells:
-    """The kind and types of a column's values in all batches."""
+    """The kind of a column, and the types of its values in all batches."""
 
     def __init__(self) -> None:
         self.kind = Kind.PLAIN
@@ -249,7 +249,7 @@ class _Cells:
         self.is_large = False  # set if a value exceeds a signed 64-bit integer
 
     def widen(self, column: Column) -> None:
-        """Add the types of a batch's values."""
+        """Add the types in a batch's values to the known types."""
         self.kind = column.kind
         self.types |= {*map(type, column.values)} - {type(None)}
         if int in self.types and not self.is_large:
@@ -320,7 +320,7 @@ def _seconds(nanoseconds: int) -> str:
 
 
 class _ParquetWriter(_Writer):
-    """Writes Parquet. Times become UTC timestamps, and durations become durations, both in nanoseconds."""
+    """Writes Parquet, with times as UTC timestamps and durations as durations, both in nanoseconds."""
 
     def __init__(self, pyarrow: Any, schema: Any, writer: Any) -> None:
         self._pyarrow = pyarrow

@@ -154,7 +154,7 @@ def _ignore(_: str) -> None:
 
 
 def differences(minuend: Iterable[Point], subtrahend: Iterable[Point]) -> Iterator[Point]:
-    """Yield the first series minus the second, which is interpolated linearly at the first one's times.
+    """Yield the minuend minus the subtrahend, at the minuend's times; the subtrahend is interpolated linearly.
 
     Both must be in time order. Times outside the range of the second series are left out. If a path has several series, only the
     first one is used.
@@ -184,7 +184,7 @@ def _first_series(found: Iterable[Point]) -> Iterator[Point]:
 
 
 class Budget:
-    """The numbers of unchanged points and of series that are still available to a request."""
+    """The numbers of points (stored unchanged) and of series that a request may still use."""
 
     def __init__(self) -> None:
         self.points = MAX_POINTS
@@ -205,7 +205,7 @@ class Sampler:
         self._start = start
         self._width = max(end - start, 1e-9) / max(columns, 1)
         self._budget = budget or Budget()
-        self._columns: dict[int, list[float]] | None = None  # column -> (low, time, high, time)
+        self._columns: dict[int, list[float]] | None = None  # column -> (low, its time, high, its time)
 
     @property
     def is_exact(self) -> bool:
@@ -260,7 +260,7 @@ def sample(
     columns: int,
     budget: Budget | None = None,
 ) -> list[dict[str, Sampler]]:
-    """Return a list with one dict from label to sampler for each of ``count`` paths. Omit series beyond the budget."""
+    """For each of ``count`` paths, return a dict that maps labels to samplers. Leave out series that exceed the budget."""
     budget = budget or Budget()
     samplers: list[dict[str, Sampler]] = [{} for _ in range(count)]
     for number, (label, time, value) in found:

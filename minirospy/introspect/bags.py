@@ -138,7 +138,7 @@ def copy_bag(
     compression: str = compressions.NONE,
     progress: Progress = lambda done: None,
 ) -> None:
-    """Copy a bag in time order; replace each connection by ``change(connection)``.
+    """Copy a bag in time order; replace each connection by the result of ``change(connection)``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails.
     """
@@ -202,7 +202,7 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Copy the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
+    """Copy the messages for which ``keep`` is true to a new bag; pass the value of ``show`` for each message to ``on_shown``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.
@@ -281,7 +281,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if the file name of an output bag ends like an MCAP file's."""
+    """Raise UsageError if the file name of an output bag ends in .mcap."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"

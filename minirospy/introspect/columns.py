@@ -99,7 +99,7 @@ def columns(messages: Sequence[object]) -> list[Column]:
 
 
 def _names_of(field: _Leaf) -> str:
-    """Return the path of the field ``name`` in the same message as an array of numbers, or "" for any other field."""
+    """For an array of numbers, return the path of the ``name`` field in the same message. For any other field, return ""."""
     element, bracket, _ = field.type.partition("[")
     if not bracket or element not in _NUMBERS - _NO_BYTES:
         return ""
@@ -108,7 +108,7 @@ def _names_of(field: _Leaf) -> str:
 
 
 def _belong(names: Sequence[Sequence[object]], values: Sequence[Sequence[object]]) -> list[bool]:
-    """Return, for each array, whether it is not empty and has as many values as names."""
+    """For each array, return whether it is not empty and has the same length as its message's list of names."""
     return [0 < len(array) == len(own) for own, array in zip(names, values, strict=True)]
 
 

@@ -18,7 +18,7 @@ __all__ = ["Filter", "Named", "Slice", "Step", "parse_steps", "select"]
 
 _MAX_VALUES = 50  # maximum number of series per path, for example for a whole array
 _MAX_TESTED = 10_000  # maximum number of elements that a filter tests
-_MAX_PATH = 1_000  # maximum length in characters; finding the end of a step takes quadratic time
+_MAX_PATH = 1_000  # maximum length of a path in characters; finding the end of a step takes quadratic time
 _MAX_STEPS = 50  # maximum number of steps per path, for example for messages within messages
 
 _STEP = re.compile(
@@ -45,7 +45,7 @@ class Slice(NamedTuple):
 
 
 class Named(NamedTuple):
-    """An array element selected by name: the message's array of strings ``name`` contains its name at the same index."""
+    """Selects an array element by name: its index is that of the name in the message's array of strings, ``name``."""
 
     name: str
 

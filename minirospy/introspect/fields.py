@@ -35,7 +35,7 @@ class Step(NamedTuple):
 
 
 class NotAnArrayError(NotFoundError):
-    """Raised if a field with an index or slice is neither an array nor a string. ``type_name`` is its value's class."""
+    """Raised if a path indexes or slices a value that is neither an array nor a string. ``type_name`` is the value's class."""
 
     def __init__(self, name: str, value: object) -> None:
         super().__init__("array", name, hint=f"the field is a single {_type_of(value)}")

@@ -131,11 +131,11 @@ def node_host(uri: str | None) -> str | None:
 
 
 def unknown_topic(graph: Graph, topic: str) -> NotFoundError:
-    """Return the error that a topic has neither publishers nor subscribers, with a list of similar existing names."""
+    """Return an error saying that a topic has no publishers or subscribers; it suggests existing topics with similar names."""
     state = graph.state()
     return NotFoundError("topic", topic, [*state.publishers, *state.subscribers])
 
 
 def unknown_service(graph: Graph, service: str) -> NotFoundError:
-    """Return the error that a service does not exist, with a list of similar existing names."""
+    """Return an error saying that a service does not exist; it suggests existing services with similar names."""
     return NotFoundError("service", service, graph.state().services)

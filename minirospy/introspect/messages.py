@@ -50,7 +50,7 @@ class MessageClasses:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """Return the class for a publisher's connection header: the installed class if its md5sum is the same.
+        """Return the class for a publisher's connection header: the installed class or, if its md5sum differs, a generated one.
 
         Raise NotFoundError if the type is not installed and the publisher sent no definition, or DefinitionError if the
         definition cannot be parsed.
@@ -105,7 +105,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
 
 
 def words_of(nanoseconds: int) -> dict[str, object]:
-    """Return the values of the keywords: ``now`` is the time, and ``auto`` a header with this stamp."""
+    """Return the values of the keywords ``now`` (this time) and ``auto`` (a header with this time as its stamp)."""
     from minirospy.base.times import Time
     from minirospy.core.idl.load import get_message_class
 
@@ -130,7 +130,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """Return a one-line error that ``values``, entered by the user, do not match the message. List the message's fields."""
+    """Return a one-line error saying that ``values``, entered by the user, do not match the message, and listing its fields."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

@@ -118,7 +118,7 @@ def is_known_host(machine: str) -> bool:
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
-    """Return the neighbours of each node that publishes or subscribes, as a dict keyed by node, sorted."""
+    """Return a dict from node name to neighbours, sorted by name, with all nodes that publish or subscribe."""
     senders: dict[str, set[str]] = {}
     receivers: dict[str, set[str]] = {}
     for topic in {*state.publishers, *state.subscribers}:
@@ -228,7 +228,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     master = MasterProxy(graph.master.uri, node.name)
     try:
         # Topics are unregistered by the node's URI, services by the service's own URI.
-        # If the node's URI is unchanged after the services were looked up, these services do not belong to a newer node.
+        # If the node's URI is still the same after looking up the services, they do not belong to a newer node of this name.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:

@@ -88,7 +88,7 @@ def delete_parameter(graph: Graph, name: str) -> None:
 
 
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
-    """Parse a parameter file named ``where``; return its documents, whose namespaces start with the global name ``namespace``.
+    """Parse the text of the parameter file ``where``; return its documents, whose namespaces start with ``namespace`` (global).
 
     Raise ValueTextError if the file is not YAML, or has unnamed values at the root.
     """

@@ -98,7 +98,7 @@ def _wrapped(line: str) -> str:
     """Wrap a line that is too wide. Like YAML libraries, break before the first word that starts beyond the last column."""
     if len(line) <= _COLUMNS:
         return line
-    # A dash counts as indentation before a key, but not before a brace.
+    # Before a key, a dash counts as indentation; before a brace, it does not.
     start = re.match(r" *(?:- (?=\w))?", line)
     indent = start.end() if start else 0
     column, depth, text = 0, 0, []

@@ -58,7 +58,7 @@ def publish_all(
     rate: float,
     on_message: Callable[[Message], object],
 ) -> None:
-    """Publish ``messages`` at ``rate`` Hz of the node's clock, until there are none left or the node is stopped.
+    """Publish ``messages`` at ``rate`` Hz (by the node's clock) until all have been published or the node is stopped.
 
     If time jumps back (a simulation is restarted), continue from the new time.
     """

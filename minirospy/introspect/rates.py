@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Number of messages in a window without a limit: bounds the memory of a long measurement."""
+"""Maximum number of messages in a window of unlimited size, which bounds the memory of a long measurement."""
 
 
 _NOTHING = "no new messages"
@@ -40,7 +40,7 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Return the rate in Hz, if the times are the periods between messages."""
+        """Return the mean rate in Hz. The times must be periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 

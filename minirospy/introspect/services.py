@@ -195,7 +195,7 @@ def _why(error: Exception) -> str:
 
 
 def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
-    # Import this here, because listing services does not need it.
+    # Import this module here, because listing services does not need it.
     from minirospy.runtime.node.service_client import ServiceClient
 
     return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

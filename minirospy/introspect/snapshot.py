@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference between two snapshots. Ignore a topic whose type alone has changed."""
+    """Return the difference between two snapshots. A topic of which only the type has changed is not a difference."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),
@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 def moved(before: Table, after: Table) -> list[str]:
-    """Return the names in both tables that have moved to the end: the master re-appends a name that is registered again."""
+    """Return the names in both tables that have moved to the end, where the master puts a name that is registered again."""
     found: dict[str, None] = {}
     rest = iter(name for name in before if name in after)
     for name in after:
@@ -91,7 +91,7 @@ def moved(before: Table, after: Table) -> list[str]:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Fetch the current graph. ``call(method, *arguments)`` calls the master; its exceptions are passed on."""
+    """Fetch the current graph. ``call(method, *arguments)`` calls the master; its exceptions propagate."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

@@ -250,7 +250,7 @@ class Inbox:
             try:
                 self._messages.put(None, timeout=0)
             except queue.Full:
-                pass  # the queue is full, so the reader checks the flag after reading the queued messages
+                pass  # the queue is full: the reader will check the flag once it has read the queued messages
 
     def __iter__(self) -> Iterator[Received]:
         while True:

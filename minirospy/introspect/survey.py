@@ -170,7 +170,7 @@ def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Count
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # A row ends with (messages, is connected) in rospy; in roscpp, the messages' size comes before these.
+                # A row ends with (message count, is connected) in rospy; in roscpp, the size in bytes precedes the message count.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

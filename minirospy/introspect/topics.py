@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Return the topic like :func:`find_topic`, but never None.
+    """Return the topic like :func:`find_topic`, but raise NotFoundError instead of returning None.
 
     Raise NotFoundError if the topic does not exist or its type is not known.
     """

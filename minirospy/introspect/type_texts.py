@@ -49,7 +49,7 @@ def type_of_text(name: str, text: str) -> InterfaceType | None:
 
 
 class TypeTexts:
-    """Determines the types of topics. Imports each type's module only once, in a worker, because that takes milliseconds."""
+    """Determines the types of topics. Imports each type's module only once, in a worker, because an import takes milliseconds."""
 
     def __init__(self, node: Node) -> None:
         self._node = node

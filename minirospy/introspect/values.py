@@ -59,7 +59,7 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # Text that is not UTF-8 is a usage error, which the command reports.
+            # Do not wrap the error for text that is not UTF-8: the command reports it as a usage error.
             raise error.__cause__ from None
         accepted = _accepted_by_ros(text, error)
         if len(accepted) != 1:
@@ -186,7 +186,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML reads an unquoted word as a string: only letters, digits, / and _, without a special meaning."""
+    """Return whether YAML reads an unquoted word as a string: only letters, digits, / and _, but no keyword such as ``yes``."""
     return (
         len(word) > 1
         and word.isascii()

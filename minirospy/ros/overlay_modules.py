@@ -218,7 +218,7 @@ def listed(source: Path) -> list[str]:
 
 
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
-    """Map the names that star imports bring from other modules to `MODULE` or `MODULE:NAME`."""
+    """Return a dict from the names that the module gets by star imports to their sources: `MODULE` or `MODULE:NAME`."""
     found = {}
     for place, names in read_passed_on().get(module, {}).items():
         for each in names.split():
@@ -229,7 +229,7 @@ def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
 
 @functools.cache
 def read_passed_on() -> dict[str, dict[str, str]]:
-    """Return the names that star imports provide in real ROS, because its modules have no ``__all__``.
+    """Return the names that star imports provide in real ROS, where modules have no ``__all__``.
 
     The result maps modules to the modules that define the names ("" if the names are modules themselves), and these to the
     names, separated by spaces: NAME, or NAME=NAME_THERE.
@@ -252,7 +252,7 @@ def _submodules(package: str) -> dict[str, str]:
 
 
 def _text_of_later(module: str, names: dict[str, str], starred: list[str]) -> list[str]:
-    """Return source lines that look up these names at first use, hidden from type checkers and editors."""
+    """Return source lines that import these names on first use. Type checkers and editors do not see these lines."""
     return [
         "",
         "import typing as _typing",

@@ -99,7 +99,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
 
 
 def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
-    """Yield problems for nodes that do not respond, with one finding for all nodes of a machine that fail alike."""
+    """Yield problems for nodes that do not respond. Nodes on the same machine with the same kind of fault share one finding."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
         if answer.trouble:
@@ -329,7 +329,7 @@ def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
 
 
 def _is_of_action(topic: str, state: SystemState) -> bool:
-    """Return whether this is the goal or cancel topic of an action server, which often has no publisher."""
+    """Return whether a topic is an action server's goal or cancel topic; such a topic often has no publishers."""
     name, _, end = topic.rpartition("/")
     return end in ("goal", "cancel") and f"{name}/status" in state.publishers
 

@@ -108,7 +108,7 @@ def check_listeners(
 
     for service, result in zip(services, in_parallel(ask, services, _ANSWER_SECONDS), strict=True):
         if isinstance(result, RpcRefused):
-            continue  # the doctor with this service is not listening
+            continue  # this node's doctor does not listen
         if isinstance(result, Exception):
             here = trouble_of(result)
             host = host_port(graph.node_uri(service.removesuffix(_SERVICE)) or "")[0]

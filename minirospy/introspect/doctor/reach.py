@@ -62,7 +62,7 @@ _R = TypeVar("_R")
 
 
 class Fault(str, Enum):
-    """Why an address does not respond, as far as this machine can tell."""
+    """Reasons why an address does not respond, as far as this machine can tell."""
 
     NAME = "name"  # the host name does not resolve
     REFUSED = "refused"  # the machine runs, but no process listens on the port

@@ -42,7 +42,7 @@ def list_controller_types() -> None:
 
 
 def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
-    """Reload the controllers' modules. ``force_kill``: first stop and unload all controllers. ``restore``: load them again."""
+    """Reload the controllers' modules. ``force_kill``: unload all first. ``restore``: load and start them again."""
     before = _call("list_controllers", ListControllers).controller if restore else []
     print(f"Restore: {restore}")
     is_done = bool(_call("reload_controller_libraries", ReloadControllerLibraries, force_kill).ok)

@@ -31,8 +31,8 @@ from minirospy.ros.controller_manager.manager import ControllerManager, find_des
 __all__ = ["ControlLoop", "limits_of_parameters", "run"]
 
 _BILLION = 1_000_000_000
-_END_SECONDS = 5.0  # maximum wait for the loop to finish at shutdown, in case a driver hangs
-_SLEEP_SECONDS = 0.1  # maximum sleep, so that a slow loop notices a stop request
+_END_SECONDS = 5.0  # maximum seconds to wait for the loop to finish at shutdown, in case a driver hangs
+_SLEEP_SECONDS = 0.1  # maximum seconds of one sleep, so that a slow loop notices a stop request
 _REPORT_SECONDS = 1.0
 _WARN_SECONDS = 10.0  # seconds between warnings about overruns or non-finite commands
 _WARN_SHARE = 0.05  # largest share of overrun cycles without a warning; a busy computer delays a few
@@ -71,7 +71,7 @@ class ControlLoop:
             limits = limits_of_parameters(hardware, self.manager.namespace)
         self._limits = LimitEnforcer(hardware.joints.values(), limits)
         self._times = CycleTimes(round(_BILLION / rate))
-        self._invalid: dict[str, None] = {}  # joints with non-finite commands since the last report, as keys
+        self._invalid: dict[str, None] = {}  # keys: joints with non-finite commands since the last report
         self._stop = SignalSafeEvent()
         self._ended = SignalSafeEvent()
         self._status = 0
@@ -208,7 +208,7 @@ class ControlLoop:
                 self._log_invalid()
         except rospy.ROSException:
             return  # the node is shutting down
-        if not rospy.is_shutdown_requested():  # otherwise rospy's shutdown unregisters all topics together
+        if not rospy.is_shutdown_requested():  # during a shutdown, rospy unregisters all topics at once
             publisher.unregister()
 
     def _log_invalid(self) -> None:

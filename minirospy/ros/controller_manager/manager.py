@@ -45,7 +45,7 @@ _LOG = {
     ERROR: rospy.logerr,
     FATAL: rospy.logfatal,
 }
-_EXTRA_SECONDS = 1.0  # seconds for which a switch may exceed its timeout if the loop has stopped, as in ROS
+_EXTRA_SECONDS = 1.0  # maximum seconds that a switch waits beyond its timeout for a stopped loop, as in ROS
 _BASE_CLASS = "controller_interface::ControllerBase"
 
 
@@ -55,7 +55,7 @@ def log(level: int, line: str) -> None:
 
 
 class ControllerManager:
-    """Loads, starts and stops the controllers of one robot, on request through its services.
+    """Loads, starts and stops the controllers of one robot, as requested through the services that it offers.
 
     The node calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``, as
     :func:`controller_manager.run` does. Each service returns after the loop's next update. ``namespace``: for the services and
@@ -69,7 +69,7 @@ class ControllerManager:
         self.table = ControllerTable(hardware, log)
         self._plugins: dict[str, Plugin] | None = None
         self._lock = threading.RLock()  # held during each service call
-        self._waiting: list[threading.Event] = []  # events that the next update sets
+        self._waiting: list[threading.Event] = []  # events to set in the next update
         self._has_updated = False
         self._is_closed = False
 
@@ -188,7 +188,7 @@ class ControllerManager:
         loaded, self.table.loaded = self.table.loaded, ()
         for each in reversed(loaded):
             self.table.close(each)
-        if not rospy.is_shutdown_requested():  # otherwise rospy's shutdown unregisters all services together
+        if not rospy.is_shutdown_requested():  # during a shutdown, rospy unregisters all services at once
             for service in self._services:
                 service.shutdown("the controller manager is closed")
 
@@ -282,7 +282,7 @@ class ControllerManager:
 
 
 def find_description(namespace: str, name: str = "robot_description") -> str | None:
-    """Return the parameter ``name`` from a namespace or its closest parent that has it, or None."""
+    """Return the parameter ``name`` from a namespace or from its closest ancestor that has this parameter, or None."""
     while True:
         namespace = namespace.rstrip("/")
         text = rospy.get_param(f"{namespace}/{name}", None)

@@ -41,7 +41,7 @@ class PluginError(MinirospyError):
 
 
 class Plugin(NamedTuple):
-    """A controller class that can be loaded. ``name``: its type in parameters. ``origin``: the file that declares it."""
+    """A controller class that can be loaded. ``name`` is its type in parameters, ``origin`` the file that declares the class."""
 
     name: str
     python: str  # the class's dotted path, or its C++ name

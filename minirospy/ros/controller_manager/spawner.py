@@ -25,7 +25,7 @@ from minirospy.ros.rosparam.rosparam import RosParamException, load_file, set_pa
 __all__ = ["main", "new_parser"]
 
 _SERVICES = ("load_controller", "switch_controller", "unload_controller")
-_MESSAGE_SECONDS = 1.0  # seconds for the manager's log to appear before the spawner's, as in ROS
+_MESSAGE_SECONDS = 1.0  # seconds to wait, so that the manager's log appears before the spawner's, as in ROS
 
 
 def new_parser() -> argparse.ArgumentParser:
@@ -96,7 +96,7 @@ class _Spawner:
         self._loaded: list[str] = []
 
     def wait_for_services(self, timeout: float | None) -> bool:
-        """Return whether every service appears within ``timeout`` seconds; wait longer until the first /clock message."""
+        """Return whether all services appear within ``timeout`` seconds, excluding the time before the first /clock message."""
         while True:
             try:
                 for name in _SERVICES:

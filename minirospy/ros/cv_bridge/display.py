@@ -87,7 +87,7 @@ def cvtColorForDisplay(
 
 
 def _guessed(encoding: str) -> str:
-    """Return bgr8, the default output encoding. Raise RuntimeError if an image with this encoding cannot be displayed."""
+    """Return bgr8, the default output encoding. Raise RuntimeError if an image in ``encoding`` cannot be displayed."""
     bits = 0
     try:
         number = type_of_encoding(encoding)
@@ -115,10 +115,10 @@ def _scaled(image: Pixels, low: float, high: float) -> Pixels:
 
     values = image.astype(np.float64) - low
     if image.dtype.kind != "f":
-        # OpenCV subtracts in the image's data type.
+        # Like OpenCV, subtract in the image's data type.
         limits = np.iinfo(image.dtype)
         values = np.clip(np.rint(values), limits.min, limits.max)
-    # OpenCV multiplies in float32, except for these types.
+    # Like OpenCV, multiply in float32, or in float64 for these two types.
     exact = np.dtype(np.float64 if image.dtype.name in ("int32", "float64") else np.float32)
     shown = np.rint(values.astype(exact) * exact.type(255.0 / (high - low)))
     scaled: Pixels = np.clip(np.nan_to_num(shown, nan=0.0), 0, 255).astype(np.uint8)

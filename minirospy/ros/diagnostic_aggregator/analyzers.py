@@ -117,7 +117,7 @@ class _Items:
         was_stale = self._last_level == STALE and now - self._last_change > self._timeout
         if header.level != self._last_level:
             self._last_level, self._last_change = header.level, now
-        # Also omit the header if it has no items and has been stale for longer than the timeout.
+        # Also omit the header if the group has no items and its level has been STALE for longer than the timeout.
         if self._discard_stale and not items and was_stale:
             return []
         return [header, *(item.status(self.path, item.name in old) for item in items)]
@@ -215,7 +215,7 @@ class DiscardAnalyzer(GenericAnalyzer):
 
 
 class IgnoreAnalyzer:
-    """An analyzer that matches and reports nothing, to disable a section of the parameters."""
+    """An analyzer that matches no statuses and reports nothing. Given as an analyzer's type, it disables that analyzer."""
 
     path = name = ""
 

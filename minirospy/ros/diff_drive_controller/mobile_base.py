@@ -67,7 +67,7 @@ class MobileBase(Controller):
         raise NotImplementedError
 
     def read_rate(self, context: ControllerContext) -> float:
-        """Read and return the odometry's publish rate, the first parameter that ROS logs."""
+        """Read, log and return the odometry's publish rate. As in ROS, it is the first parameter in the log."""
         self._name = context.name
         hertz = context.parameters.finite("publish_rate", 50.0)
         self.log_info(f"Controller state will be published at {hertz:g}Hz.")
@@ -204,12 +204,12 @@ class MobileBase(Controller):
 
 
 def enabled(flag: bool) -> str:
-    """Return ROS's word for a flag, for the log."""
+    """Return the word that ROS logs for a flag: "enabled" or "disabled"."""
     return "enabled" if flag else "disabled"
 
 
 def _covariance(parameters: Parameters, key: str) -> list[float]:
-    """Return the covariance matrix with six diagonal values from a parameter. If they are missing, ROS aborts the process."""
+    """Return the covariance matrix whose diagonal is a parameter's list of six numbers. ROS aborts the process without them."""
     diagonal = parameters.numbers(key)
     if diagonal is None or len(diagonal) != 6:
         raise ControllerError(f"Parameter '{parameters.namespace}/{key}' must be a list of 6 numbers")

@@ -15,7 +15,7 @@ __all__ = ["Definition", "close_server"]
 
 
 class Definition(ParameterGenerator):
-    """A configuration: call ``add`` as in a .cfg file, then assign the properties to the generated module's names."""
+    """A configuration without a .cfg file: call ``add`` as in such a file. The properties are a generated module's variables."""
 
     def __init__(self) -> None:
         """Define a configuration without parameters. Unlike a .cfg file, it needs no folders."""

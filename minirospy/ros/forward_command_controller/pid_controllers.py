@@ -110,7 +110,7 @@ class PidJointVelocityController(_PidController):
         self._open_command(context, 1)
 
     def starting(self, time: Time) -> None:
-        """Stop the joint."""
+        """Command zero velocity and reset the PID controller."""
         self._command.values = [0.0]
         self._pid.reset()
 

@@ -21,7 +21,7 @@ class Bumper(SensorPlugin):
         names = [each.text.strip() for each in contact.all("collision")] if contact is not None else []
         link = self.sensor_link
         known = {each.name for each in link.record.collisions}
-        # sdformat renames collisions when it merges links. If no name is known, use all collisions of the link.
+        # sdformat renames collisions when it merges links. If none of the names is known, use all collisions of the link.
         chosen = known.intersection(names) or known
         self._collisions = {f"{link.scoped_name}::{name}" for name in chosen}
         self._frame = self.frame("frameName", "world")

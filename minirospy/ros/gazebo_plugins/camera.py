@@ -90,7 +90,7 @@ class CameraPlugin(SensorPlugin):
                 lens.sense()
 
     def reset(self) -> None:
-        """Restart the update periods."""
+        """Start a new update period for all cameras."""
         super().reset()
         self._last_ns = None
 

@@ -38,7 +38,7 @@ class DiffDrive(DrivePlugin):
         self.load_drive(has_odometry=self.flag("publishTf", True))
 
     def reset(self) -> None:
-        """Stop and restart the odometry."""
+        """Stop the wheels, and restart the odometry at the origin."""
         super().reset()
         self._encoders = PlanarOdometry()
         self._encoder_speed = (0.0, 0.0, 0.0)

@@ -82,7 +82,7 @@ class _HectorPlugin(PeriodicPlugin):
         self._last_ns = self.simulation.time_ns
 
     def reset(self) -> None:
-        """Restart the update period."""
+        """Start a new update period."""
         super().reset()
         self._last_ns = self.simulation.time_ns
 
@@ -93,7 +93,7 @@ class _HectorPlugin(PeriodicPlugin):
         self._last_ns = now_ns
 
     def measure(self, seconds: float) -> None:
-        """Publish a measurement; ``seconds`` is the time since the last one."""
+        """Publish a measurement; ``seconds`` is the time since the last measurement."""
 
 
 class HectorGps(_HectorPlugin):

@@ -75,7 +75,7 @@ class Imu(PeriodicPlugin):
         self.serve(self.text("serviceName", "/default_imu"), Empty, lambda _: EmptyResponse())
 
     def reset(self) -> None:
-        """Restart the update period."""
+        """Start a new update period."""
         super().reset()
         self._meter = _Accelerometer(self._link, self._place)
 
@@ -105,7 +105,7 @@ class ImuSensor(SensorPlugin):
         self.rate = self.number("updateRateHZ", 1.0)
 
     def reset(self) -> None:
-        """Restart the update period."""
+        """Start a new update period."""
         super().reset()
         self._meter = _Accelerometer(self.sensor_link, self.sensor.pose)
 

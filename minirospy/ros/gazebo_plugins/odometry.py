@@ -63,7 +63,7 @@ class DrivePlugin(PeriodicPlugin):
     def publish_odometry(
         self, pose: Pose, velocity: tuple[float, float, float], *, shown: Pose | None
     ) -> None:
-        """Publish the odometry, if enabled; first publish ``shown`` as a transform unless it is None."""
+        """Publish the odometry, if enabled. Unless ``shown`` is None, first publish that pose as a transform."""
         if self._odometry is None:
             return
         parent, child = self._frames

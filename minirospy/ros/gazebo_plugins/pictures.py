@@ -25,7 +25,7 @@ __all__ = ["Photographer", "to_depths"]
 
 Draw = Callable[["Renderer"], None]
 
-MAX_CLOSING_SECONDS = 5.0  # maximum wait for unfinished pictures
+MAX_CLOSING_SECONDS = 5.0  # timeout in seconds for unfinished pictures when closing
 
 
 class _DrawingThread:
@@ -95,9 +95,9 @@ class Photographer:
         _thread.join()
 
     def take(self, pose: Pose, horizontal_fov: float, clip: tuple[float, float], draw: Draw) -> bool:
-        """Copy the scene now and call ``draw`` later in the drawing thread; return False if that is impossible.
+        """Copy the scene now and call ``draw`` later in the drawing thread. Return False if no picture can be taken now.
 
-        It is not possible if OpenGL is missing or not open yet, or if the last picture is not finished. Call this in the
+        No picture can be taken if OpenGL is missing or not open yet, or if the last picture is not finished. Call this in the
         simulation's thread.
         """
         renderer = self._renderer
@@ -143,6 +143,6 @@ class Photographer:
 
 
 def to_depths(renderer: Renderer, far: float) -> NDArray[np.float32]:
-    """Return the captured depths in m; pixels without an object have the far limit."""
+    """Return the captured depths in m. Pixels that show no object have the depth ``far``."""
     depths: NDArray[np.float32] = np.minimum(renderer.depth(), np.float32(far))
     return depths

@@ -16,7 +16,7 @@ from minirospy.ros.gazebo_ros.plugins import RayFan, SensorPlugin
 
 __all__ = ["RayPlugin", "Rays", "read_rays"]
 
-MAX_RAYS = 1_000_000  # maximum per sensor; more would exhaust the memory
+MAX_RAYS = 1_000_000  # maximum number of rays per sensor; more would exhaust the memory
 
 
 @dataclass(frozen=True)

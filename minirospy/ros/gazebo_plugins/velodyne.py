@@ -48,7 +48,7 @@ class Velodyne(RayPlugin):
             ranges = ranges + random.normal(0.0, self._noise, len(ranges))
             is_valid = self._is_between(ranges) & (self._is_organized | is_valid)
         points = np.zeros(len(ranges), _POINT)
-        with np.errstate(invalid="ignore"):  # 0 * inf is invalid: an axis-aligned ray that hits nothing
+        with np.errstate(invalid="ignore"):  # an axis-aligned ray that hits nothing yields 0 * inf
             for index, axis in enumerate("xyz"):
                 points[axis] = rays.directions[:, index] * ranges
         points["ring"] = np.arange(len(ranges)) // rays.count

@@ -79,7 +79,7 @@ class SimulationLoop:
         has_ended = SignalSafeEvent()
         future.add_done_callback(lambda _: has_ended.set())
         self._submit(function, future)
-        # Do not wait in result(): the loop's thread would wait for the future's lock if a signal interrupted that.
+        # Do not wait in result(): a signal handler that interrupts it may hold the future's lock, which the loop needs.
         wait_for_event(has_ended, None)
         return future.result()
 
@@ -110,7 +110,7 @@ class SimulationLoop:
         self._deadline = wall.monotonic()
 
     def end_after(self, steps: int, function: Callable[[], object]) -> None:
-        """Pause and call a function after this total number of steps."""
+        """Pause the simulation and call ``function`` once the total number of steps has reached ``steps``."""
         self.call(lambda: setattr(self, "_end", (steps, function)))
 
     def step(self, count: int) -> None:
@@ -154,7 +154,7 @@ class SimulationLoop:
                 self._end = None
 
     def _advance(self, count: int) -> int:
-        """Advance by up to a number of steps, fewer if they take too long; return the number of steps done."""
+        """Advance by at most ``count`` steps, by fewer if they take too long. Return the number of steps done."""
         end = wall.monotonic() + MAX_STEPPING_SECONDS
         done = 0
         while done < count and not self._is_closed:

@@ -42,9 +42,9 @@ if TYPE_CHECKING:
 __all__ = ["WorldMarkers", "has_moved", "marker_of", "model_markers"]
 
 TOPIC = "~world_markers"
-RATE_HZ = 10.0  # simulated-time rate for publishing moving models
+RATE_HZ = 10.0  # Hz of simulated time, for publishing moving models
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
-MAX_PLANE = 100.0  # m; size at which larger planes are drawn
+MAX_PLANE = 100.0  # size in m at which larger planes are drawn
 PLANE_THICKNESS = 0.001  # m
 MIN_CHANGE = 1e-5  # smallest visible change, in m or quaternion units; resting bodies tremble less
 
@@ -66,7 +66,7 @@ class WorldMarkers:
         self._send([Marker(action=Marker.DELETEALL), *self._all()])
 
     def _all(self) -> list[Marker]:
-        """Return the markers of all models. Reuse those of models that have not moved."""
+        """Return the markers of all models. Reuse the existing markers of models that have not moved."""
         self._published = poses = self._simulation.body_poses()
         known, self._known = self._known, {}
         for model in self._simulation.models.values():
@@ -115,7 +115,7 @@ def model_markers(model: SimModel) -> list[Marker]:
 
 @functools.cache
 def _uri(path: str) -> str:
-    """Return a file's URI: package:// if it is in a package, because the dashboard can read that."""
+    """Return a file's URI: package:// if the file is in a package, because the dashboard can read such URIs."""
     file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may contain relative folders
     for folder in file.parents:
         if name := package_name(folder):
@@ -159,7 +159,7 @@ def marker_of(visual: Visual, namespace: str, number: int, pose: Pose) -> Marker
 def _add_triangles(
     marker: Marker, shape: MeshShape | Polyline | Heightmap, *, is_colored: bool
 ) -> Marker | None:
-    """Return the marker with a shape's triangles added. If it has none, log that once and return None."""
+    """Return the marker with a shape's triangles added. If they cannot be read, log the reason once and return None."""
     try:
         points, colors = _triangle_points(shape)
     except MeshError as error:
@@ -180,7 +180,7 @@ def _warn_once(error: str) -> None:
 
 @functools.lru_cache(maxsize=64)
 def _triangle_points(shape: MeshShape | Polyline | Heightmap) -> tuple[list[Point], list[ColorRGBA]]:
-    """Return the corners and colours of a shape's triangles. Cached, because each change of the world needs them again."""
+    """Return the corners and colours of a shape's triangles. Cached, because they are needed at each change of the world."""
     found = read_triangles(shape)
     colors = [] if found.colors is None else [ColorRGBA(*color) for color in found.colors.tolist()]
     return [Point(x, y, z) for x, y, z in found.corners.tolist()], colors

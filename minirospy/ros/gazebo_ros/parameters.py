@@ -33,13 +33,13 @@ def text_of(element: XmlElement | None, tag: str, default: str = "") -> str:
 
 
 def number_of(element: XmlElement | None, tag: str, default: float) -> float:
-    """Return a child element's number, or the default. Raise PluginError if it is not a number or out of the tag's range."""
+    """Return a child element's number, or the default. Raise PluginError if the text is not a number within the tag's range."""
     text = text_of(element, tag)
     return _number(tag, text, text) if text else default
 
 
 def numbers_of(element: XmlElement | None, tag: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-    """Return a child element's numbers, or an empty tuple. Raise PluginError if a number, or their count, is invalid."""
+    """Return a child element's numbers, or () if there are none. Raise PluginError if a number or their count is invalid."""
     text = text_of(element, tag)
     words = text.split()
     if words and len(words) not in counts:

@@ -82,7 +82,7 @@ def resource_paths(
     find_package: FindPackage | None = None,
     separator: str = os.pathsep,
 ) -> ResourcePaths:
-    """Return the search paths from the environment variables. ``package_folders``: packages that may export folders.
+    """Return the search paths from the environment variables and from the exports of the packages in ``package_folders``.
 
     ``~/.gazebo/models``, to which Gazebo downloads models, is searched if HOME is set.
     """
@@ -100,7 +100,7 @@ def resource_paths(
 
 
 def exported_paths(folders: Iterable[Path | str], attribute: str, separator: str = os.pathsep) -> list[str]:
-    """Return the folders in this attribute of packages' ``<gazebo_ros>`` exports. Skip unreadable packages."""
+    """Return the folders that packages export in this attribute of ``<gazebo_ros>``. Skip packages that cannot be read."""
     found: list[str] = []
     for folder in folders:
         for element in _exports(Path(folder)):
@@ -129,7 +129,7 @@ def _split(text: str, separator: str) -> list[str]:
 
 
 def _first(folders: Iterable[str], name: str) -> str | None:
-    """Return the path in the first folder that contains this file or folder."""
+    """Return the path of the file or folder ``name`` in the first of ``folders`` that contains it, or None."""
     name = name.strip("/")
     paths = (os.path.normpath(os.path.join(folder, name)) for folder in folders)
     return next((path for path in paths if name and os.path.exists(path)), None)

@@ -148,13 +148,13 @@ class PluginBase:
         return text_of(self.element, tag, default)
 
     def required(self, tag: str, title: str) -> str:
-        """Return a parameter's text. If it is missing or empty, raise PluginError with a text that starts with the title."""
+        """Return a parameter's text. If it is missing or empty, raise PluginError with a message that starts with ``title``."""
         if not (text := self.text(tag)):
             raise PluginError(f"{title} missing <{tag}>, cannot proceed".lstrip())
         return text
 
     def number(self, tag: str, default: float) -> float:
-        """Return a parameter's number. Raise PluginError if it is not a number or out of the tag's range.
+        """Return a parameter's number. Raise PluginError if the text is not a number, or the number is outside the tag's range.
 
         As in Gazebo, a negative rate means each step; a warning names it.
         """
@@ -242,7 +242,7 @@ class ModelPlugin(PluginBase):
         return joint
 
     def link(self, name: str) -> tuple[SimLink, Pose]:
-        """Return a link and the named link's pose in it, because a fixed joint may have merged the named link into another.
+        """Return a link, and the pose in it of the link ``name``, which a fixed joint may have merged into the returned link.
 
         Raise PluginError if the link does not exist.
         """
@@ -256,7 +256,7 @@ class ModelPlugin(PluginBase):
 
 
 class Timer:
-    """Reports when a period of simulated time has elapsed. Rate 0 means every step."""
+    """Reports when a period of simulated time has elapsed. With a rate of 0, each step is a period."""
 
     def __init__(self, rate: float) -> None:
         self._period = round(1e9 / rate) if rate > 0 else 0
@@ -318,7 +318,7 @@ class PeriodicPlugin(ModelPlugin):
                 self.sense()
 
     def reset(self) -> None:
-        """Restart the update period."""
+        """Start a new update period."""
         self._timer = None
         self.due_ns = 0
 

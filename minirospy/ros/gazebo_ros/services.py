@@ -72,14 +72,14 @@ def apply(loop: SimulationLoop, handler: Handler, request: object) -> None:
 
 
 def require_link(simulation: Simulation, name: str, service: str) -> SimLink:
-    """Return a link. If it does not exist, raise Refused with the service's text."""
+    """Return a link. If it does not exist, raise Refused with a message that starts with ``service``."""
     if (link := find_link(simulation, name)) is None:
         raise Refused(f"{service}: link not found, did you forget to scope the link by model name?")
     return link
 
 
 def require_joint(simulation: Simulation, name: str, service: str) -> SimJoint:
-    """Return a joint. If it does not exist, raise Refused with the service's text."""
+    """Return a joint. If it does not exist, raise Refused with a message that starts with ``service``."""
     if (joint := find_joint(simulation, name)) is None:
         raise Refused(f"{service}: joint not found")
     return joint

@@ -25,7 +25,7 @@ class UnknownPackage(Exception):
 
 
 def read_urdf_request(text: str, name: str, namespace: str, resources: ResourcePaths) -> Model:
-    """Return the model in a URDF text. Raise WrongFormat if it has no ``<robot>``, UnknownPackage, or SdfError."""
+    """Return the model in a URDF text. Raise WrongFormat if it has no ``<robot>``, else UnknownPackage or SdfError."""
     if _root(text).tag != "robot":
         raise WrongFormat
     for package in dict.fromkeys(_PACKAGE.findall(text)):

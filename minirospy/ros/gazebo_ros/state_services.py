@@ -41,7 +41,7 @@ class StateServices:
         self._server = server
         self._loop = loop = server.loop
         self._simulation = loop.simulation
-        self._queries: dict[str, int] = {}  # get_model_state calls per model
+        self._queries: dict[str, int] = {}  # number of get_model_state calls per model
         offer(loop, "delete_model", srv.DeleteModel, self._delete_model)
         offer(loop, "get_model_properties", srv.GetModelProperties, self._get_model_properties)
         offer(loop, "get_model_state", srv.GetModelState, self._get_model_state)

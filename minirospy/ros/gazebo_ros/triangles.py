@@ -15,8 +15,8 @@ from minirospy.core.sdf.model import Color, Heightmap, MeshShape, Polyline
 
 __all__ = ["MAX_TRIANGLES", "Triangles", "read_triangles"]
 
-MAX_TRIANGLES = 20_000  # maximum per shape; each takes 36 to 84 bytes in each message with shapes
-MAX_CELLS = 80  # maximum per side of a heightmap
+MAX_TRIANGLES = 20_000  # maximum triangles per shape; each takes 36 to 84 bytes in each message with shapes
+MAX_CELLS = 80  # maximum number of cells per side of a heightmap
 
 
 class Triangles(NamedTuple):

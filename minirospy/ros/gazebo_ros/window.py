@@ -99,7 +99,7 @@ class Window:
         self._thread.start()
 
     def changed(self) -> None:
-        """Make the thread publish the shapes again soon. Thread-safe."""
+        """Ask the thread to publish the shapes again soon. Thread-safe."""
         self._is_stale = True
 
     def close(self) -> None:
@@ -118,7 +118,7 @@ class Window:
                     self._publish_slow()
             except LoopClosed:
                 return
-            except SimulationError as error:  # such as an error from a ray with a NaN pose
+            except SimulationError as error:  # for example, because a ray's pose is NaN
                 rospy.logerr_throttle(10, "the window: %s", error)
             if now >= next_state and _has_subscribers(self._state):
                 next_state = now + STATE_SECONDS
@@ -265,7 +265,7 @@ def ray_lengths(distances: NDArray[np.float64], max_range: float) -> NDArray[np.
 
 
 def model_names(folders: Iterable[str]) -> list[str]:
-    """Return the names of the models in these folders: subfolders with a model.config or model.sdf."""
+    """Return the names of the models in these folders. A model is a subfolder with a model.config or model.sdf."""
     found = set()
     for folder in folders:
         try:

@@ -164,7 +164,7 @@ class GazeboRosControl(ModelPlugin):
         self._last_write = now_ns
 
     def reset(self) -> None:
-        """Restart the periods and the controllers."""
+        """Start new periods now, and let the next update restart the controllers."""
         self._last_update = self._last_write = self.simulation.time_ns
         self._is_reset = True
 

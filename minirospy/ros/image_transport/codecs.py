@@ -82,7 +82,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed(message: CompressedImage) -> Image:
-    """Decode a compressed image to the encoding named in its format.
+    """Decode a compressed image to the encoding that the message's ``format`` names.
 
     Raise CodecError if the data is not a valid image in that format.
     """
@@ -93,7 +93,7 @@ def uncompressed(message: CompressedImage) -> Image:
         kinds = {1: "mono8", 3: "bgr8", 4: "bgra8"}
         encoding = kinds[channels] if pixels.dtype == "uint8" else f"16UC{channels}"
     elif encoding in _COLORS and channels in (3, 4):
-        # OpenCV decodes to BGR. A format without "bgr" means that the encoder has swapped red and blue.
+        # OpenCV decodes to BGR. If the format lacks "bgr", the encoder has swapped red and blue.
         bits = "16" if pixels.dtype == "uint16" else "8"
         order = "bgr" if "compressed bgr" in rest else "rgb"
         pixels = _converted(pixels, order + ("a" if channels == 4 else "") + bits, encoding)

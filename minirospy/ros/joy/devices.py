@@ -53,7 +53,7 @@ class Device(Protocol):
         """Return the next event, or None after ``seconds`` without an event. Raise DeviceError if the device is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run both motors for one second at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
+        """Run the motors for one second, each at a power from 0 to 1. Raise RumbleError if the motors cannot be used."""
 
     def close(self) -> None:
         """Close the device."""
@@ -107,7 +107,7 @@ class LinuxDevice:
         return Event(kind, number, value)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run both motors for one second at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
+        """Run the motors for one second, each at a power from 0 to 1. Raise RumbleError if the motors cannot be used."""
         if self._motors is None:
             if not self._feedback_path:
                 raise RumbleError(
@@ -200,7 +200,7 @@ class PygameDevice:
         return self._events.pop(0)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run both motors for one second at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
+        """Run the motors for one second, each at a power from 0 to 1. Raise RumbleError if the motors cannot be used."""
         if not self._joystick.rumble(min(max(strong, 0.0), 1.0), min(max(weak, 0.0), 1.0), 1000):
             raise RumbleError("the joystick has no motors that SDL knows")
 

@@ -24,7 +24,7 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2  # maximum delay before the node notices a shutdown
+_LOOK_SECONDS = 0.2  # maximum seconds until the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0

@@ -12,10 +12,10 @@ from typing import NamedTuple
 __all__ = ["EVENT_AXIS", "EVENT_BUTTON", "EVENT_INIT", "Event", "Joystick", "JoystickOptions"]
 
 EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
-"""Event types from Linux's struct js_event, which the other backends also use."""
+"""Event types in Linux's struct js_event. Devices on other systems use the same values."""
 
 MAX_VALUE = 32767.0
-_FIRST_SECONDS = 1.0  # seconds from opening the device to the first repetition, as in the real node
+_FIRST_SECONDS = 1.0  # seconds from opening the device to the first repetition, as in ROS's joy_node
 
 
 class Event(NamedTuple):
@@ -37,7 +37,7 @@ class JoystickOptions:
     sticky_buttons: bool = False
 
     def checked(self) -> tuple[JoystickOptions, list[str]]:
-        """Return the options clamped to their limits, and the real node's warnings about clamped options."""
+        """Return the options clamped to their limits, and the warnings of ROS's joy_node about clamped options."""
         warnings = []
         deadzone, rate, interval = self.deadzone, self.autorepeat_rate, self.coalesce_interval
         if interval and rate > 1 / interval:

@@ -41,14 +41,14 @@ def event_device(joystick: str, folder: Path = _INPUT) -> str:
 
 
 def pack_effect(number: int, strong: float, weak: float) -> bytes:
-    """Return a struct ff_effect for motors at 0 to 1 of full power; ``number`` is -1 for a new effect."""
+    """Return a struct ff_effect with each motor's power, from 0 to 1. ``number`` is the effect's ID, or -1 for a new effect."""
     low, high = (round(min(max(share, 0.0), 1.0) * _MAX_MAGNITUDE) for share in (strong, weak))
     fields = _EFFECT.pack(_FF_RUMBLE, number, 0, 0, 0, _MILLISECONDS, 0, low, high)
     return fields + bytes(_EFFECT_SIZE - len(fields))
 
 
 def pack_event(code: int, value: int) -> bytes:
-    """Return a struct input_event that plays the effect ``code`` or sets the gain."""
+    """Return a struct input_event that plays the effect with the ID ``code``, or sets the gain if ``code`` is _FF_GAIN."""
     return struct.pack("@llHHi", 0, 0, _EV_FF, code, value)
 
 
@@ -69,7 +69,7 @@ class Rumble:
             raise self._error(error) from error
 
     def play(self, strong: float, weak: float) -> None:
-        """Run both motors for one second at 0 to 1 of full power."""
+        """Run the motors for one second, each at a power from 0 to 1."""
         try:
             self._upload(self._number, (strong, weak))
             os.write(self._file, pack_event(self._number, 1))

@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The file name without suffix, the minimum occupancy of occupied cells, and the maximum of free cells."""
+    """The file name without suffix, the occupancy from which a cell counts as occupied, and the one up to which it is free."""
 
     name: str = "map"
     occupied: int = 65
@@ -65,7 +65,7 @@ def _threshold(text: str, name: str, least: int) -> int:
 
 
 def main() -> int:
-    """Save one map; return the exit status, 1 if saving fails."""
+    """Save one map; return the exit status, which is 1 if saving fails."""
     try:
         options = parse_options(rospy.myargv()[1:])
     except UsageError as error:

@@ -47,7 +47,7 @@ _CLOCK_SECONDS = 0.05
 
 
 def main() -> int:
-    """Run the node until it shuts down; return the exit status, 255 if there is no map."""
+    """Run the node until it shuts down; return the exit status, which is 255 if there is no map."""
     words = rospy.myargv()[1:]
     try:
         rospy.init_node("map_server", anonymous=True)
@@ -104,7 +104,7 @@ def settings_of_file(name: str) -> MapSettings:
 
 
 def load_map(settings: MapSettings) -> OccupancyGrid:
-    """Return a map without frame and times. Raise MapError if the map cannot be loaded."""
+    """Return a map whose frame and times are not set. Raise MapError if the map cannot be loaded."""
     rospy.loginfo('Loading map from image "%s"', settings.image)
     try:
         pixels = read_image(Path(settings.image).read_bytes())
@@ -127,7 +127,7 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
 
 
 class MapServer:
-    """Serves a map on two latched topics and through two services. Raise MapError if the map cannot be loaded."""
+    """Serves a map on two latched topics and through two services. ``__init__`` raises MapError if the map cannot be loaded."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))

@@ -41,7 +41,7 @@ class StatusTracker:
         self.goal = goal
         self.handle_tracker: HandleTrackerDeleter | None = None
         self.id_generator = GoalIDGenerator()
-        self.ended_at = 0  # nanoseconds in ROS time; 0 until the goal ends
+        self.ended_at = 0  # time at which the goal ended, in ns of ROS time; 0 until then
         self._bytes: bytes | None = None
         self._serialized: tuple[object, ...] = ()  # the field values serialized in `_bytes`
         self.status = GoalStatus()

@@ -28,7 +28,7 @@ SEND_SECONDS = 1e-3
 # Seconds to delay cancel requests, because their goals, sent earlier on another connection, are delayed too.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
-# Seconds for a server to reconnect after a lost connection; then its goals are LOST.
+# Seconds for a server to reconnect after a lost connection; after that, its goals count as LOST.
 SERVER_SECONDS = 5.0
 
 

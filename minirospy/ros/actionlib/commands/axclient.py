@@ -95,7 +95,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
 
 def action_class(type_: str) -> type[Action]:
-    """Return the class of an action type: ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
+    """Return the action class for a type in either form: ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
     Raise NotFoundError if there is no such action.
     """

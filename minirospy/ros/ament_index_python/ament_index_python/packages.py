@@ -38,7 +38,7 @@ def get_package_share_path(package_name: str, print_warning: bool = True) -> Pat
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Return a package's folder, because ROS 1 has no shared install prefix.
+    """Return a package's folder, which in ROS 1 takes the place of the install prefix.
 
     Raise PackageNotFoundError if there is no such package.
     """

@@ -75,7 +75,7 @@ def shortest_angular_distance_with_limits(
 def shortest_angular_distance_with_large_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Like :func:`shortest_angular_distance_with_limits`, but the limits may exceed -pi and pi.
+    """Like :func:`shortest_angular_distance_with_limits`, but the limits may lie outside the range -pi to pi.
 
     The left limit must be less than the right one.
     """

@@ -23,7 +23,7 @@ __all__ = ["Bond", "Timeout", "as_float_duration", "as_ros_duration"]
 Seconds = float | times.Duration
 Callback = Callable[[], object]
 
-_LOOK = 0.1  # seconds between checks whether the node is shutting down
+_LOOK = 0.1  # seconds between checks for a shutdown of the node
 
 
 def as_ros_duration(d: Seconds) -> times.Duration:
@@ -62,7 +62,7 @@ class Timeout:
             self.timer.cancel()
 
     def left(self) -> times.Duration:
-        """Return the remaining time."""
+        """Return the time until the deadline, or zero if it has passed."""
         return rospy.Duration.from_sec(max(0.0, self.deadline - time.monotonic()))
 
 

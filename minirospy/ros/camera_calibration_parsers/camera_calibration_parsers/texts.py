@@ -127,7 +127,7 @@ def _pixels(word: object) -> int:
 
 
 def _matrix(tree: dict[str, object], key: str, shape: tuple[int, int] | None) -> tuple[float, ...]:
-    """Return a matrix's numbers; ``shape`` None accepts any shape."""
+    """Return a matrix's numbers. Raise CalibrationError if its shape is not ``shape`` (None: any shape is valid)."""
     found = tree.get(key)
     if not isinstance(found, dict):
         raise CalibrationError(f"{key} is missing")

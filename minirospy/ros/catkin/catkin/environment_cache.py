@@ -52,7 +52,7 @@ def _changed(name: str, old: str, new: str) -> str:
 
 
 def _quoted(value: str) -> str:
-    """Return a value quoted for the shell. As in catkin, a value in double quotes stays unchanged."""
+    """Return a value quoted for the shell. As in catkin, a value that is already in double quotes stays unchanged."""
     if _IS_WINDOWS or (value.startswith('"') and value.endswith('"')):
         return value
     return "'" + value.replace("'", "'\\''") + "'"

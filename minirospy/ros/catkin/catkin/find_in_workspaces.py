@@ -27,7 +27,7 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """Return the ``search_dirs`` folders that exist for package ``project``, or the files ``path`` in them.
+    """Return the existing ``search_dirs`` folders of the package ``project`` or, if ``path`` is given, these paths in them.
 
     ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. The function
     appends all searched paths to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.

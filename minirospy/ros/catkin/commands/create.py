@@ -132,7 +132,7 @@ def create_package_here(
 
 
 def _existing(name: str) -> str:
-    """Return the folder of a minirospy package, or the file of a Python module, with this name; otherwise an empty string."""
+    """Return the folder of the minirospy package or the file of the Python module with this name, or "" if there is neither."""
     import importlib.util
 
     from minirospy.workspace.packages import OF_THE_WORKSHOP, built_in_roots, package_name

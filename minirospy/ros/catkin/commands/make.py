@@ -151,7 +151,7 @@ def _catkin_make(
 
     tests = [target for target in targets if target.startswith("run_tests_")]
     others = {"all", "install", *TEST_TARGETS, *tests}
-    # Words with "=", such as VERBOSE=1, set make variables. A message generation target selects its whole package.
+    # Words with "=", such as VERBOSE=1, set make variables. A target that generates messages stands for its whole package.
     named = [_GENERATED.sub("", word) for word in targets if word not in others and "=" not in word]
     chosen = [*(pkg or []), *named]
     plans = build_packages(workspace, chosen, only_pkg_with_deps or (), variables)

@@ -97,7 +97,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 
 
 def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
-    """Return the folder to run a test in. If it is the package's build folder, create it.
+    """Return the folder in which to run a test. Create the folder if it is the package's build folder.
 
     As in catkin, ``nosetests --where=FOLDER`` runs in the given folder; other programs run in the build folder.
     """
@@ -113,7 +113,7 @@ def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
-    """Return the CMake targets that run a package's tests, or one test.
+    """Return the CMake targets that run all tests of a package or, if ``test`` is given, only that test.
 
     :func:`_flat` has replaced the separators in their names.
     """

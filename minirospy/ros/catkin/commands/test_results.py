@@ -44,7 +44,7 @@ class Counts(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 if all tests passed, or 1 if there are errors or failures, or the folder does not exist."""
+    """Run the command; return 0 if all tests passed, or 1 if a test failed or had an error, or if the folder does not exist."""
     return COMMAND.main(argv)
 
 

@@ -182,7 +182,7 @@ class Export(_Conditional):
 
 
 class License(str):
-    """A license; ``file`` is the name of the file with its text, or None."""
+    """The name of a license; ``file`` is the name of the file that contains the license text, or None."""
 
     file: str | None = None
 
@@ -318,7 +318,7 @@ class Package:
             each.evaluate_condition(context)
 
     def validate(self, warnings: list[str] | None = None) -> None:
-        """Check the contents. Append warnings to ``warnings``, or print them if it is None.
+        """Check the contents. Append warnings to the list ``warnings`` or, if ``warnings`` is None, print them.
 
         Raise InvalidPackage with all errors.
         """
@@ -385,7 +385,7 @@ def package_exists_at(path: str) -> bool:
 
 
 def parse_package(path: str, warnings: list[str] | None = None) -> Package:
-    """Parse a package.xml, given its path or its folder. Raise InvalidPackage, or OSError if there is no file."""
+    """Parse a package.xml, given its path or its folder. Raise InvalidPackage if it is invalid, OSError if it cannot be read."""
     filename = _file_of(path)
     with open(filename, "rb") as file:
         return parse_package_string(file.read(), filename, warnings)

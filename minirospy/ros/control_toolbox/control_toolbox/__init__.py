@@ -24,7 +24,7 @@ __all__ = ["Pid", "PidGains"]
 
 
 class Pid(pid.Pid):
-    """A PID controller. After :meth:`serve`, dynamic_reconfigure can change its gains, and its terms may be published."""
+    """A PID controller. :meth:`serve` lets dynamic_reconfigure change its gains and, if so configured, publishes its terms."""
 
     _server: Server | None = None
     _state: RealtimePublisher[PidState] | None = None
@@ -39,7 +39,7 @@ class Pid(pid.Pid):
 
     @classmethod
     def open(cls, parameters: Parameters, opened: ExitStack) -> Pid:
-        """Return a controller from :meth:`read` after calling its :meth:`serve`. Closing ``opened`` closes the controller."""
+        """Read a controller's gains, call :meth:`serve` and return the controller. Closing ``opened`` closes the controller."""
         found = cls.read(parameters)
         opened.callback(found.close)
         found.serve(parameters)
@@ -66,7 +66,7 @@ class Pid(pid.Pid):
             self._state.close()
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # the server has not yet read the gains that are not set as parameters
+        is_first = level == ~0  # first call, with defaults for the gains that are not set as parameters
         if is_first:
             config.update(_config(self.gains))
             return config

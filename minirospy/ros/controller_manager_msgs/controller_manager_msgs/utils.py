@@ -101,21 +101,21 @@ class ControllerLister:
 def filter_by_name(
     ctrl_list: Controllers, ctrl_name: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers whose name equals, or contains, a string."""
+    """Return the controllers whose name is ``ctrl_name`` or, with ``match_substring``, contains it."""
     return _filter(ctrl_list, "name", ctrl_name, match_substring)
 
 
 def filter_by_type(
     ctrl_list: Controllers, ctrl_type: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers whose type equals, or contains, a string."""
+    """Return the controllers whose type is ``ctrl_type`` or, with ``match_substring``, contains it."""
     return _filter(ctrl_list, "type", ctrl_type, match_substring)
 
 
 def filter_by_state(
     ctrl_list: Controllers, ctrl_state: str, match_substring: bool = False
 ) -> list[ControllerState]:
-    """Return the controllers whose state equals, or contains, a string."""
+    """Return the controllers whose state is ``ctrl_state`` or, with ``match_substring``, contains it."""
     return _filter(ctrl_list, "state", ctrl_state, match_substring)
 
 
@@ -139,7 +139,7 @@ def filter_by_resources(
     hardware_interface: str | None = None,
     match_any: bool = False,
 ) -> list[ControllerState]:
-    """Return the controllers that claim all these resources through one hardware interface (default: any).
+    """Return the controllers that claim all these resources through the given hardware interface (None: through any one).
 
     ``match_any``: one matching resource is enough.
     """
@@ -156,7 +156,7 @@ def filter_by_resources(
 
 
 def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
-    """Return the sorted names of the controllers in a namespace: names that contain a parameter ``type``."""
+    """Return the sorted names of the controllers in a namespace, recognized by their parameter ``NAME/type``."""
     prefix = namespace if namespace.endswith("/") else namespace + "/"
     below = [name.split(prefix, 1)[1].split("/") for name in list_params(namespace) if prefix in name]
     return sorted(parts[0] for parts in below if len(parts) == 2 and parts[1] == "type")

@@ -98,7 +98,7 @@ class DiagnosticTaskVector:
             self.fn = fn
 
         def run(self, stat: Status) -> Status:
-            """Set the status's name and fill the status."""
+            """Fill a status: set its name to the task's name, then call the task's function."""
             stat.name = self.name
             return self.fn(stat)
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Client", "ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv"]
 
-_SLICE_SECONDS = 0.25  # seconds between checks whether the node is shutting down
+_SLICE_SECONDS = 0.25  # seconds between checks for a shutdown of the node
 
 _TYPES: dict[str, type] = {"int": int, "double": float, "str": str, "bool": bool}
 _TRUE = ("yes", "true", "t", "1")
@@ -53,12 +53,12 @@ class Client:
         config_callback: ConfigCallback | None = None,
         description_callback: DescriptionCallback | None = None,
     ) -> None:
-        """Wait up to ``timeout`` seconds for the server ``name``; None or 0 waits forever.
+        """Wait up to ``timeout`` seconds for the server ``name`` (None or 0: no timeout).
 
         ``config_callback(config)`` is called on each change. Raise ROSException if the server does not appear in time.
         """
         if not isinstance(name, str):
-            # Without this check, the client could wait for an impossible name.
+            # Without this check, the client could wait forever, for a server whose name cannot exist.
             raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
@@ -126,7 +126,7 @@ class Client:
         return decode_config(answer, self.get_group_descriptions())
 
     def update_groups(self, changes: Values) -> Config | None:
-        """Return the server's tree of groups, with states changed as in ``changes``, which maps group names to states."""
+        """Return the server's tree of groups with changed states. ``changes`` maps the changed groups' names to their states."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
         while groups:

@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(verb: str, usage: str = "", *more: str, missing: Mapping[str, str] | None = None) -> Parser:
-    """Return the parser for a verb whose arguments are a node's name and ``more``."""
+    """Return the parser for ``dynparam VERB``, whose arguments are a node's name and the arguments named in ``more``."""
     parser = Parser(
         f"dynparam {verb}",
         ros_usage=(usage or f"%prog {verb} [options] node{''.join(f' {each}' for each in more)}").replace(

@@ -59,7 +59,7 @@ class Config(dict[str, Any]):
     """A configuration whose values are also attributes. Reading a missing attribute raises KeyError, as in ROS."""
 
     def __init__(self, *args: Iterable[tuple[str, object]] | Values, **kwargs: object) -> None:
-        """Create a configuration from dict's arguments."""
+        """Create a configuration. The arguments are those of ``dict()``."""
         super().__init__(*args, **kwargs)
 
     def __getattr__(self, name: str) -> Any:
@@ -93,7 +93,7 @@ def encode_description(descr: ConfigType) -> ConfigDescription:
 
 
 def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
-    """Convert a group and all its subgroups from a type's description to messages."""
+    """Convert a group in a type's description, and all its subgroups, to messages."""
     parameters = [
         ParamDescription(*(each[key] for key in ("name", "type", "level", "description", "edit_method")))
         for each in group["parameters"]
@@ -135,7 +135,7 @@ def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group without its subgroups and parameters. If the group comes from a description, its state is True."""
+    """Return a group's own data, without its subgroups and parameters. In a description, a group has no state; use True."""
     return Config(
         id=group.id,
         parent=group.parent,
@@ -172,7 +172,7 @@ def decode_description(msg: ConfigDescription) -> Config:
 
 
 def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None = None) -> Config:
-    """Return a message's groups as a tree, or only the subgroups of ``group`` as a dict if that is not the root."""
+    """Return a message's groups as a tree or, for a ``group`` other than the root, only its subgroups, as a dict."""
     if group is None or group.id == 0:
         return _tree(m.groups, group_dict)
     return _children(m.groups, group.id, group_dict, set())
@@ -215,7 +215,7 @@ def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Conf
 
 
 def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Decode a configuration. If ``description`` is given, also copy the parameters' values to their groups."""
+    """Decode a configuration. If ``description`` is given, also copy each parameter's value to the group that contains it."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)

@@ -310,7 +310,7 @@ class ParameterGenerator:
 
 
 def _source_line() -> tuple[str, int]:
-    """Return the .cfg file's name and current line, which a parameter's description records."""
+    """Return the .cfg file's name and the line that is running, to be recorded in a parameter's description."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

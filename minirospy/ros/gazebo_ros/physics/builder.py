@@ -40,7 +40,7 @@ __all__ = [
 FIXED_KINDS = ("fixed",)
 MAX_LIMIT = 1e15  # SDF uses 1e16 for no limit
 MIN_RANGE = 1e-5  # MuJoCo rejects ranges of length zero
-MAX_LIGHTS = 8  # OpenGL's maximum
+MAX_LIGHTS = 8  # maximum number of lights in OpenGL
 MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer substeps, MuJoCo softens contacts, and wheels slip
 VISUAL = "\tvisual"  # suffix that separates the names of visuals from those of collisions
 MOTOR_DAMPING = 0.9999  # MuJoCo's maximum impedance: joint friction and motors are as stiff as possible
@@ -99,7 +99,7 @@ class Builder:
                 self._add_mimics(built, model, name)
         except Exception as error:
             self.delete(built)
-            self.shapes.warnings.clear()  # otherwise the next model would report these warnings
+            self.shapes.warnings.clear()  # otherwise the next model added would report these, too
             if isinstance(error, SimulationError):
                 raise SimulationError(f"model '{name}': {error}") from error.__cause__
             if isinstance(error, (ValueError, TypeError, OSError)):
@@ -141,7 +141,7 @@ class Builder:
                 row.type = names.get(light.kind, kinds.mjLIGHT_POINT)
 
     def add_visuals(self, built: BuiltModel, model: Model, name: str) -> list[str]:
-        """Add a model's visuals. Return a warning for each unreadable one, which is left out."""
+        """Add a model's visuals. Leave out unreadable ones, and return a warning for each of these."""
         warnings: list[str] = []
         for link in model.links.values():
             for visual in link.visuals:
@@ -245,7 +245,7 @@ class Builder:
             row.range = [max(lower, -MAX_LIMIT), min(upper, MAX_LIMIT)]
 
     def _add_excludes(self, built: BuiltModel, model: Model, name: str) -> None:
-        """Exclude contacts within the model, or only between links connected by a joint if the model collides with itself."""
+        """Exclude contacts within the model or, if it collides with itself, only those between links with a common joint."""
         with_shapes = [link for link in model.links.values() if link.collisions]
         joined = {frozenset((joint.parent, joint.child)) for joint in model.joints.values()}
         for index, first in enumerate(with_shapes):
@@ -395,7 +395,7 @@ def _direction(joint: Joint, axis: Axis) -> Vector:
 
 
 def _set_first(row: Any, name: str, value: float) -> None:
-    """Set a coefficient: a number before MuJoCo 4, a polynomial's first coefficient since then."""
+    """Set a coefficient. Before MuJoCo 4, it is a number; since then, it is the first coefficient of a polynomial."""
     if isinstance(getattr(row, name), float):
         setattr(row, name, value)
     else:

@@ -30,7 +30,7 @@ class Decomposition:
         self._is_told = False
 
     def split(self, mesh: Mesh, name: str, most: int) -> list[Mesh] | None:
-        """Return at most this many convex parts of a connected mesh, or None to use its convex hull."""
+        """Return at most ``most`` convex parts of a connected mesh, or None if the mesh is to be replaced by its convex hull."""
         data = mesh.vertices.tobytes() + mesh.triangles.tobytes() + f"{most} {CONCAVITY}".encode()
         path = Path(ros_home(), FOLDER, f"{hashlib.sha256(data).hexdigest()[:32]}.npz")
         try:

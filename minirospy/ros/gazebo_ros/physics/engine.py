@@ -22,9 +22,9 @@ __all__ = ["Engine"]
 
 RAY_GROUPS = np.array([each in (GROUP_COLLISION, GROUP_RAY_ONLY) for each in range(6)], np.uint8)
 MIN_SWING = 0.5  # rad/s; slower joints need no correction of Coriolis forces
-MIN_GRAIN = 0.1  # sine of the angle to the normal; ignore a friction direction closer to the normal
+MIN_GRAIN = 0.1  # sine of the angle to the normal, below which a friction direction is ignored
 MIN_FRICTION = 1e-5  # MuJoCo's own
-MAX_FORCE = 1e9  # N or N m; the limit for a motor without one
+MAX_FORCE = 1e9  # N or N m; for motors without a force limit
 MAX_MOTOR_SPEED = 1e4  # rad/s or m/s; faster motor targets make contacts unstable
 
 
@@ -67,7 +67,7 @@ class Engine:
         self.max_velocity: NDArray[np.float64] = np.full(count, MAX_MOTOR_SPEED)
         self.follows_position: NDArray[np.bool_] = np.zeros(count, np.bool_)
         self.motor_limit: NDArray[np.float64] = np.zeros(count)  # force limits of motors on damped joints
-        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # damping of these joints; 0 for all others
+        self.motor_damping: NDArray[np.float64] = np.zeros(count)  # damping of joints with motors, else 0
         self._damped: NDArray[np.intp] = np.zeros(0, np.intp)
         self._followers: NDArray[np.intp] = np.zeros(0, np.intp)
         self._follower_positions: NDArray[np.intp] = np.zeros(0, np.intp)
@@ -164,7 +164,7 @@ class Engine:
                 compute(model, data)
 
     def _find_grains(self) -> None:
-        """Read the friction directions of geoms that have them, and both friction coefficients of all geoms."""
+        """Read the friction directions of the geoms that have one, and both friction coefficients of all geoms."""
         model, grains = self.model, self._builder.shapes.grains
         self._grain_directions: NDArray[np.float64] = np.zeros((model.ngeom, 3))
         self._frictions: NDArray[np.float64] = np.repeat(model.geom_friction[:, :1], 2, axis=1)
@@ -295,7 +295,7 @@ class Engine:
         self._bias[dofs] = np.clip(lacking / (left * self.substep), -limit, limit) * self._rate
 
     def _limit_damped(self) -> None:
-        """Set the damping of joints with motors, and the motors' remaining force.
+        """Set the damping of joints with motors, and the force that the damping leaves to each motor.
 
         MuJoCo integrates damping implicitly: on a light wheel, this slows a motor for many steps, and the reaction pushes the
         robot back. As long as a motor is stronger than the damping, the damping is therefore included in the motor's force

@@ -106,7 +106,7 @@ class SimLink:
         return State(pose, (vx, vy, vz), (wx, wy, wz))
 
     def set_state(self, state: State) -> None:
-        """Move the whole model to give this link the state. Keep the joint positions and stop the joints."""
+        """Move the whole model so that this link has the given state. Keep the joint positions and stop the joints."""
         _check(self, *state.pose.position, *state.pose.orientation, *state.linear, *state.angular)
         self.model.move(self.pose, state)
 
@@ -447,7 +447,7 @@ class SimModel:
         self._set_free_velocities(linear, angular, origin)
 
     def move(self, base: Pose, state: State) -> None:
-        """Move the model rigidly, which moves its frame from the pose ``base`` to ``state``. The joints stop."""
+        """Move the model rigidly so that a frame at the pose ``base``, such as a link's, reaches ``state``. The joints stop."""
         self.engine.refresh()
         change = compose(state.pose, inverse(base))
         for joint in self.all_joints():
@@ -459,7 +459,7 @@ class SimModel:
         self._set_free_velocities(state.linear, state.angular, state.pose.position)
 
     def _rest_pose(self, root: str) -> Pose:
-        """Return a non-free root body's world pose at joint position 0."""
+        """Return the world pose of a root body at joint position 0. The body must not be a free one."""
         model, body = self.engine.model, self.links[root].id
         return _pose(model.body_pos[body], model.body_quat[body])
 
@@ -523,7 +523,7 @@ class SimModel:
         return remains
 
     def force_changes(self, start: float = 0.0, duration: float = 0.0) -> tuple[float, float]:
-        """Notify the simulation of a force on this model. Return the force's start (now or later) and end, in s."""
+        """Notify the simulation of a force on this model. Return the times in s at which it starts (not before now) and ends."""
         self.simulation.forced[self.name] = None
         start = max(start, self.simulation.time)
         return start, start + duration if duration >= 0 else math.inf

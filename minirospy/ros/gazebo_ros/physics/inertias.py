@@ -25,7 +25,7 @@ class PrincipalInertia(NamedTuple):
 
 
 def principal_inertia(inertial: Inertial) -> PrincipalInertia:
-    """Return the closest valid inertia."""
+    """Return the principal inertia of a link, corrected if it is invalid."""
     mass = max(inertial.mass, MIN_MASS)
     xx, xy, xz, yy, yz, zz = inertial.inertia
     if not (xy or xz or yz):

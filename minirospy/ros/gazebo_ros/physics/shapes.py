@@ -67,8 +67,8 @@ SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
 MAX_FRICTION = 2.0
 PART = "\t"  # separates a collision's name from its geom's number
 MIN_SIZE = 1e-6  # m; MuJoCo rejects sizes of zero
-MIN_VERTICES = 4  # minimum per mesh; MuJoCo rejects meshes with fewer
-MIN_AREA = 1e-14  # m^2, minimum per mesh; MuJoCo rejects smaller ones
+MIN_VERTICES = 4  # minimum number of vertices per mesh; MuJoCo rejects meshes with fewer
+MIN_AREA = 1e-14  # minimum surface area per mesh, in m^2; MuJoCo rejects smaller ones
 WALL_THICKNESS = 0.01  # m; too thick for a robot at 10 m/s to pass through in a 1 ms step
 _GREY: Color = (0.7, 0.7, 0.7, 1.0)
 _WHITE: Color = (1.0, 1.0, 1.0, 1.0)
@@ -145,7 +145,7 @@ class Shapes:
         return self._count
 
     def delete_after(self, last: int) -> None:
-        """Delete the meshes and heightmaps with numbers above ``last``, which no geom may use."""
+        """Delete the meshes and heightmaps with numbers above ``last``. They must not be used by any geom."""
         numbers = [number for number in self._elements if number > last]
         names = {self._elements[number].name for number in numbers}
         for number in numbers:
@@ -382,7 +382,7 @@ def _joined(meshes: list[Mesh]) -> Mesh:
 
 
 def _turn_to(normal: tuple[float, float, float]) -> Quaternion:
-    """Return the rotation from the z axis to the normal."""
+    """Return a rotation that turns the z axis to ``normal``."""
     x, y, z = normal
     length = (x * x + y * y + z * z) ** 0.5
     if length < MIN_SIZE:

@@ -175,7 +175,7 @@ class Simulation:
             raise SimulationError(f"there is no model '{name}'") from None
 
     def add_model(self, model: Model, pose: Pose | None = None, name: str = "") -> SimModel:
-        """Add a model at a pose and under a name, by default its own pose and name.
+        """Add a model at ``pose`` (default: the pose in the model) and under ``name`` (default: the name in the model).
 
         The time and the other models' states are kept. Raise SimulationError if the name is in use or the model is invalid.
         """
@@ -334,7 +334,7 @@ class Simulation:
             groups[inner] = GROUP_CONTACT_ONLY
             engine.cast(origin, vectors, ids, distances, max_range, body)
             groups[inner] = shown
-            # If another geom, such as a wall, is that close, cast its rays one by one from the minimum range.
+            # If a ray hits another geom closer than this, such as a wall, cast the ray again from the minimum range.
             for index in np.flatnonzero((distances >= 0) & (distances < min_range)).tolist():
                 start = origin + min_range * vectors[index]
                 found, hit = np.full(1, -1, np.int32), np.full(1, -1.0)
@@ -357,7 +357,7 @@ class Simulation:
         return renderer
 
     def open_renderer(self, width: int, height: int) -> Renderer:
-        """Return a renderer for the calling thread, which may be any. The caller must first call :meth:`add_visuals`.
+        """Return a renderer for the calling thread, which can be any thread. The caller must first call :meth:`add_visuals`.
 
         Raise SimulationError if OpenGL or a library is missing.
         """

@@ -45,7 +45,7 @@ class Contact(NamedTuple):
 
 
 class RayHits(NamedTuple):
-    """Each ray's distance (m) and collision name: infinite and empty if it hits nothing."""
+    """Each ray's distance (m), and the name of the collision that it hits: infinity and "" if it hits nothing."""
 
     distances: NDArray[np.float64]
     collisions: tuple[str, ...]

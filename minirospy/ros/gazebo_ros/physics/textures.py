@@ -8,9 +8,9 @@ from minirospy.ros.gazebo_ros.physics.library import load_mujoco
 
 __all__ = ["Textures"]
 
-MAX_PIXELS = 1024  # maximum per side; larger pictures are scaled down, because cameras cannot show more
-SIDES = (90, 270, 180, 0, 0, 180)  # degrees, to turn the pictures at x, -x, y, -y, z and -z upright
-MAX_AREA = 60_000_000  # pixels per file; larger ones take seconds to read
+MAX_PIXELS = 1024  # maximum pixels per side; larger pictures are scaled down: cameras cannot show more
+SIDES = (90, 270, 180, 0, 0, 180)  # degrees by which a cube's pictures at x, -x, y, -y, z and -z are turned
+MAX_AREA = 60_000_000  # maximum pixels per file; larger files take seconds to read
 
 
 class Textures:

@@ -23,7 +23,7 @@ def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
 
 
 def compute_full_text(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the full definition of a message or service, including the messages that it uses, as in bags.
+    """Return the full definition of a message or service, as stored in bags: it includes the messages that are used.
 
     Raise KeyError if :func:`load_depends` has not been called for ``spec``.
     """

@@ -29,7 +29,7 @@ _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
 def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Values) -> Values:
-    """Return a raw pixel's rectified pixel. Raise ValueError if D has an unsupported number of coefficients."""
+    """Convert a pixel from the raw to the rectified image. Raise ValueError if D has an unsupported number of coefficients."""
     import numpy as np
 
     k = _coefficients(D)
@@ -120,7 +120,7 @@ def _coefficients(D: Distortion) -> list[float]:
 
 
 def _tilt(tau_x: float, tau_y: float) -> Values:
-    """Return the matrix for a sensor tilted relative to the lens."""
+    """Return the matrix by which OpenCV models a sensor that is tilted relative to the lens."""
     import numpy as np
 
     cx, sx, cy, sy = math.cos(tau_x), math.sin(tau_x), math.cos(tau_y), math.sin(tau_y)

@@ -70,7 +70,7 @@ def _message(sensor: ImuSensor, time: Time) -> Imu:
 
 
 def _covariance(measured: Sequence[float] | None, covariance: Sequence[float] | None) -> list[float]:
-    """Return a covariance for an Imu message, which defines -1 as not measured and 0 as unknown."""
+    """Return a covariance in the form of an Imu message, in which -1 means not measured, and 0 unknown."""
     if covariance is not None:
         return list(covariance)
     return _NOT_MEASURED if measured is None else _UNKNOWN

@@ -102,7 +102,7 @@ class InteractiveMarkerServer:
     def setCallback(
         self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
     ) -> bool:
-        """Set the callback for one type of feedback, or the default for types without a callback.
+        """Set the callback for one type of feedback, or the default callback, for types that have no callback of their own.
 
         None removes the callback. The change takes effect immediately. Return whether the marker exists.
         """

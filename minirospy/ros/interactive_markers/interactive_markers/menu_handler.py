@@ -31,7 +31,7 @@ class EntryContext:
 
 
 class MenuHandler:
-    """A menu to attach to markers with ``apply``. Handles identify entries and start at 1."""
+    """A menu that ``apply`` attaches to markers. Each entry has a handle, an integer; the first handle is 1."""
 
     NO_CHECKBOX = 0
     CHECKED = 1

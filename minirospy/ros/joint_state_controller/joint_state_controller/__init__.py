@@ -53,7 +53,7 @@ class JointStateController(Controller):
         self.opened.callback(self._publisher.close)
 
     def starting(self, time: Time) -> None:
-        """Publish in the next cycle. After a restart, keep the publishing schedule."""
+        """At the first start, make the first message due in the next cycle. After a restart, keep the publishing schedule."""
         if not self._has_started:
             self._rate.start(time, is_due=True)
             self._has_started = True

@@ -90,7 +90,7 @@ class JointTrajectoryController(Controller):
         self.read_gains(context)
 
         self._state_period = max(1, round(_SECOND / state_rate))  # ns
-        self._state_due = 0  # ns of uptime at which to publish the state next
+        self._state_due = 0  # time at which to publish the next state, in ns of uptime
         state = RealtimePublisher(f"{context.namespace}/state", JointTrajectoryControllerState)
         self._state = self.opened.enter_context(closing(state))
         action = RealtimeActionServer(
@@ -157,7 +157,7 @@ class JointTrajectoryController(Controller):
         raise NotImplementedError
 
     def reset(self) -> None:
-        """Set the joints' commands until the first update."""
+        """Set the commands that the joints follow until the first update."""
 
     def _fill(self, message: _State, time: Time, positions: list[float], velocities: list[float]) -> _State:
         """Fill a message with this cycle's states."""
@@ -217,7 +217,7 @@ class JointTrajectoryController(Controller):
         tolerances: Sequence[JointTolerances] | None,
         goal: MonitoredGoal | None,
     ) -> None:
-        """Queue a trajectory for the loop; an empty one holds the joints. Raise TrajectoryError if it is rejected."""
+        """Queue a trajectory for the loop; an empty one holds the joints. Raise TrajectoryError if the trajectory is rejected."""
         if not self.follower.is_running:
             raise TrajectoryError(_NOT_RUNNING.format("commands"))
         if not message.points:
@@ -287,7 +287,7 @@ class PosVelAccJointTrajectoryController(PosVelJointTrajectoryController):
 class _ClosedLoopController(JointTrajectoryController):
     """Commands ``velocity_ff/JOINT`` times the desired velocities plus the output of a PID controller with ``gains/JOINT``."""
 
-    command: ClassVar[str]  # the joint's attribute for the command
+    command: ClassVar[str]  # name of the joint attribute for the command
 
     def read_gains(self, context: ControllerContext) -> None:
         """Read the gains and make them configurable with dynamic_reconfigure."""

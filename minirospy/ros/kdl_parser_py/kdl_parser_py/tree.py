@@ -81,7 +81,7 @@ class Chain:
         return sum(segment.is_moving for segment in self._segments)
 
     def getSegment(self, nr: int) -> Segment:
-        """Return the segment with this index; 0 is the topmost."""
+        """Return the segment with this index; 0 is the topmost segment."""
         return self._segments[nr]
 
 

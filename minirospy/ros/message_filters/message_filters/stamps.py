@@ -142,7 +142,7 @@ def closest_stamps(
 
     chosen = []
     for queue, stamps in zip(queues, candidates, strict=True):
-        # Choose the first stamp in a remaining window, because ROS's loops reach that stamp first.
+        # Choose the first stamp, in the order of by_distance, that is in a remaining window: ROS's loops find the same stamp.
         for each in queue.by_distance(stamps, stamp):
             if left := _around(windows, each, slop):
                 windows = left
@@ -154,7 +154,7 @@ def closest_stamps(
 
 
 def _around(windows: Sequence[int], stamp: int, slop: int) -> list[int]:
-    """Return the starts of the windows that contain ``stamp``."""
+    """Return those of the windows, each given by its start, that contain ``stamp``."""
     return list(windows[bisect_right(windows, stamp - slop) : bisect_right(windows, stamp)])
 
 

@@ -204,7 +204,7 @@ class Rotation:
     def Inverse(self, arg: _T) -> _T: ...
 
     def Inverse(self, arg: Vector | Twist | Wrench | None = None) -> object:
-        """Return the inverse, or a vector, twist or wrench rotated by it."""
+        """Return the inverse. If ``arg`` is a vector, twist or wrench, return it rotated by the inverse instead."""
         m = self._m
         inverse = Rotation(m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
         return inverse if arg is None else inverse * arg
@@ -272,7 +272,7 @@ class Frame:
     header: Header  # only tf2_ros.Stamped sets this
 
     def __init__(self, R: Rotation | Vector | Frame | None = None, V: Vector | None = None) -> None:
-        """Create a pose from a Rotation and a Vector, one of them, or another Frame; default: the identity."""
+        """Create a pose from a Rotation, a Vector or both, or from another Frame; default: the identity."""
         self.M: Rotation
         self.p: Vector
         if isinstance(R, Frame):
@@ -322,7 +322,7 @@ class Frame:
     def Inverse(self, arg: _T) -> _T: ...
 
     def Inverse(self, arg: object = None) -> object:
-        """Return the inverse, or a point, twist or wrench transformed by it."""
+        """Return the inverse. If ``arg`` is a point, twist or wrench, return it transformed by the inverse instead."""
         back = self.M.Inverse()
         if arg is None:
             return Frame(back, -(back * self.p))
