@@ -211,7 +211,7 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def wait_for_expected(self) -> None:
-        """Wait up to a second until the subscribers that the master listed at registration have connected."""
+        """Wait up to a second for the subscribers that the master listed at registration to connect."""
         await self
         state = self._state
         if state is None:

@@ -180,7 +180,7 @@ class MasterUnreachableError(MinirospyError):
 
 
 class NodeUnreachableError(MinirospyError):
-    """The node ``name``, registered at ``uri``, does not respond. For a service, ``kind`` is "service"."""
+    """The node or service ``name``, registered at ``uri``, does not respond. ``kind`` is "node" or "service"."""
 
     def __init__(self, name: str, uri: str, why: str = "", kind: str = "node") -> None:
         super().__init__(name, uri, why, kind)
@@ -348,7 +348,7 @@ class NoBagError(BagFormatError):
 
 
 class BagVersionError(BagError):
-    """The bag's ``version`` (101 is 1.1) cannot be read, or cannot be used for this purpose."""
+    """A bag of this ``version`` (101 is 1.1) cannot be read, or not for this purpose."""
 
     def __init__(self, version: int, why: str) -> None:
         super().__init__(version, why)

@@ -124,7 +124,7 @@ def check_yaml(text: str, loader: Loader | None = None) -> None:
     YAML libraries accept such text: nesting may crash Python, and a value with aliases is small only until it is sent or
     printed. Raise yaml.YAMLError if the text is not YAML for ``loader`` (default: the compiled one).
     """
-    # Compute an upper bound of the depth from brackets and indentation; it is within the limit for nearly all texts.
+    # Brackets and indentation give an upper bound on the depth, which suffices for nearly all texts.
     indent = max(map(len, _INDENT.findall(text)), default=0)
     has_aliases = "*" in text and "&" in text
     if text.count("[") + text.count("{") + 2 * indent < _MAX_LEVELS and not has_aliases:

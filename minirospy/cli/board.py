@@ -204,7 +204,7 @@ def _press(pin: Sequence[int]) -> None:
         for each in pin:
             board.press(each)
             used = board.state().pins[each]
-            # An input with a pull resistor may have a button that the user has connected.
+            # Do not warn about an input with a pull resistor: the user may have connected a button.
             if each not in BUTTONS and (used.function is Function.OUT or used.pull == Pull.OFF):
                 part = f"it is wired to a {LEDS[each]} LED" if each in LEDS else "nothing is wired to it"
                 warn(

@@ -194,7 +194,7 @@ class Session:
         return lambda: self._or_interrupted(lambda: wait(None))
 
     def post(self, function: Callable[..., object], *args: object) -> None:
-        """Schedule a call of ``function`` on the node's loop; return immediately."""
+        """Schedule a call to ``function`` on the node's loop; return immediately."""
         if self._loop:
             self._loop.post(function, *args)
 

@@ -89,7 +89,7 @@ class TCPROSTransportProtocol:
 
 
 class TCPROSServiceClient(TCPROSTransportProtocol):
-    """The client's side of a connection to a service."""
+    """The client side of a connection to a service."""
 
     def __init__(
         self,

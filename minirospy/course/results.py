@@ -269,5 +269,5 @@ def _result_of(found: Mapping[str, object]) -> Result:
 
 
 def _time_of(found: object) -> float:
-    """Return a valid time, or 0 (unknown) for an invalid value: any node may have set the parameter."""
+    """Return the time, or 0 (unknown) if the value is invalid, because any node may have set the parameter."""
     return float(found) if isinstance(found, int | float) and 0 <= found < _MAX_TIME else 0.0

@@ -15,7 +15,7 @@ from minirospy.fleet.keys import Claim, is_machine
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
 HOLD_SECONDS = 10.0  # seconds to reserve a departed robot's name: Zenoh closes a silent link after as long
-# maximum number of held names of robots that have left; limited because peers choose the names
+# maximum number of names reserved for departed robots; limited because peers choose the names
 MAX_HOLDS = 5_000
 
 

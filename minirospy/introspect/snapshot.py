@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 def moved(before: Table, after: Table) -> list[str]:
-    """Return the names in both tables that have moved to the end, where the master puts a name that is registered again."""
+    """Return the names that moved to the end of the table: the master moves a name there when it is registered again."""
     found: dict[str, None] = {}
     rest = iter(name for name in before if name in after)
     for name in after:

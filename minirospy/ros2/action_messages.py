@@ -43,7 +43,7 @@ class GoalId(NamedTuple):
 
 
 class Status(NamedTuple):
-    """A goal's status: the number of a GoalState, and a text for people."""
+    """A goal's status: the number of a GoalState, and a readable text."""
 
     goal: GoalId
     state: int

@@ -98,7 +98,7 @@ class ActionType:
         return encode(name, self._fields, values)
 
     def cancelled(self, request: bytes) -> tuple[bytes, int]:
-        """Return the goal's id and stamp in a cancel request. Raise DeserializationError if the request is invalid."""
+        """Parse a cancel request; return its goal id and stamp. Raise DeserializationError if the request is invalid."""
         found = decode("action_msgs/srv/CancelGoal_Request", self._fields, request)
         info = cast("dict[str, dict[str, object]]", found["goal_info"])
         stamp = cast("dict[str, int]", info["stamp"])

@@ -438,7 +438,7 @@ class SharedGraph:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))
 
     async def _join(self, topic: str, shared: _SharedPublisher) -> None:
-        """Wait until this node's own subscription, and the subscribers known to the master, are connected."""
+        """Wait until this node's own subscriber and the subscribers known to the master are connected to the publisher."""
         await shared.publisher.wait_for_expected()
         await self._join_own(topic)
 

@@ -189,7 +189,7 @@ def dump_json_in_pieces(value: object) -> str:
 
 
 def _pieces(value: object) -> Iterator[str]:
-    """Yield the pieces of a value's JSON."""
+    """Yield a value's JSON text in pieces."""
     if isinstance(value, dict):
         mark = "{"
         for name, each in value.items():

@@ -165,7 +165,7 @@ def _shown(text: str) -> str:
 
 def _word(match: re.Match[str]) -> Word:
     if match["bracket"] is not None:
-        # A bracket argument has no variable references, so escape text that looks like one.
+        # CMake expands no variables in a bracket argument, so escape text that looks like a variable reference.
         return Word(re.sub(r"([\\$])", r"\\\1", match["bracket"]), True)
     quoted = match["quoted"] is not None
     return Word(match["quoted"] if quoted else match["word"], quoted)

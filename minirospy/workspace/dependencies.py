@@ -80,7 +80,7 @@ class Dependencies:
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
-        """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
+        """Return a package's folder. If it does not exist, raise NotFoundError, which lists similar names."""
         folder = self._packages.find(name)
         if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")

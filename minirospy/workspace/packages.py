@@ -83,7 +83,7 @@ class Packages:
         return packages
 
     def find(self, name: str) -> Path:
-        """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
+        """Return a package's folder. If it does not exist, raise NotFoundError, which lists similar names."""
         for root in self.roots:
             # Try the folder with the package's name first, which avoids a search.
             if package_name(root / name) == name:

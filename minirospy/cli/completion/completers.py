@@ -146,7 +146,7 @@ def _below(root: Path, shown: str, word: str) -> list[str]:
 
 
 def files(cursor: Cursor) -> Iterable[str]:
-    """Return local files and folders, as shells complete them."""
+    """Return local files and folders, as a shell's completion does."""
     head, slash, prefix = cursor.word.rpartition("/")
     folder = Path(os.path.expanduser(head + slash) or ".")
     return [head + slash + name for name in _entries(folder, hidden=prefix.startswith("."))]

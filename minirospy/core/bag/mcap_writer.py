@@ -92,7 +92,7 @@ class McapWriter:
         return self._gathered
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
-        """Return the number of a new connection for :meth:`write`. Raise BagFormatError if its header lacks a field."""
+        """Add a connection; return its number, for :meth:`write`. Raise BagFormatError if the header lacks a required field."""
         for name in _NEEDED:
             if name not in header:
                 raise BagFormatError(f'the connection header of {topic} has no field "{name}"')

@@ -42,7 +42,7 @@ __all__ = ["CHUNK_THRESHOLD", "BagWriter", "Buffer", "Continued"]
 
 Buffer = bytes | bytearray | memoryview
 
-CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is complete, as in ROS
+CHUNK_THRESHOLD = 768 * 1024  # uncompressed bytes at which a chunk is closed, as in ROS
 
 _LARGE = 64 * 1024  # a message of at least this many bytes is not copied into the chunk
 

@@ -70,7 +70,7 @@ class LoopbackHardware(RobotHardware):
             added = self.add_joint(name, *(interfaces.get(name) or COMMAND_INTERFACES), position=position)
             self._bounds.append((added, lower, upper))
         mimics = {name: joint.mimic for name, joint in movable.items() if joint.mimic}
-        # Add a mimic joint after the joint that it mimics, which may be a mimic joint, too. Skip joints that mimic each other.
+        # Add a mimic joint after the joint that it mimics, which may itself be a mimic joint. Skip joints that mimic each other.
         while ready := [
             name for name, each in mimics.items() if each.joint in self.joints and each.joint not in mimics
         ]:

@@ -438,5 +438,5 @@ def nothing(*_: object) -> None:
 
 
 def key_of_node(key: str) -> str:
-    """Return the name under which a parameter is in a node's table, which also contains topics and services."""
+    """Return a parameter's key in a node's table, which also contains topics and services."""
     return key.rstrip("/") or "/"

@@ -135,7 +135,7 @@ class ParameterTree:
                 raise ParametersFullError(f"no more than {self._most_for(weight) // 1024**2} MiB in memory")
 
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
-        """Set a value of ``weight`` bytes; a dictionary replaces the whole namespace.
+        """Set a value, whose size is ``weight`` bytes. A dictionary replaces the whole namespace.
 
         If ``key`` is below an existing parameter that is not a namespace, a new namespace replaces that parameter. Raise
         ValueError if the root would not be a dictionary.

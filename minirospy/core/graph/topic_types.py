@@ -53,7 +53,7 @@ class TopicTypes:
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
 
     def cost(self, topic: str, type_: str) -> int:
-        """Return how many more bytes to charge to a node for registering the topic with this type than are charged already."""
+        """Return the additional bytes to charge to a node if it registers the topic with this type."""
         before = self._types.get(topic)
         if before and before.node:
             return max(0, text_cost(type_) - text_cost(before.text))

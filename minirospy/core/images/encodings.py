@@ -129,7 +129,7 @@ def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _of_depth(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Convert an image to another depth: 8 and 16 bits are scaled, other depths are rounded and clipped."""
+    """Convert an image to another depth. Between 8 and 16 bits, scale the values; otherwise round and clip them."""
     import numpy as np
 
     depths = list(DEPTHS)

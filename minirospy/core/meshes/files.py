@@ -70,7 +70,7 @@ def _with_textures(mesh: Mesh, folder: Path) -> Mesh:
 
 
 def _picture(name: str, folder: Path) -> str:
-    """Return the path of a picture that a mesh file in ``folder`` names, or an empty string.
+    """Return the path of a picture that is named in a mesh file in ``folder``, or an empty string.
 
     Gazebo's models store their pictures in ``materials/textures``.
     """

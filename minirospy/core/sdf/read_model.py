@@ -344,7 +344,7 @@ class _Reader:
         return _KINDS.get(text)
 
     def _link_of(self, name: str) -> str:
-        """Return the link that a joint refers to by name: a link, or the link to which a frame is attached."""
+        """Return the link for a name in a joint: the name may be that of a frame, which is attached to a link."""
         for _ in range(len(self.attached) + 1):
             if name not in self.attached or name in self.links:
                 break

@@ -175,7 +175,7 @@ class StaticCache:
         self._sample = sample
 
     def at(self, time: int) -> Sample:
-        """Return the sample."""
+        """Return the only sample, at any ``time``."""
         return self._sample
 
     def latest(self) -> tuple[int, Frame]:

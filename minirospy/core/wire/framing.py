@@ -198,7 +198,7 @@ class FrameReader:
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return the memory for the next bytes. It is never empty."""
+        """Return the buffer into which to read the next bytes. Its length is never zero."""
         if self._large is not None:
             if self._filled == len(self._large):
                 # Let the buffer grow as bytes arrive, because a length prefix alone must not allocate all of the memory.
@@ -215,7 +215,7 @@ class FrameReader:
         return self._small[self._end :]
 
     def received(self, count: int) -> Iterator[memoryview]:
-        """Return the frames that ``count`` more bytes in :meth:`space` complete. Raise WireError if a frame is too long."""
+        """Process ``count`` bytes in :meth:`space`; return the completed frames. Raise WireError if a frame is too long."""
         if self._large is not None:
             self._filled += count
             if self._filled == self._wanted:

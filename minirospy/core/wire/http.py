@@ -122,7 +122,7 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the current message has a chunked body; even a few bytes of it may contain many chunks."""
+        """Return whether the current message has a chunked body. Even a few bytes may then contain many chunks."""
         return self._chunked is not None
 
     @property
@@ -296,7 +296,7 @@ class HttpReader:
 
 
 def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
-    """Return the end of the first line that ends after ``start``, and the start of the next line; -1 if there is none.
+    """Return the end of the line at ``start``, and the start of the next line. The end is -1 if the line is incomplete.
 
     A line feed alone also ends a line, for requests written by hand.
     """

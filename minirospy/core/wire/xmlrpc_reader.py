@@ -109,7 +109,7 @@ class Reader:
         # The number of bytes fed, and the memory that the long strings use.
         self._fed = 0
         self._memory = 0
-        # The joined part of a long string, and the string's bytes per character.
+        # The part of a long string that has been read so far, and the string's bytes per character.
         self._joined = ""
         self._width = 1
         # The decoded part of a long base64 value.

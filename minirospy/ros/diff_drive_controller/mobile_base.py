@@ -240,7 +240,7 @@ def log_origin(name: str, joint: Joint) -> None:
 
 
 def wheel_radius(robot: Robot, joint: Joint, *, allow_sphere: bool) -> float:
-    """Return the radius of the wheel driven by a joint, from its collision geometry, a cylinder or sphere.
+    """Return the radius of the wheel that a joint drives: that of its collision geometry, a cylinder or a sphere.
 
     If there is none, log the reason and raise ControllerError.
     """

@@ -85,7 +85,9 @@ class Window:
         self._contacts = _publisher("contacts", MarkerArray)
         self._rays = _publisher("rays", MarkerArray)
         self._is_stale = True  # whether models were added, removed or, if static, moved since the last shapes
-        self._known: dict[SimModel, list[Marker]] = {}  # markers in the last message with shapes
+        self._known: dict[
+            SimModel, list[Marker]
+        ] = {}  # the markers in the last message that contained shapes
         self._moving: list[tuple[str, int]] = []  # the moving links' scoped names and pose rows
         self._generation = -1  # engine generation for which the pose rows are valid
         self._last: NDArray[np.float64] = np.zeros((0, 7))  # poses in the last message

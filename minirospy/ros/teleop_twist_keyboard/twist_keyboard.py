@@ -115,7 +115,7 @@ class KeyTeleop:
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:
-        """Process a key, or "" after the timeout. Return the lines to print, or None if nothing must be published."""
+        """Process a key, or "" after a timeout. Return the lines to print, or None if there is nothing to publish."""
         if key in _MOVES:
             self._direction = _MOVES[key]
             return []

@@ -313,7 +313,7 @@ class OutLink:
         """Send part of the queue. Raise OSError if the connection has failed."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
-            # Send a large frame, or one that was sent in part, on its own, not together with small frames.
+            # Do not combine a large or partly sent frame with small frames.
             self._gather(outbox[0])
             self._begun = self._is_reading = True
             if not outbox[0]:

@@ -85,7 +85,7 @@ class RingMemory:
 
     @property
     def backed_bytes(self) -> int:
-        """Return the number of bytes with allocated memory."""
+        """Return how many bytes of the ring are backed by allocated memory."""
         return sum(self._backed)
 
     def close(self) -> None:
@@ -106,7 +106,7 @@ class SharedRing:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.lock = threading.Lock()
         self.memory: RingMemory | None = None
-        self.trouble = ""  # the reason why there is no memory, set by turn_off()
+        self.trouble = ""  # why shared memory is off; set by turn_off()
         self._loop = loop
         self._senders: set[RingSender] = set()
         self._retired: list[

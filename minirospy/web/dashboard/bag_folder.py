@@ -28,7 +28,7 @@ _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECA
 
 
 class FoundBag(NamedTuple):
-    """A bag: its name for the page (with forward slashes), its size in bytes, and its modification time in seconds."""
+    """A bag: its name as shown on the page (with forward slashes), its size in bytes, and its modification time in seconds."""
 
     name: str
     size: int

@@ -92,7 +92,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
     budget = Budget()
     by_bag: dict[str, list[BagPath]] = {}
     for each in request.paths:
-        # Read all paths in a bag together. A difference needs two readers of the same bag, because their positions may differ.
+        # Read all paths of a bag in one pass, except differences: one takes two readers, which may be at different positions.
         place = each.operand.bag if each.minus is None else f"{each.key}\0"
         by_bag.setdefault(place, []).append(each)
     for done, group in enumerate(by_bag.values()):

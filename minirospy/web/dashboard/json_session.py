@@ -161,7 +161,7 @@ class JsonSession:
         self.send_error("binary messages have no meaning here")
 
     def ended(self) -> None:
-        """End the session. Idempotent, so that the release of resources is not interrupted by a second call."""
+        """End the session. Idempotent: a second call does not interrupt the release of resources."""
         if not self.is_ended:
             self.is_ended = True
             self._task.cancel()

@@ -48,7 +48,7 @@ class Share:
         return self.size + self.large
 
     def set(self, size: int) -> None:
-        """Set the number of bytes that only this client uses. Above the limit, make clients release memory."""
+        """Set how many bytes this client alone uses. If all clients together exceed the limit, make some release memory."""
         grown = size - self.size
         if grown:
             self.size = size

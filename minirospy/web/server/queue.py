@@ -87,7 +87,7 @@ class SendQueue:
 
     @property
     def is_overrun(self) -> bool:
-        """Return whether so many responses are queued that the client cannot be reading them."""
+        """Return whether so many responses are queued that the client has evidently stopped reading."""
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:

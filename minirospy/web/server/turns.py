@@ -35,7 +35,7 @@ SLICE_SECONDS = 0.0001
 # number of jobs for which a client counts as new; their expected time is at least that of other new clients' jobs
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which a client's expected time per job decays after a shorter job
-IMMEDIATE_SHARE = 0.5  # fraction of the time that work may use without being queued
+IMMEDIATE_SHARE = 0.5  # the share of the loop's time that a client's work may take before it is queued
 # Maximum length of an interactive client's burst of work, in slices (1 ms in total).
 # A request takes 0.1 to 0.5 ms to handle; 64 kB of empty frames take 100 ms.
 # A new client starts with one slice, and gets one more after each short burst.
@@ -159,7 +159,7 @@ class FairTurns:
         share.is_closed = True
 
     def start(self, share: Share) -> bool:
-        """Run a client's work, now or in its turn; return whether any work is left. No effect if the client is already queued."""
+        """Run a client's work now, or queue the client; return whether work is left. Do nothing if it is queued already."""
         if share.is_queued or share.is_closed:
             return share.is_queued
         if self._is_running or self.is_busy or not self._may_start_now():

@@ -183,7 +183,7 @@ class DiffDriveController(MobileBase):
         return _Wheels(*(value * factor for value, factor in zip(self._described, factors, strict=True)))
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # first call, with defaults for the values that are not set as parameters
+        is_first = level == ~0  # whether the server calls this for the first time, with its default values
         if is_first:
             config.update(self._config)
             return config

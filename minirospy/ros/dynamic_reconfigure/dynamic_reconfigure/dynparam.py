@@ -213,7 +213,7 @@ def _values_of(node: str, timeout: float | None) -> Config | None:
 
 
 def _change(node: str, values: Values, timeout: float | None) -> None:
-    """Change values at a node; print an error if a value is invalid.
+    """Change a node's values; print an error if a value is invalid.
 
     Raise ROSException if the node does not appear in time, MinirospyError if its server fails.
     """

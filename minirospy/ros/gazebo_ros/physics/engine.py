@@ -164,7 +164,7 @@ class Engine:
                 compute(model, data)
 
     def _find_grains(self) -> None:
-        """Read the friction directions of the geoms that have one, and both friction coefficients of all geoms."""
+        """Read each geom's friction direction, if it has one, and its two friction coefficients."""
         model, grains = self.model, self._builder.shapes.grains
         self._grain_directions: NDArray[np.float64] = np.zeros((model.ngeom, 3))
         self._frictions: NDArray[np.float64] = np.repeat(model.geom_friction[:, :1], 2, axis=1)

@@ -139,7 +139,7 @@ def open_context(width: int, height: int) -> tuple[str, Any]:
             context.make_current()
         except Exception as error:  # noqa: BLE001 (OpenGL's libraries raise errors of many types)
             faults.append(f"{backend}: {' '.join(str(error).split())[:100] or type(error).__name__}")
-            # PyOpenGL reads its platform from this variable, and the next backend needs another one.
+            # PyOpenGL reads its platform from this variable, and the next backend needs a different platform.
             if before is None:
                 os.environ.pop("PYOPENGL_PLATFORM", None)
             continue

@@ -56,7 +56,7 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return a node's working folder. If cwd is "node", raise the same MinirospyError as node_program."""
+    """Return a node's working folder. Raise MinirospyError if cwd is "node" and the program is not found."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 

@@ -51,7 +51,7 @@ def watch(
 
 
 def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: float) -> None:
-    """Terminate process groups with SIGINT, SIGTERM and SIGKILL, in this order."""
+    """Terminate process groups with SIGINT, SIGTERM and SIGKILL, in that order."""
     left = group
     for name, seconds in (("SIGINT", interrupt_seconds), ("SIGTERM", terminate_seconds)):
         left = [pid for pid in left if send(pid, name)]

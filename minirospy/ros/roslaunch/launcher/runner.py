@@ -172,7 +172,7 @@ class Launcher:
         return process
 
     def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
-        """Return the nodes on this machine and those on others. Raise LaunchError if a machine is unknown."""
+        """Return two lists: the nodes on this machine, and those on other machines. Raise LaunchError if a machine is unknown."""
         here: list[NodeSpec] = []
         elsewhere: list[NodeSpec] = []
         for node in self._spec.nodes:

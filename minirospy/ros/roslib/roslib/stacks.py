@@ -112,7 +112,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to search in ``env``, or None if ``env`` is None: search those in this process's environment."""
+    """Return the folders to search according to ``env``. None selects this process's environment."""
     return None if env is None else _folders(env)
 
 

@@ -294,7 +294,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return those of ``names`` that are nodes; print an error for each other name."""
+    """Return the ``names`` that are nodes; print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

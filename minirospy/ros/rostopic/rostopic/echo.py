@@ -21,7 +21,7 @@ ValueTransform = Callable[[object, object], object]
 
 
 class CallbackEcho:
-    """Prints messages like `rostopic echo`: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
+    """Prints messages like `rostopic echo`. Usage: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
 
     ``msg_eval`` extracts the field to print; messages for which ``filter_fn`` returns a falsy value are not printed.
     ``done`` becomes True after ``count`` messages.

@@ -50,7 +50,7 @@ _DATATYPES: dict[int, tuple[str, int]] = {
 }
 """The format character and size in bytes, keyed by field datatype."""
 
-_BLOCK = 4_096  # points to read per step, few enough for the processor's cache
+_BLOCK = 4_096  # points to read per step, few enough to fit in the CPU cache
 
 _FEW = 1_000  # below this number of points, plain Python is faster than numpy
 

@@ -153,7 +153,7 @@ class Iterator(Container):
     # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
-        """Return the contained state as a dict {label: state}."""
+        """Return the contained states as a dict {label: state}."""
         return {self._state_label: self._state}
 
     def __getitem__(self, key: str) -> State:

@@ -24,7 +24,7 @@ def rpy_of_matrix(rotation: Quaternion) -> Vector:
 
 
 def euler_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw, computed like the output of tf2_tools' echo.py."""
+    """Return roll, pitch and yaw, computed in the same way as in tf2_tools' echo.py."""
     (xx, _, _), (yx, yy, yz), (zx, zy, zz) = _matrix(rotation)
     cosine = math.sqrt(xx * xx + yx * yx)
     if cosine > _SMALL:

@@ -212,7 +212,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         async for message in subscription:
             try:
                 take(message)
-            except DeserializationError as error:  # a StatusList is parsed, which may fail, on first access
+            except DeserializationError as error:  # a StatusList is parsed on first access, which may fail
                 self._node.log.error("a message on %s is ignored: %s", subscription.topic, error)
         for goal in list(self._goals.values()):
             goal._interrupt()

@@ -139,7 +139,7 @@ class Raw(Codec[ET.Element]):
     """A codec that keeps elements unchanged."""
 
     def from_xml(self, node: ET.Element, path: Path) -> ET.Element:
-        """Return the element."""
+        """Return the element itself."""
         return node
 
     def write_xml(self, node: ET.Element, value: ET.Element) -> None:
