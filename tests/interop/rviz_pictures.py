@@ -85,7 +85,10 @@ def _box(x: float, half: float) -> Iterator[tuple[tuple[float, ...], tuple[float
 
 
 def collada(materials: tuple[str, str] = ("red", "")) -> str:
-    """Return a Collada file: two boxes, by default a red one and one without a material, a lamp and a camera."""
+    """Return a Collada file: two boxes, by default a red one and one without a material, a lamp and a camera.
+
+    RViz shows the material as opaque, although it has the transparency 0, which means that it cannot be seen.
+    """
     geometries, nodes = [], []
     for name, x, material in (("a", -0.2, materials[0]), ("b", 0.2, materials[1])):
         triangles = [*_box(x, 0.15)]
@@ -123,7 +126,8 @@ def collada(materials: tuple[str, str] = ("red", "")) -> str:
             '<library_effects><effect id="e"><profile_COMMON><technique sid="t"><phong>'
             "<emission><color>0.05 0.3 0.1 1</color></emission><ambient><color>0.4 0.4 0.4 1</color></ambient>"
             "<diffuse><color>0.7 0.1 0.1 1</color></diffuse><specular><color>0.6 0.6 0.6 1</color></specular>"
-            "<shininess><float>50</float></shininess></phong></technique></profile_COMMON></effect></library_effects>"
+            "<shininess><float>50</float></shininess><transparent><color>1 1 1 1</color></transparent>"
+            "<transparency><float>0</float></transparency></phong></technique></profile_COMMON></effect></library_effects>"
             if any(materials)
             else ""
         )
@@ -187,7 +191,7 @@ OBJ = "mtllib part.mtl\nusemtl leaf\n" + "".join(
     f"v {' '.join(map(str, corner))}\nvn {' '.join(map(str, normal))}\n" for corner, normal in _box(0, 0.15)
 )
 OBJ += "".join(f"f {at}//{at} {at + 1}//{at + 1} {at + 2}//{at + 2}\n" for at in range(1, 37, 3))
-MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.5 0.2\nKe 0.2 0 0.3\nKs 0.4 0.4 0.4\nd 1\n"
+MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.5 0.2\nKe 0.2 0 0.3\nKs 0.4 0.4 0.4\nd 0\n"  # d: RViz ignores it
 
 
 def display(cls: str, topic: str = "", **settings: object) -> Settings:

@@ -463,6 +463,27 @@ def test_meshes_keep_their_materials_without_lamps_and_a_bad_shape_is_named(
         assert time.monotonic() < end
 
 
+def test_meshes_are_opaque_whatever_the_opacity_in_their_files(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rviz_pictures.prepare(tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    visuals = "".join(
+        f'<visual><origin xyz="{x} 0 0"/><geometry><mesh filename="package://rviz_meshes/{name}" scale="4 4 4"/></geometry>'
+        "</visual>"
+        for x, name in ((-1.5, "two.dae"), (1.5, "leaf.obj"))
+    )
+    text = f'<robot name="r"><link name="map">{visuals}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+    publish(served, {"/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    look_down(page)
+    # Both files say that their material cannot be seen.
+    wait_color(page, (191, 102, 51), 3)
+    wait_color(page, (77, 128, 128), 3)
+
+
 def test_textures_have_the_colors_of_their_pictures(
     serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -178,8 +178,8 @@ async function objectOf(link, uri, bytes) {
     geometry.setAttribute("position", new BufferAttribute(positions, 3));
     if (normals) geometry.setAttribute("normal", new BufferAttribute(normals, 3));
     else geometry.computeVertexNormals();
-    const { rgb = GRAY, alpha = 1, emission = [0, 0, 0] } = colors.get(material) ?? {};
-    const body = bodyMaterial(rgb, alpha);
+    const { rgb = GRAY, emission = [0, 0, 0] } = colors.get(material) ?? {};
+    const body = bodyMaterial(rgb);
     body.emissive.fromArray(emission);
     group.add(new Mesh(geometry, body));
   }
@@ -224,7 +224,11 @@ async function readDae(link, uri, bytes) {
   parsed.scene.traverse((/** @type {any} */ each) => {
     if (!each.isMesh) return;
     each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
-    for (const material of [each.material].flat()) setColors(material);
+    for (const material of [each.material].flat()) {
+      setColors(material);
+      // RViz ignores <transparency>: some programs write 0 for opaque materials.
+      material.opacity = 1;
+    }
   });
   const group = new Group();
   group.add(parsed.scene);

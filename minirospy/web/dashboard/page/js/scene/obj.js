@@ -48,20 +48,21 @@ function addFace({ positions, normals }, words, vertices, directions) {
   }
 }
 
-/** Return the colors of materials by name: {rgb (0 to 255), alpha, emission (if it has one; 0 to 1)}. */
+/**
+ * Return the colors of materials by name: {rgb (0 to 255), emission (if it has one; 0 to 1)}. As in RViz, all are
+ * opaque.
+ */
 export function readMaterials(text) {
   const found = new Map();
   let color = null;
   for (const line of text.split("\n")) {
     const [word, ...rest] = line.trim().split(/\s+/);
     if (word === "newmtl") {
-      color = { rgb: [153, 153, 153], alpha: 1 };
+      color = { rgb: [153, 153, 153] };
       found.set(rest.join(" "), color);
     } else if (!color) continue;
     else if (word === "Kd" && rest.length >= 3) color.rgb = rest.slice(0, 3).map((part) => Number(part) * 255);
     else if (word === "Ke" && rest.length >= 3) color.emission = rest.slice(0, 3).map(Number);
-    else if (word === "d") color.alpha = Number(rest.at(-1));
-    else if (word === "Tr") color.alpha = 1 - Number(rest.at(-1));
   }
   return found;
 }
