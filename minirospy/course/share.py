@@ -91,8 +91,8 @@ class _OwnMaster:
     def publish(self, record: Record, state: dict[str, object]) -> None:
         """Publish the state, with the results of the checks that have ended on this computer.
 
-        Do nothing if the topic is not advertised yet and the master did not respond to the last call of `nodes`: advertising would
-        block for much longer than that call.
+        Do nothing if the topic is not advertised yet and the master did not respond to the last call of `nodes`, because
+        advertising would block for much longer than that call.
         """
         if self._publisher is None and not self._answers:
             return

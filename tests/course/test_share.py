@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import queue
 import re
@@ -21,7 +22,7 @@ from minirospy.core.idl.load import message_class
 from minirospy.course.results import MAX_KEY, Record, Result, parameter_key, send
 from minirospy.course.share import share
 from minirospy.introspect.messages import Received
-from minirospy.introspect.streams import ToolNode
+from minirospy.introspect.streams import ToolNode, TopicPublisher
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.loop import LoopThread
@@ -231,6 +232,71 @@ def test_nodes_of_other_students_at_the_same_master_are_left_out(
     names = found["now"]["nodes"]
     assert len(names) == 1
     assert names[0].startswith("/teacher_")
+
+
+class Blinking:
+    """A board whose first LED changes at each turn, and the clock of share(), which advances only while it sleeps."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self.turns = 0
+
+    def __enter__(self) -> Blinking:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def get(self, pin: int) -> int:
+        return self.turns % 2 if pin == 2 and self.turns < 12 else 0
+
+    def monotonic(self) -> float:
+        return self.seconds
+
+    def sleep(self, seconds: float) -> None:
+        self.seconds += seconds
+        self.turns += 1
+
+
+@pytest.fixture
+def blinking(monkeypatch: pytest.MonkeyPatch) -> Blinking:
+    found = Blinking()
+    monkeypatch.setattr("minirospy.course.share.Board", lambda: found)
+    monkeypatch.setattr("minirospy.course.share.time", found)
+    return found
+
+
+def test_topic_has_at_most_one_message_per_second(
+    master: str, blinking: Blinking, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[tuple[float, str]] = []
+
+    def publish(_: TopicPublisher, message: Any) -> None:
+        sent.append((blinking.seconds, json.loads(message.data)["now"]["leds"]))
+
+    monkeypatch.setattr(TopicPublisher, "publish", publish)
+    share(Record.read(Environment.read()), Environment.read(), lambda: blinking.seconds > 4)
+    times = [seconds for seconds, _ in sent]
+    assert times[0] == 0
+    assert all(later - earlier > 0.99 for earlier, later in itertools.pairwise(times))
+    # The state after the last change is sent without waiting for the next heartbeat.
+    assert [leds for seconds, leds in sent if seconds > 2.3] == ["000000"]
+
+
+def test_unreachable_class_master_is_asked_once_for_each_state(
+    master: str, blinking: Blinking, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blinking.turns = 12  # nothing changes
+    tried: list[float] = []
+
+    def set_param(*_: object) -> None:
+        tried.append(blinking.seconds)
+        raise MasterUnreachableError(master, "test")
+
+    monkeypatch.setattr(MasterProxy, "set_param", set_param)
+    share(Record.read(Environment.read()), Environment.read(), lambda: blinking.seconds > 4)
+    assert len(tried) == 2
+    assert tried[1] >= 3
 
 
 def test_missing_master_is_an_error() -> None:
