@@ -89,7 +89,7 @@ def _parser() -> Parser:
     add(
         "--share",
         action="store_true",
-        help="show your board and your nodes on the teacher's page until Ctrl-C",
+        help="show your results, board and nodes on the teacher's page until Ctrl-C",
     )
     add(
         "--class",

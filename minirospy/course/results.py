@@ -20,6 +20,7 @@ from pathlib import Path
 from minirospy.base.environment import Environment, split_uri
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcRefused, UsageError
 from minirospy.base.escape import escaped
+from minirospy.base.private_files import replace_file
 from minirospy.course.checker import Report
 from minirospy.course.exercise import built_in_names
 from minirospy.runtime.rpc.master_proxy import MasterProxy
@@ -111,7 +112,7 @@ class Record:
             handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name)
             with os.fdopen(handle, "w", encoding="utf-8") as stream:
                 json.dump({**self.to_parameter(), "master": self.master}, stream, indent=1)
-            os.replace(name, self.path)
+            replace_file(name, self.path)
         except OSError as error:
             raise MinirospyError(f"{self.path} cannot be written: {error.strerror}") from error
 

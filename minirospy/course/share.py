@@ -26,7 +26,9 @@ __all__ = ["share"]
 _POLL_SECONDS = 0.2  # seconds between pin readings; changes are missed if an LED blinks faster than 2.5 Hz
 _BEAT_SECONDS = 3.0  # seconds between heartbeats; the page marks a computer as gone after missing three
 _ASK_SECONDS = 2.0  # timeout in seconds for calls to a master
+_PUBLISH_SECONDS = 1.0  # minimum seconds between messages on the topic, because each has all results (22 kB)
 _TOPIC = CLASS_PARAMETER  # the page's classroom.js also finds this topic with a fleet robot's name before it
+_TOOL = "check_share"  # prefix of the names of the nodes that publish the topic
 
 
 def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:
@@ -41,24 +43,26 @@ def share(record: Record, environment: Environment, ended: Callable[[], bool] = 
         _OwnMaster(environment) as own,
     ):
         master.get_pid()
-        beat, sent, due = 0, "", 0.0
+        beat, sent, due, publish_due = 0, "", 0.0, 0.0
+        unpublished: dict[str, object] | None = None
         while not ended() and not own.is_killed:
             pins = "".join(str(board.get(pin)) for pin in (*LEDS, *BUTTONS))
             now = time.monotonic()
             if pins != sent or now >= due:
                 beat += 1
-                state = {
+                sent, due = pins, now + _BEAT_SECONDS
+                unpublished = {
                     "leds": pins[: len(LEDS)],
                     "buttons": pins[len(LEDS) :],
                     "nodes": own.nodes(),
                     "beat": beat,
                 }
-                own.publish(record, state)
                 # The teacher's computer may be briefly unreachable, so retry at the next heartbeat.
                 with contextlib.suppress(MasterUnreachableError, RpcError):
-                    master.set_param(f"{record.class_parameter}/now", state)
-                    sent = pins
-                due = now + _BEAT_SECONDS
+                    master.set_param(f"{record.class_parameter}/now", unpublished)
+            if unpublished and now >= publish_due:
+                own.publish(record, unpublished)
+                unpublished, publish_due = None, now + _PUBLISH_SECONDS
             time.sleep(_POLL_SECONDS)
 
 
@@ -69,6 +73,7 @@ class _OwnMaster:
         self._environment = environment
         self._node: ToolNode | None = None
         self._publisher: TopicPublisher | None = None
+        self._answers = False
         self._message: Any = message_class("std_msgs/String")()
 
     def __enter__(self) -> _OwnMaster:
@@ -84,7 +89,13 @@ class _OwnMaster:
         return self._node is not None and self._node.ended.is_set()
 
     def publish(self, record: Record, state: dict[str, object]) -> None:
-        """Publish the state, with the results of the checks that have ended on this computer."""
+        """Publish the state, with the results of the checks that have ended on this computer.
+
+        Do nothing if the topic is not advertised yet and the master did not respond to the last call of `nodes`, because
+        advertising would block for much longer than that call.
+        """
+        if self._publisher is None and not self._answers:
+            return
         stored = Record.read(self._environment)
         if not stored.results:
             stored.results = record.results
@@ -92,19 +103,30 @@ class _OwnMaster:
         key = record.class_parameter.rpartition("/")[2]
         self._message.data = json.dumps({**stored.to_parameter(), "key": key, "now": state})
         with contextlib.suppress(MinirospyError, RpcError):
-            if self._publisher is None:
-                self._node = self._node or ToolNode(self._environment, "check_share")
-                self._publisher = self._node.publisher(_TOPIC, type(self._message), latch=True)
-            self._publisher.publish(self._message)
+            publisher = self._publisher or self._advertise()
+            publisher.publish(self._message)
+
+    def _advertise(self) -> TopicPublisher:
+        node = ToolNode(self._environment, _TOOL)
+        try:
+            self._publisher = node.publisher(_TOPIC, type(self._message), latch=True)
+        except BaseException:
+            # The node has recorded the topic locally, so the next attempt needs a new node.
+            node.close()
+            raise
+        self._node = node
+        return self._publisher
 
     def nodes(self) -> list[str]:
-        """Return the names of at most ten nodes, except this one."""
+        """Return the names of at most ten nodes, without those that publish the topic. The list is empty without a master."""
         master = MasterProxy(self._environment.master_uri, "/check_share", timeout=_ASK_SECONDS)
+        self._answers = False
         try:
             state = master.get_system_state()
         except (MinirospyError, RpcError):
             return []
         finally:
             master.close()
-        found = {node for table in state for nodes in table.values() for node in nodes}
-        return sorted(found - {"/rosout", self._node.name if self._node else ""})[:10]
+        self._answers = True
+        found = {node for table in state for nodes in table.values() for node in nodes} - {"/rosout"}
+        return sorted(name for name in found if not name.rpartition("/")[2].startswith(f"{_TOOL}_"))[:10]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import queue
 import re
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,12 +18,16 @@ import pytest
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcRefused
 from minirospy.board.board import Board
+from minirospy.core.idl.load import message_class
 from minirospy.course.results import MAX_KEY, Record, Result, parameter_key, send
 from minirospy.course.share import share
 from minirospy.introspect.messages import Received
-from minirospy.introspect.streams import ToolNode
+from minirospy.introspect.streams import ToolNode, TopicPublisher
+from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.transport.loop import LoopThread
 from minirospy.web.dashboard.files import FOLDER
+from tests.conftest import free_port
 
 
 def wait_for(holds: Callable[[], bool]) -> None:
@@ -66,6 +72,21 @@ def test_state_of_the_board_is_at_the_master(master: str) -> None:
         ended.set()
         sharing.join()
         proxy.close()
+
+
+@contextlib.contextmanager
+def running_master(port: int) -> Iterator[None]:
+    """Run a master at a port."""
+    loop = LoopThread("late-master")
+    try:
+        serving = Master(port=port)
+        loop.run(serving.start())
+        try:
+            yield
+        finally:
+            loop.run(serving.close(), 30.0)
+    finally:
+        loop.close()
 
 
 class Sharing:
@@ -151,6 +172,131 @@ def test_class_master_suffices_without_an_own_one(master: str, monkeypatch: pyte
     finally:
         ended.set()
         sharing.join()
+
+
+def test_topic_appears_when_the_own_master_starts_later(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    port = free_port()
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
+    record = Record.read(Environment.read())
+    record.student, record.master = "Anna", master
+    ended = threading.Event()
+    sharing = threading.Thread(target=share, args=(record, Environment.read(), ended.is_set))
+    sharing.start()
+    try:
+        with contextlib.closing(MasterProxy(master, "/teacher")) as proxy:
+            beat = "/minirospy_class/Anna/now/beat"
+            wait_for(lambda: beat in proxy.get_param_names() and proxy.get_param(beat) >= 3)
+        with running_master(port), ToolNode(Environment.read(), "teacher") as node:
+            inbox: queue.Queue[Received] = queue.Queue()
+            node.measure("/minirospy_class", inbox.put)
+            found = json.loads(node.classes.read(inbox.get(timeout=60)).data)
+            assert found["student"] == "Anna"
+            ended.set()
+            sharing.join()
+    finally:
+        ended.set()
+        sharing.join()
+
+
+def test_silent_own_master_does_not_block_the_class(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The system accepts connections for a socket that listens, but nothing answers.
+    with socket.create_server(("localhost", 0)) as silent:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
+        record = Record.read(Environment.read())
+        record.student, record.master = "Anna", master
+        created: list[str] = []
+        monkeypatch.setattr("minirospy.course.share.ToolNode", lambda _, tool: created.append(tool))
+        ended = threading.Event()
+        sharing = threading.Thread(target=share, args=(record, Environment.read(), ended.is_set))
+        sharing.start()
+        try:
+            with contextlib.closing(MasterProxy(master, "/teacher")) as proxy:
+                beat = "/minirospy_class/Anna/now/beat"
+                wait_for(lambda: beat in proxy.get_param_names() and proxy.get_param(beat) >= 2)
+        finally:
+            ended.set()
+            sharing.join()
+    # A node would wait for the master for much longer.
+    assert not created
+
+
+def test_nodes_of_other_students_at_the_same_master_are_left_out(
+    master: str, share_as: Callable[[Record], Sharing]
+) -> None:
+    environment = Environment.read()
+    with ToolNode(environment, "check_share") as other:
+        other.publisher("/minirospy_class", message_class("std_msgs/String"), latch=True)
+        record = Record.read(environment)
+        record.student = "Anna"
+        found = share_as(record).message(lambda found: found["student"] == "Anna")
+    names = found["now"]["nodes"]
+    assert len(names) == 1
+    assert names[0].startswith("/teacher_")
+
+
+class Blinking:
+    """A board whose first LED changes at each turn, and the clock of share(), which advances only while it sleeps."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self.turns = 0
+
+    def __enter__(self) -> Blinking:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def get(self, pin: int) -> int:
+        return self.turns % 2 if pin == 2 and self.turns < 12 else 0
+
+    def monotonic(self) -> float:
+        return self.seconds
+
+    def sleep(self, seconds: float) -> None:
+        self.seconds += seconds
+        self.turns += 1
+
+
+@pytest.fixture
+def blinking(monkeypatch: pytest.MonkeyPatch) -> Blinking:
+    found = Blinking()
+    monkeypatch.setattr("minirospy.course.share.Board", lambda: found)
+    monkeypatch.setattr("minirospy.course.share.time", found)
+    return found
+
+
+def test_topic_has_at_most_one_message_per_second(
+    master: str, blinking: Blinking, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[tuple[float, str]] = []
+
+    def publish(_: TopicPublisher, message: Any) -> None:
+        sent.append((blinking.seconds, json.loads(message.data)["now"]["leds"]))
+
+    monkeypatch.setattr(TopicPublisher, "publish", publish)
+    share(Record.read(Environment.read()), Environment.read(), lambda: blinking.seconds > 4)
+    times = [seconds for seconds, _ in sent]
+    assert times[0] == 0
+    assert all(later - earlier > 0.99 for earlier, later in itertools.pairwise(times))
+    # The state after the last change is sent without waiting for the next heartbeat.
+    assert [leds for seconds, leds in sent if seconds > 2.3] == ["000000"]
+
+
+def test_unreachable_class_master_is_asked_once_for_each_state(
+    master: str, blinking: Blinking, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blinking.turns = 12  # nothing changes
+    tried: list[float] = []
+
+    def set_param(*_: object) -> None:
+        tried.append(blinking.seconds)
+        raise MasterUnreachableError(master, "test")
+
+    monkeypatch.setattr(MasterProxy, "set_param", set_param)
+    share(Record.read(Environment.read()), Environment.read(), lambda: blinking.seconds > 4)
+    assert len(tried) == 2
+    assert tried[1] >= 3
 
 
 def test_missing_master_is_an_error() -> None:

@@ -182,9 +182,9 @@ def test_class_is_read_from_parameters() -> None:
     """
     exercises, students = run_script("classTable", "js/classroom.js", body)
     assert exercises == ["count", "move_light", "__proto__"]
-    dark = {"passed": False, "ever": False, "failures": ["The LED lights: it stays dark"]}
+    dark = {"passed": False, "ever": False, "time": 0, "failures": ["The LED lights: it stays dark"]}
     assert students[:2] == [
-        ["<b>Anna</b>", {"count": {"passed": False, "ever": True, "failures": []}}, "000001", 2],
+        ["<b>Anna</b>", {"count": {"passed": False, "ever": True, "time": 0, "failures": []}}, "000001", 2],
         ["Ben", {"move_light": dark}, "", 0],
     ]
     assert [name for name, *_ in students] == ["<b>Anna</b>", "Ben", "hostile"]

@@ -7,6 +7,7 @@ Animations, skins, cameras and lights are ignored. So is ``up_axis``, as in Gaze
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -31,9 +32,11 @@ def parse_dae(data: bytes) -> list[Mesh]:
 
     Raise MeshError if the data is not Collada, refers to missing parts, or is too large.
     """
-    data, end, _ = data.partition(b"</COLLADA>")  # text after the end is ignored, as in ROS
+    end = re.search(rb"</COLLADA\s*>", data)
+    if end and end.end() < len(data):
+        data = data[: end.end()]  # text after the end is ignored, as in ROS
     try:
-        root = parse_xml(data + end)
+        root = parse_xml(data)
     except XmlError as error:
         raise MeshError(f"this is no Collada file: {error}") from None
     if _tag(root) != "COLLADA":

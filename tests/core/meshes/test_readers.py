@@ -169,6 +169,9 @@ def test_dae_has_units_transforms_and_colours() -> None:
 @pytest.mark.parametrize("rest", [b"\n", b"\0" * 100, b"</mesh></COLLADA>"])
 def test_text_after_the_end_of_a_dae_is_ignored(rest: bytes) -> None:
     assert len(parse_dae(DAE.encode() + rest)) == len(parse_dae(DAE.encode()))
+    assert len(parse_dae(DAE.replace("</COLLADA>", "</COLLADA \n>").encode() + rest)) == len(
+        parse_dae(DAE.encode())
+    )
 
 
 def test_dae_strips_fans_and_polygons() -> None:

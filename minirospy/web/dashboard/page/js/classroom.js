@@ -6,9 +6,12 @@ const TOPIC = "/minirospy_class";
 const TYPE = "std_msgs/String";
 const MAX_STUDENTS = 200;
 const MAX_EXERCISES = 100; // columns: the course has 15
+const MAX_NAME = 60; // characters of a student's name
 const MAX_NODES = 10; // of a student
 const MAX_FAILURES = 5; // of an exercise
 const MAX_TEXT = 300; // characters, as `minirospy check` cuts them
+const MAX_MESSAGE = 150_000; // characters: 15 exercises with MAX_FAILURES texts of MAX_TEXT, each as \u0000
+const RESULT = ["passed", "ever", "time", "number", "failures"]; // fields of an exercise
 const NAME = /^[A-Za-z0-9_]{1,64}$/;
 
 /**
@@ -21,25 +24,49 @@ export function classTopics(channels) {
 }
 
 /**
- * Read a message of such a topic. Return null if it is no student's.
+ * Read a message of such a topic; return only the parts that the table shows. Return null if it is no student's.
  * @param {string} text
  */
 export function readShared(text) {
+  if (text.length > MAX_MESSAGE) return null;
   try {
-    const found = JSON.parse(text);
-    return NAME.test(found.key) && typeof found.key === "string" ? found : null;
+    const { key, student, now, exercises } = JSON.parse(text);
+    if (typeof key !== "string" || !NAME.test(key)) return null;
+    const results = entries(exercises).filter(([name]) => NAME.test(name));
+    return {
+      key,
+      student: typeof student === "string" ? student.slice(0, MAX_NAME) : "",
+      now: only(now, ["leds", "buttons", "nodes", "beat"]),
+      // fromEntries, since an exercise may have the name __proto__.
+      exercises: Object.fromEntries(results.slice(0, MAX_EXERCISES).map(([name, each]) => [name, only(each, RESULT)])),
+    };
   } catch {
     return null;
   }
 }
 
 /**
+ * Store a topic's message. If there is no room, first drop those of topics that are no channels any more.
+ * @param {Map<string, any>} shared
+ * @param {string} topic
+ * @param {any} found as readShared returns it
+ * @param {(topic: string) => boolean} isChannel
+ */
+export function storeShared(shared, topic, found, isChannel) {
+  if (!shared.has(topic) && shared.size >= MAX_STUDENTS)
+    for (const each of [...shared.keys()]) if (!isChannel(each)) shared.delete(each);
+  if (shared.has(topic) || shared.size < MAX_STUDENTS) shared.set(topic, found);
+}
+
+/**
  * Return the exercises, in the order of the course, and the students, by name. Values of other kinds, which any node
- * may set, are left out. A student with a parameter and a topic has one row, with the topic's values.
+ * may set, are left out. A student with a parameter and a topic has one row, with the later state of the board and the
+ * later result of each exercise.
  * @param {Map<string, any>} parameters
  * @param {Map<string, any>} shared The last message of each topic, as readShared returns it.
+ * @param {(source: string, beat: number) => number} seenAt Return when a parameter's or topic's beat was first seen.
  */
-export function classTable(parameters, shared = new Map()) {
+export function classTable(parameters, shared = new Map(), seenAt = () => 0) {
   const students = new Map(); // id -> student
   const numbers = new Map(); // exercise -> its place in the course
   for (const [path, value] of parameters) {
@@ -49,6 +76,7 @@ export function classTable(parameters, shared = new Map()) {
     const student = studentOf(students, key, key);
     if (student) setPart(student, numbers, part, name, field, value);
   }
+  for (const student of students.values()) if (student.beat) student.at = seenAt(student.key, student.beat);
   for (const [topic, found] of shared) {
     const robot = topic.slice(1, -TOPIC.length);
     const known = students.get(found.key);
@@ -57,24 +85,54 @@ export function classTable(parameters, shared = new Map()) {
     if (!student) continue;
     student.topic = topic;
     student.robot = robot;
-    setPart(student, numbers, "student", "", "", found.student);
-    for (const [name, value] of entries(found.now)) setPart(student, numbers, "now", name, "", value);
+    const sent = newStudent(student.key, student.name);
+    if (found.student) setPart(sent, numbers, "student", "", "", found.student);
+    for (const [name, value] of entries(found.now)) setPart(sent, numbers, "now", name, "", value);
     for (const [name, result] of entries(found.exercises)) {
-      for (const [field, value] of entries(result)) setPart(student, numbers, "exercises", name, field, value);
+      for (const [field, value] of entries(result)) setPart(sent, numbers, "exercises", name, field, value);
     }
+    if (sent.beat) sent.at = seenAt(topic, sent.beat);
+    merge(student, sent);
   }
   const exercises = [...numbers.keys()].sort((a, b) => numbers.get(a) - numbers.get(b) || (a < b ? -1 : 1));
   const listed = [...students.values()].sort((a, b) => a.name.localeCompare(b.name) || (a.key < b.key ? -1 : 1));
   return { exercises, students: listed };
 }
 
+/** Add what a topic sent to a row that may already have the values of parameters. */
+function merge(student, sent) {
+  student.name = sent.name;
+  // Beats begin at 1 again when `minirospy check --share` is restarted, so the time is compared first.
+  if (sent.at > student.at || (sent.at === student.at && sent.beat >= student.beat)) {
+    const { leds, buttons, nodes, beat, at } = sent;
+    Object.assign(student, { leds, buttons, nodes, beat, at });
+  }
+  for (const [name, result] of sent.results) {
+    const old = student.results.get(name);
+    const ever = result.ever || old?.ever === true;
+    student.results.set(name, { ...(old && old.time > result.time ? old : result), ever });
+  }
+}
+
 /** Return the student with this id, a new one if there is room, else null. */
 function studentOf(students, id, name) {
   if (!students.has(id)) {
     if (students.size >= MAX_STUDENTS) return null;
-    students.set(id, { key: id, name, robot: "", results: new Map(), leds: "", buttons: "", nodes: [], beat: 0 });
+    students.set(id, newStudent(id, name));
   }
   return students.get(id);
+}
+
+/** Return a row without values; "at" is when its beat was first seen, -1 without one. */
+function newStudent(key, name) {
+  return { key, name, robot: "", results: new Map(), leds: "", buttons: "", nodes: [], beat: 0, at: -1 };
+}
+
+/** Return the texts, numbers and lists among the fields of a value, the lists cut. */
+function only(value, fields) {
+  const isPlain = (each) => Object(each) !== each || Array.isArray(each);
+  const found = entries(value).filter(([name, each]) => fields.includes(name) && isPlain(each));
+  return Object.fromEntries(found.map(([name, each]) => [name, Array.isArray(each) ? texts(each, MAX_NODES) : each]));
 }
 
 function entries(value) {
@@ -82,7 +140,7 @@ function entries(value) {
 }
 
 function setPart(student, numbers, part, name, field, value) {
-  if (part === "student" && typeof value === "string") student.name = value.slice(0, 60);
+  if (part === "student" && typeof value === "string") student.name = value.slice(0, MAX_NAME);
   else if (part === "now") setNow(student, name, value);
   else if (part === "exercises" && name && NAME.test(name)) setResult(student, numbers, name, field, value);
 }
@@ -98,10 +156,11 @@ function setResult(student, numbers, name, field, value) {
     if (numbers.size >= MAX_EXERCISES) return;
     numbers.set(name, Number.MAX_SAFE_INTEGER);
   }
-  if (!student.results.has(name)) student.results.set(name, { passed: false, ever: false, failures: [] });
+  if (!student.results.has(name)) student.results.set(name, { passed: false, ever: false, time: 0, failures: [] });
   const result = student.results.get(name);
   if (field === "number" && Number.isFinite(value)) numbers.set(name, Math.min(numbers.get(name), value));
   else if (["passed", "ever"].includes(field)) result[field] = value === true;
+  else if (field === "time" && Number.isFinite(value)) result.time = value;
   else if (field === "failures" && Array.isArray(value)) result.failures = texts(value, MAX_FAILURES);
 }
 

@@ -188,7 +188,9 @@ async function objectOf(link, uri, bytes) {
 
 async function readDae(link, uri, bytes) {
   // As in RViz, text after the end of the file is ignored.
-  const [text] = new TextDecoder().decode(bytes).split(/(?<=<\/COLLADA\s*>)/, 1);
+  const whole = new TextDecoder().decode(bytes);
+  const end = /<\/COLLADA\s*>/.exec(whole);
+  const text = end ? whole.slice(0, end.index + end[0].length) : whole;
   // The pictures come through the bridge, too: fetched first, since the loader wants addresses.
   const pictures = new Map();
   for (const [, name] of text.matchAll(/<init_from>(?:<ref>)?([^<]+\.(?:png|jpe?g|webp))/gi)) {
@@ -203,10 +205,14 @@ async function readDae(link, uri, bytes) {
   let areLoading = false;
   manager.onStart = () => (areLoading = true);
   const loaded = new Promise((resolve) => (manager.onLoad = () => resolve(undefined)));
-  const parsed = new ColladaLoader(manager).parse(text, "");
-  // A texture is black until its picture is there, and nothing would draw the scene again then.
-  if (areLoading) await loaded;
-  for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
+  let parsed;
+  try {
+    parsed = new ColladaLoader(manager).parse(text, "");
+    // A texture is black until its picture is there, and nothing would draw the scene again then.
+    if (areLoading) await loaded;
+  } finally {
+    for (const url of pictures.values()) if (url.startsWith("blob:")) URL.revokeObjectURL(url);
+  }
   if (!parsed) throw new Error(t("{name}: this is not a Collada file", { name: uri }));
   // The loader turns the file so that y is up. Robots' descriptions mean the coordinates as they are in the file, and
   // so does RViz.
@@ -221,15 +227,18 @@ async function readDae(link, uri, bytes) {
   // RViz gives the file's first material to a mesh without any.
   const replaced = first ?? bodyMaterial(GRAY);
   const known = (material) => (isMissing(material) ? replaced : material);
+  const materials = new Set();
   parsed.scene.traverse((/** @type {any} */ each) => {
     if (!each.isMesh) return;
     each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
-    for (const material of [each.material].flat()) {
-      setColors(material);
-      // RViz ignores <transparency>: some programs write 0 for opaque materials.
-      material.opacity = 1;
-    }
+    for (const material of [each.material].flat()) materials.add(material);
   });
+  // After the last call of isMissing, which looks at the map: meshes share materials.
+  for (const material of materials) {
+    setColors(material);
+    // RViz ignores <transparency>: some programs write 0 for opaque materials.
+    material.opacity = 1;
+  }
   const group = new Group();
   group.add(parsed.scene);
   return group;

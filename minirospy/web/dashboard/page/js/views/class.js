@@ -1,7 +1,7 @@
 // Class: the students at this master and in the fleet, with their boards and the exercises that each has passed. Only
 // shows.
 
-import { classTable, classTopics, readShared } from "../classroom.js";
+import { classTable, classTopics, readShared, storeShared } from "../classroom.js";
 import { h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
@@ -12,7 +12,7 @@ const GONE_MS = 10000; // without a beat of `minirospy check --share`, which com
 export class Class {
   constructor(link, words, main) {
     this.link = link;
-    this.beats = new Map(); // key -> {beat, at}
+    this.beats = new Map(); // topic, or key of a parameter -> {beat, at}
     this.shared = new Map(); // topic -> its last message; kept when the computer has left
     this.ends = new Map(); // topic -> what ends the subscription
     this.count = h("span", { class: "muted" });
@@ -58,10 +58,10 @@ export class Class {
       if (this.ends.has(topic)) continue;
       this.ends.set(
         topic,
-        this.link.subscribe({ topic, mode: "all" }, ({ lines = [] }) => {
-          const found = readShared(lines.at(-1)?.message.data ?? "");
+        this.link.subscribe({ topic, mode: "latest" }, ({ message }) => {
+          const found = readShared(message?.data ?? "");
           if (!found) return;
-          this.shared.set(topic, found);
+          storeShared(this.shared, topic, found, (each) => this.ends.has(each));
           this.update();
         }),
       );
@@ -70,15 +70,19 @@ export class Class {
 
   update() {
     this.follow();
-    const { exercises, students } = classTable(this.link.parameters, this.shared);
     const now = performance.now();
-    for (const { key, beat } of students) {
-      if (this.beats.get(key)?.beat !== beat) this.beats.set(key, { beat, at: now });
-    }
+    const beats = new Map();
+    const seenAt = (source, beat) => {
+      const old = this.beats.get(source);
+      beats.set(source, old?.beat === beat ? old : { beat, at: now });
+      return beats.get(source).at;
+    };
+    const { exercises, students } = classTable(this.link.parameters, this.shared, seenAt);
+    this.beats = beats;
     // Nothing is drawn again that has not changed, so that what a person has selected stays.
-    const isLive = (student) => student.beat > 0 && now - this.beats.get(student.key).at < GONE_MS;
+    const isLive = (student) => student.beat > 0 && now - student.at < GONE_MS;
     const live = students.filter(isLive).map(({ key }) => key);
-    const shown = students.map((each) => [{ ...each, beat: 0 }, [...each.results]]);
+    const shown = students.map((each) => [{ ...each, beat: 0, at: 0 }, [...each.results]]);
     const all = JSON.stringify([exercises, shown, live]);
     if (all === this.drawn) return;
     this.drawn = all;
