@@ -6,6 +6,7 @@ nanoseconds since the epoch.
 The main thread uses SignalSafeEvent, SignalSafeCondition and SignalSafeQueue instead of the classes of threading and queue.
 Those are written in Python: an exception from a signal handler, such as KeyboardInterrupt, can interrupt them after they have
 acquired their lock and before the block that releases it. The lock then stays locked, and other threads wait forever.
+docs/architecture.md lists the exceptions.
 """
 
 from __future__ import annotations

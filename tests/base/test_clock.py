@@ -145,7 +145,7 @@ def interrupted_at(
     def trace(frame: FrameType, kind: str, _: Any) -> Any:
         nonlocal steps
         # Python prints exceptions in finalizers, which the garbage collector may call here, instead of raising them.
-        if frame.f_code.co_filename not in (clock_module.__file__, contextlib.__file__, threading.__file__, __file__):
+        if frame.f_code.co_filename not in INTERRUPTED:
             return None
         frame.f_trace_opcodes = True
         if kind == "opcode" and (steps or has_begun()):
@@ -327,7 +327,10 @@ def unsafe_waits(text: str) -> list[str]:
 
 
 def test_no_module_waits_where_ctrl_c_would_leave_a_lock_locked() -> None:
-    """Use SignalSafeEvent and SignalSafeQueue. Enter a Condition's lock, which is written in C, not the Condition."""
+    """Use SignalSafeEvent and SignalSafeQueue. Enter a Condition's lock, which is written in C, not the Condition.
+
+    This finds constructors; it does not check which thread waits on a Condition.
+    """
     assert unsafe_waits("self.a = threading.Event()\nself.b = queue.Queue(3)\nc: C = threading.Condition()\n")
     for unsafe in (
         "a: threading.Event = field(default_factory=threading.Event)\n",
