@@ -53,6 +53,16 @@ def test_rospy_and_its_messages_can_be_imported_with_ros2_sourced(sourced: dict[
     assert done.stdout == "992ce8a1687cec8c8bd883ec73ca41d1 rosgraph_msgs/Log tf2_ros 0 1\n"
 
 
+def test_folder_without_a_module_hides_no_package(sourced: dict[str, str], tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    (source / "geometry_msgs").mkdir(parents=True)
+    path = os.pathsep.join([sourced["PYTHONPATH"], str(source)])
+    done = run(
+        "import rospy\nfrom geometry_msgs.msg import Pose\nprint(Pose._type)", {**sourced, "PYTHONPATH": path}
+    )
+    assert (done.stdout, done.returncode) == ("geometry_msgs/Pose\n", 0), done.stderr
+
+
 def test_messages_of_ros2_that_came_first_are_named_in_one_line(sourced: dict[str, str]) -> None:
     done = run("from std_msgs.msg import Thing\nimport rospy", sourced)
     assert done.returncode == 1

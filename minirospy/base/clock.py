@@ -6,6 +6,7 @@ nanoseconds since the epoch.
 The main thread uses SignalSafeEvent, SignalSafeCondition and SignalSafeQueue instead of the classes of threading and queue.
 Those are written in Python: an exception from a signal handler, such as KeyboardInterrupt, can interrupt them after they have
 acquired their lock and before the block that releases it. The lock then stays locked, and other threads wait forever.
+docs/architecture.md lists the exceptions.
 """
 
 from __future__ import annotations
@@ -72,7 +73,14 @@ class SignalSafeEvent(threading.Event):
         return self._is_set
 
     def set(self) -> None:
-        """Set the event, and wake the waiting threads."""
+        """Set the event, and wake the waiting threads, even if a signal handler raises an exception meanwhile."""
+        try:
+            self._set()
+        except BaseException:
+            self._set()
+            raise
+
+    def _set(self) -> None:
         # Set the flag before reading the list: a waiting thread first adds itself to the list and then checks the flag.
         self._is_set = True
         for lock in self._waiting.copy():
@@ -90,13 +98,15 @@ class SignalSafeEvent(threading.Event):
             return True
         lock = threading.Lock()
         lock.acquire()
-        self._waiting.append(lock)
         try:
+            self._waiting.append(lock)
             if self._is_set:
                 return True
             return lock.acquire(timeout=-1 if timeout is None else max(0.0, timeout)) or self._is_set
         finally:
-            self._waiting.remove(lock)
+            # The list lacks the lock if a signal handler raised an exception before the call of append().
+            if lock in self._waiting:
+                self._waiting.remove(lock)
 
 
 class SignalSafeCondition:
@@ -106,7 +116,17 @@ class SignalSafeCondition:
         self._waiting: list[SignalSafeEvent] = []
 
     def notify_all(self) -> None:
-        """Make the waiting threads call their predicates again. Call this after each change that may affect a predicate."""
+        """Let the waiting threads call their predicates again. Call this after each change that may affect one.
+
+        All threads are notified, even if a signal handler raises an exception meanwhile.
+        """
+        try:
+            self._notify_all()
+        except BaseException:
+            self._notify_all()
+            raise
+
+    def _notify_all(self) -> None:
         for event in self._waiting.copy():
             event.set()
 
@@ -115,10 +135,13 @@ class SignalSafeCondition:
 
         A signal can interrupt the wait on every OS.
         """
+        # Most calls need not wait, and creating an event takes longer than the call.
+        if predicate():
+            return True
         end = None if timeout is None else time.monotonic() + timeout
         event = SignalSafeEvent()
-        self._waiting.append(event)
         try:
+            self._waiting.append(event)
             while True:
                 # Clear the event before the call: a change after the call sets it again.
                 event.clear()
@@ -129,31 +152,36 @@ class SignalSafeCondition:
                     return False
                 wait_for_event(event, rest)
         finally:
-            self._waiting.remove(event)
+            if event in self._waiting:
+                self._waiting.remove(event)
 
 
 class SignalSafeQueue(Generic[_T]):
-    """A queue for at most ``size`` items. Signal handlers may use it, no matter what code the signal interrupts."""
+    """A queue for at most ``size`` items, which any thread may use, whichever code a signal interrupts.
+
+    If several threads put items at the same time, each may use the last place: the queue then exceeds its size by at most
+    the number of these threads minus 1.
+    """
 
     def __init__(self, size: int) -> None:
+        self._size = size
         # SimpleQueue is written in C: a signal handler runs only before or after its calls.
         self._items: queue.SimpleQueue[_T] = queue.SimpleQueue()
-        self._free: queue.SimpleQueue[None] = queue.SimpleQueue()  # holds one None per free slot
-        for _ in range(size):
-            self._free.put(None)
+        self._removed = SignalSafeCondition()
 
     def put(self, item: _T, timeout: float | None = None) -> None:
         """Append an item. Raise queue.Full if the queue is still full after ``timeout`` seconds."""
-        try:
-            self._free.get(timeout=timeout)
-        except queue.Empty:
-            raise queue.Full from None
+        if not self._removed.wait_for(lambda: self._items.qsize() < self._size, timeout):
+            raise queue.Full
         self._items.put(item)
 
     def get(self, timeout: float | None = None) -> _T:
         """Remove and return the first item. Raise queue.Empty if there is none after ``timeout`` seconds."""
+        # If an exception ended an earlier call before its notification, a thread may still wait to put an item.
+        if self._items.empty():
+            self._removed.notify_all()
         item = self._items.get(timeout=timeout)
-        self._free.put(None)
+        self._removed.notify_all()
         return item
 
 

@@ -70,7 +70,8 @@ def find_ros1(name: str, path: Sequence[str]) -> ModuleSpec | None:
     """Return the spec of the first top-level package on ``path`` that is not ROS 2's, or None if there is none."""
     for entry in path:
         found = PathFinder.find_spec(name, [entry])
-        if found is not None and not is_of_ros2(found):
+        # A folder without an __init__.py, whose spec has no loader, hides no package that comes later on the path.
+        if found is not None and found.loader is not None and not is_of_ros2(found):
             return found
     return None
 

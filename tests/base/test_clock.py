@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import queue
 import re
@@ -132,14 +133,23 @@ def test_event_wakes_every_thread_that_waits() -> None:
     assert not event.wait(-1)
 
 
-def interrupted_at(step: int, call: Callable[[], object]) -> bool:
-    """Call a function and raise KeyboardInterrupt in it before bytecode number ``step``. Return whether it had that many."""
+def interrupted_at(
+    step: int, call: Callable[[], object], has_begun: Callable[[], object] = lambda: True
+) -> bool:
+    """Call a function and raise KeyboardInterrupt in it before bytecode number ``step``. Return whether it had that many.
+
+    Count the bytecodes from the first before which ``has_begun()`` is true.
+    """
     steps = 0
 
     def trace(frame: FrameType, kind: str, _: Any) -> Any:
         nonlocal steps
+        # Python prints exceptions in finalizers, which the garbage collector may call here, instead of raising them.
+        if frame.f_code.co_filename not in INTERRUPTED:
+            return None
         frame.f_trace_opcodes = True
-        steps += kind == "opcode"
+        if kind == "opcode" and (steps or has_begun()):
+            steps += 1
         if steps == step:
             raise KeyboardInterrupt
         return trace
@@ -194,7 +204,116 @@ def test_interrupted_thread_leaves_the_others_free(
     assert step > 5
 
 
-UNSAFE = re.compile(r"\bthreading\.Event\(\)|=threading\.Event\)|\bqueue\.(?:Lifo|Priority)?Queue\(")
+def waiting_in(waited_for: object) -> list[Any]:
+    """Return the list of waiting threads: the only list among the attributes of an event or a condition."""
+    (waiting,) = (value for value in vars(waited_for).values() if isinstance(value, list))
+    return waiting
+
+
+def test_interrupted_wait_leaves_no_entry_in_the_list() -> None:
+    event, condition = SignalSafeEvent(), SignalSafeCondition()
+    assert interrupted_at(1, lambda: event.wait(0), lambda: waiting_in(event))
+    assert waiting_in(event) == []
+    assert interrupted_at(1, lambda: condition.wait_for(lambda: False, 0), lambda: waiting_in(condition))
+    assert waiting_in(condition) == []
+
+
+def all_wake_from_event(step: int) -> bool:
+    """Let threads wait for an event, and interrupt set() at bytecode ``step``. Return whether it had that many."""
+    event = SignalSafeEvent()
+    threads = [threading.Thread(target=event.wait, daemon=True) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    is_interrupted = interrupted_at(step, event.set, event.is_set)
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads), f"a thread sleeps forever, step {step}"
+    return is_interrupted
+
+
+def all_wake_from_condition(step: int) -> bool:
+    """Let threads wait for a condition, and interrupt notify_all() at bytecode ``step``. Return whether it had that many."""
+    condition = SignalSafeCondition()
+    is_over = False
+    called = threading.Semaphore(0)
+
+    def predicate() -> bool:
+        called.release()
+        return is_over
+
+    threads = [threading.Thread(target=condition.wait_for, args=(predicate,), daemon=True) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for _ in range(6):  # each thread calls its predicate before and after it enters the list
+        assert called.acquire(timeout=60)
+    events = waiting_in(condition).copy()
+    is_over = True
+    is_interrupted = interrupted_at(
+        step, condition.notify_all, lambda: any(event.is_set() for event in events)
+    )
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads), f"a thread sleeps forever, step {step}"
+    return is_interrupted
+
+
+@pytest.mark.parametrize("all_wake", [all_wake_from_event, all_wake_from_condition])
+def test_interrupted_call_wakes_all_threads(all_wake: Callable[[int], bool]) -> None:
+    """Interrupt set() or notify_all() at each bytecode after it has begun to wake threads."""
+    step = 1
+    while all_wake(step):
+        step += 1
+    assert step > 5
+
+
+def queue_keeps_its_size(step: int) -> bool:
+    """Interrupt get() and put() at bytecode ``step``, as often as the queue has places. Return whether get() had that many."""
+    size = 2
+    items: SignalSafeQueue[int] = SignalSafeQueue(size)
+    for number in range(size):
+        items.put(number)
+    is_interrupted = [interrupted_at(step, lambda: items.get(0)) for _ in range(size)]
+    with contextlib.suppress(queue.Full):
+        for _ in range(size):
+            interrupted_at(step, lambda: items.put(5, 0))
+    with contextlib.suppress(queue.Empty):
+        while True:
+            items.get(0)
+    for number in range(size):
+        items.put(number, 0)
+    with pytest.raises(queue.Full):
+        items.put(size, 0)
+    assert [items.get(0) for _ in range(size)] == list(range(size))
+    return any(is_interrupted)
+
+
+def waiting_put_ends(step: int) -> bool:
+    """Let a thread wait to put an item, and interrupt get() at bytecode ``step``. Return whether it had that many."""
+    items: SignalSafeQueue[int] = SignalSafeQueue(1)
+    items.put(1)
+    putting = threading.Thread(target=items.put, args=(2,), daemon=True)
+    putting.start()
+    is_interrupted = interrupted_at(step, lambda: items.get(60))
+    assert items.get(60) in (1, 2)
+    putting.join(60)
+    assert not putting.is_alive(), f"the thread waits forever, step {step}"
+    return is_interrupted
+
+
+@pytest.mark.parametrize("survives", [queue_keeps_its_size, waiting_put_ends])
+def test_queue_survives_interrupted_calls(survives: Callable[[int], bool]) -> None:
+    step = 1
+    while survives(step):
+        step += 1
+    assert step > 5
+
+
+UNSAFE = re.compile(
+    r"\bthreading\.Event\(\)|=threading\.(?:Event|Condition)\b|\bqueue\.(?:Lifo|Priority)?Queue\("
+    r"|^ *from threading import (?:\([^)]*|.*)\b(?:Event|Condition)\b"
+    r"|^ *from queue import (?:\([^)]*|.*)\b(?:Lifo|Priority)?Queue\b",
+    re.MULTILINE,
+)
 CONDITION = re.compile(r"(\S+)(?:: \S+)? = threading\.Condition\((.*)\)$", re.MULTILINE)
 SOURCES = Path(clock_module.__file__).parents[1]
 
@@ -208,8 +327,21 @@ def unsafe_waits(text: str) -> list[str]:
 
 
 def test_no_module_waits_where_ctrl_c_would_leave_a_lock_locked() -> None:
-    """Use SignalSafeEvent and SignalSafeQueue. Enter a Condition's lock, which is written in C, not the Condition."""
+    """Use SignalSafeEvent and SignalSafeQueue. Enter a Condition's lock, which is written in C, not the Condition.
+
+    This finds constructors; it does not check which thread waits on a Condition.
+    """
     assert unsafe_waits("self.a = threading.Event()\nself.b = queue.Queue(3)\nc: C = threading.Condition()\n")
+    for unsafe in (
+        "a: threading.Event = field(default_factory=threading.Event)\n",
+        "a: C = field(default_factory=threading.Condition, repr=False)\n",
+        "    from threading import Event\n",
+        "from threading import Lock, Condition as C\n",
+        "from threading import (\n    Event,\n)\n",
+        "from queue import Empty, Queue\n",
+    ):
+        assert unsafe_waits(unsafe), unsafe
+    assert not unsafe_waits("from threading import Lock, Thread\nfrom queue import Empty, SimpleQueue\n")
     assert unsafe_waits("self.a = threading.Condition(self.b)\nwith self.a:\n    pass\n") == ["self.a"]
     assert not unsafe_waits("self.a = threading.Condition(self.b)\nwith self.b:\n    self.a.wait()\n")
     found = {

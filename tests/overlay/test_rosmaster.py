@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import pytest
 import rosgraph
 import rosmaster
 import rosmaster.master
+import rosmaster.threadpool
 import roswtf
 
 
@@ -34,3 +38,36 @@ def test_names() -> None:
     assert rosmaster.DEFAULT_MASTER_PORT == 11311
     assert callable(rosmaster.rosmaster_main)
     assert callable(roswtf.roswtf_main)
+
+
+def test_main_thread_joins_a_pool_without_waiting_on_a_condition(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Ctrl-C while Condition.wait() releases the lock would raise RuntimeError."""
+    wait = threading.Condition.wait
+
+    def wait_elsewhere(condition: threading.Condition, timeout: float | None = None) -> bool:
+        assert threading.get_ident() != joining
+        return wait(condition, timeout)
+
+    joining = threading.get_ident()
+    pool = rosmaster.threadpool.MarkedThreadPool(1)
+    held, done = threading.Event(), threading.Event()
+    pool.queue_task("slow", held.wait, (60,))
+    pool.queue_task("slow", done.set)
+
+    def release() -> None:
+        # The pool accepts no number of threads while join_all() waits.
+        while pool.set_thread_count(1):
+            time.sleep(0.001)
+        held.set()
+
+    thread = threading.Thread(target=release, daemon=True)
+    thread.start()
+    with monkeypatch.context() as patched:
+        patched.setattr(threading.Condition, "wait", wait_elsewhere)
+        pool.join_all()
+    assert done.is_set()
+    assert pool.get_thread_count() == 0
+    assert pool.set_thread_count(1)
+    pool.join_all()
+    thread.join(60)
+    assert not thread.is_alive()

@@ -26,6 +26,7 @@ from smach.util import CBInterface
 from std_msgs.msg import String
 from std_srvs.srv import SetBoolRequest, SetBoolResponse
 
+from minirospy.base.clock import SignalSafeCondition
 from minirospy.ros.smach_ros.smach_ros.pickled import pickle_userdata, unpickle_userdata
 
 PROGRAMS = Path(__file__).parent / "smach_programs"
@@ -115,6 +116,19 @@ def test_concurrence_that_is_to_end_before_it_starts_ends_its_states() -> None:
         smach.Concurrence.add("CHILD", child)
     made.request_preempt()
     assert made.execute() == "preempted"
+
+
+def test_concurrence_does_not_wait_after_a_shutdown(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = threading.Event()
+    child = state_of(lambda ud: ended.wait(60) and "done", "done")
+    child.request_preempt = ended.set  # type: ignore[method-assign,assignment]
+    made = smach.Concurrence(["done"], "done")
+    with made:
+        smach.Concurrence.add("CHILD", child)
+    monkeypatch.setattr("minirospy.ros.smach.smach.concurrence.is_shutdown", lambda: True)
+    monkeypatch.setattr(SignalSafeCondition, "wait_for", lambda *args: pytest.fail("it waits"))
+    assert made.execute() == "done"
+    assert ended.is_set()
 
 
 def test_outcome_map_of_a_state_that_is_not_there_is_logged(logged: list[str]) -> None:

@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
+from minirospy.base.clock import SignalSafeCondition
+
 __all__ = ["MarkedThreadPool"]
 
 
@@ -26,6 +28,8 @@ class MarkedThreadPool:
     def __init__(self, numThreads: int) -> None:
         self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)
+        self._removed = SignalSafeCondition()
+        """Notified after each removal of a task or thread; join_all() waits for it, also in the main thread."""
         self._tasks: list[_Task] = []
         self._markers: list[object] = []
         self._threads: list[threading.Thread] = []
@@ -64,8 +68,9 @@ class MarkedThreadPool:
         """Stop the threads, first running the queued tasks if requested. The pool can be reused afterwards."""
         with self._lock:
             self._is_joining = True
-            while wait_for_tasks and self._tasks and self._threads:
-                self._changed.wait()
+        if wait_for_tasks:
+            self._removed.wait_for(lambda: not (self._tasks and self._threads))
+        with self._lock:
             threads = list(self._threads)
             self._resize(0)
         for thread in threads if wait_for_threads else ():
@@ -81,6 +86,7 @@ class MarkedThreadPool:
             thread.start()
         del self._threads[: len(self._threads) - count]
         self._changed.notify_all()
+        self._removed.notify_all()
 
     def _work(self) -> None:
         while task := self._next():
@@ -104,6 +110,7 @@ class MarkedThreadPool:
                         self._tasks.remove(task)
                         self._markers.append(task.marker)
                         self._changed.notify_all()
+                        self._removed.notify_all()
                         return task
                 self._changed.wait()
         return None

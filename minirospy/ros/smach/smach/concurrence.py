@@ -140,8 +140,8 @@ class Concurrence(Container):
         for thread in self._threads.values():
             thread.start()
 
-        while not self._done.wait_for(lambda: self._is_ending or self.preempt_requested(), _SHUTDOWN_CHECK):
-            if is_shutdown():
+        while not is_shutdown():
+            if self._done.wait_for(lambda: self._is_ending or self.preempt_requested(), _SHUTDOWN_CHECK):
                 break
         logdebug("SMACH Concurrence preempting running states.")
         for label, state in self._states.items():
