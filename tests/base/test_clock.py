@@ -133,13 +133,27 @@ def test_event_wakes_every_thread_that_waits() -> None:
     assert not event.wait(-1)
 
 
+INTERRUPTED = {clock_module.__file__, __file__}
+
+
 def interrupted_at(
     step: int, call: Callable[[], object], has_begun: Callable[[], object] = lambda: True
 ) -> bool:
     """Call a function and raise KeyboardInterrupt in it before bytecode number ``step``. Return whether it had that many.
 
-    Count the bytecodes from the first before which ``has_begun()`` is true.
+    Count the bytecodes from the first before which ``has_begun()`` is true. The function runs in a thread, because an
+    exception that is raised at the end of an ``except`` block remains the context of the thread's later ones.
     """
+    results: list[bool] = []
+    thread = threading.Thread(
+        target=lambda: results.append(_interrupted_at(step, call, has_begun)), daemon=True
+    )
+    thread.start()
+    thread.join(100)
+    return results[0]
+
+
+def _interrupted_at(step: int, call: Callable[[], object], has_begun: Callable[[], object]) -> bool:
     steps = 0
 
     def trace(frame: FrameType, kind: str, _: Any) -> Any:
