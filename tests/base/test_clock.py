@@ -133,6 +133,9 @@ def test_event_wakes_every_thread_that_waits() -> None:
     assert not event.wait(-1)
 
 
+INTERRUPTED = (__file__, clock_module.__file__, contextlib.__file__, threading.__file__)
+
+
 def interrupted_at(
     step: int, call: Callable[[], object], has_begun: Callable[[], object] = lambda: True
 ) -> bool:
