@@ -57,7 +57,9 @@ def test_folder_without_a_module_hides_no_package(sourced: dict[str, str], tmp_p
     source = tmp_path / "source"
     (source / "geometry_msgs").mkdir(parents=True)
     path = os.pathsep.join([sourced["PYTHONPATH"], str(source)])
-    done = run("import rospy\nfrom geometry_msgs.msg import Pose\nprint(Pose._type)", {**sourced, "PYTHONPATH": path})
+    done = run(
+        "import rospy\nfrom geometry_msgs.msg import Pose\nprint(Pose._type)", {**sourced, "PYTHONPATH": path}
+    )
     assert (done.stdout, done.returncode) == ("geometry_msgs/Pose\n", 0), done.stderr
 
 
