@@ -138,8 +138,7 @@ $(STAMP): $(PROGRAMS)
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
 
 # The run of the tests reports what cannot be collected.
-COLLECT := $(BIN)/python -m pytest -p no:terminal -o addopts=--import-mode=importlib --collect-only
-$(COMPILED): unexport PYTEST_ADDOPTS
+COLLECT := PYTEST_ADDOPTS= $(BIN)/python -m pytest -p no:terminal -o addopts=--import-mode=importlib --collect-only
 $(VENV)/.compiled-core: | $(READY)
 	@$(COLLECT) $(COMPILED_CORE) || :
 	@$(PYTHON) -c "open('$@', 'w').close()"
