@@ -59,9 +59,12 @@ def compile_below(root, target):
 
 def load(name, kinds=("msg", "srv")):
     """Return the class of ``pkg/Name``, made at run time or from a module; a service's request and response are found in srv."""
+    return LOADED[name] if name in LOADED else from_module(name, kinds)
+
+
+def from_module(name, kinds):
+    """Return the class of ``pkg/Name`` from a module."""
     package, short = name.split("/")
-    if name in LOADED:
-        return LOADED[name]
     for kind in kinds:
         try:
             found = getattr(import_module(package + "." + kind), short, None)
@@ -129,7 +132,8 @@ def described(data_class):
 def describe(argument):
     """Return the properties of each type's class, for modules of these kinds ("msg", "srv")."""
     names, kinds = argument
-    return {name: described(load(name, kinds)) for name in names}
+    # Not those made at run time: a test of such a class may have run before in this process.
+    return {name: described(from_module(name, kinds)) for name in names}
 
 
 def dynamic(argument):
