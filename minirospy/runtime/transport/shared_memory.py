@@ -1,4 +1,6 @@
-"""Whether two processes can share memory for large messages, and the reason if they cannot. Linux only; both have the same user.
+"""Finds out whether two processes can share memory for large messages, and the reason if they cannot. Linux only.
+
+Both processes must have the same user.
 
 The publisher's end of such a connection is in :mod:`minirospy.runtime.transport.ring_sender`, the subscriber's in
 :mod:`minirospy.runtime.transport.ring_receiver`. Source: docs/shared_memory.md.
