@@ -14,10 +14,7 @@ import sys
 
 from minirospy.runtime.transport.sockets import peer
 
-__all__ = ["FIELD", "ascii_text", "is_possible", "may_share", "obstacle", "why_impossible"]
-
-FIELD = "shared_memory"
-"""The field of the connection header by which a subscriber declares that it can read from a ring."""
+__all__ = ["ascii_text", "is_possible", "may_share", "obstacle", "why_impossible"]
 
 
 def is_possible() -> bool:
