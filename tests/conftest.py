@@ -69,6 +69,14 @@ def write_files(folder: Path, texts: Mapping[str, str], executable: Collection[s
             file.chmod(0o755)
 
 
+def modules_loaded_by(code: str) -> set[str]:
+    """Run code in a new process, where it may print but write no error; return the names of the modules loaded at its end."""
+    program = f"{code}\nimport sys\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return set(done.stdout.splitlines()[-1].split())
+
+
 def free_port() -> int:
     """Return a port without a listener, for a server that another process starts, or that is restarted.
 

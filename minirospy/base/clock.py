@@ -12,6 +12,7 @@ docs/architecture.md lists the exceptions.
 from __future__ import annotations
 
 import contextlib
+import functools
 import queue
 import struct
 import sys
@@ -54,6 +55,23 @@ SILENT_CLOCK = (
 """The warning that no time has arrived on /clock."""
 
 
+def _repeated_if_interrupted(method: Callable[[_T], None]) -> Callable[[_T], None]:
+    """Let a method, which wakes all waiting threads, start again if a signal handler raises an exception in it.
+
+    Otherwise some of the threads would sleep forever. The exception is raised after that.
+    """
+
+    @functools.wraps(method)
+    def call(self: _T) -> None:
+        try:
+            method(self)
+        except BaseException:
+            method(self)
+            raise
+
+    return call
+
+
 class SignalSafeEvent(threading.Event):
     """An event that a signal handler may set or wait for, no matter what code the signal interrupts.
 
@@ -72,15 +90,9 @@ class SignalSafeEvent(threading.Event):
         """Return whether the event is set."""
         return self._is_set
 
+    @_repeated_if_interrupted
     def set(self) -> None:
         """Set the event, and wake the waiting threads, even if a signal handler raises an exception meanwhile."""
-        try:
-            self._set()
-        except BaseException:
-            self._set()
-            raise
-
-    def _set(self) -> None:
         # Set the flag before reading the list: a waiting thread first adds itself to the list and then checks the flag.
         self._is_set = True
         for lock in self._waiting.copy():
@@ -115,18 +127,12 @@ class SignalSafeCondition:
     def __init__(self) -> None:
         self._waiting: list[SignalSafeEvent] = []
 
+    @_repeated_if_interrupted
     def notify_all(self) -> None:
         """Let the waiting threads call their predicates again. Call this after each change that may affect one.
 
         All threads are notified, even if a signal handler raises an exception meanwhile.
         """
-        try:
-            self._notify_all()
-        except BaseException:
-            self._notify_all()
-            raise
-
-    def _notify_all(self) -> None:
         for event in self._waiting.copy():
             event.set()
 

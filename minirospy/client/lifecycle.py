@@ -76,7 +76,7 @@ class Lifecycle:
         # Called after ``hooks``, including hooks added by other hooks
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
-        """called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls"""
+        """Called after is_shutdown() has become true and before the node leaves the graph, to end blocking calls."""
 
         self.spin_shuts_down = True  # False in a notebook: there, an interrupt ends spin(), but not the node
         self.has_waited = False  # True after a thread has waited or slept in a rospy call

@@ -64,7 +64,7 @@ class TypedName(NamedTuple):
 
 
 class NodeDetail(NamedTuple):
-    """What a node has registered at the master."""
+    """The registrations of a node at the master."""
 
     name: str
     uri: str | None

@@ -21,7 +21,7 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 
 @dataclass(frozen=True)
 class TypeRule:
-    """How a ROS 1 type differs from the corresponding ROS 2 type.
+    """The differences between a ROS 1 type and the corresponding ROS 2 type.
 
     ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields. If
     ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side

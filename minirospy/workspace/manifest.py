@@ -45,7 +45,7 @@ PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
 
 
 class Kind(Enum):
-    """What a dependency is needed for. The value is the tag in formats 2 and 3."""
+    """The purpose of a dependency. The value is the tag in formats 2 and 3."""
 
     BUILD = "build_depend"
     BUILD_EXPORT = "build_export_depend"

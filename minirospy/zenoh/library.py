@@ -37,10 +37,11 @@ _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
 _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
 _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in _POOLS.items())})"
-"""Value of ZENOH_RUNTIME. Many threads, because Zenoh sets SO_LINGER to 10 s: closing a dead link blocks a thread.
+"""Value of ZENOH_RUNTIME. Many threads receive, because Zenoh sets SO_LINGER to 10 s: closing a dead link blocks a thread.
 
-Measured: the simultaneous loss of 100 robots is noticed after 30 s with 32 threads in each pool, and after 11 s with 128
-threads in rx. The lease is 10 s.
+`linger.py` removes that option, except on Windows, but Zenoh may close a link before that. Measured without `linger.py`: the
+simultaneous loss of 100 robots was noticed after 30 s with 32 threads in rx, and after 11 s with 128 threads. The lease is
+10 s. The pool has twice as many threads, for larger fleets.
 """
 CONNECT_MS = 3000
 

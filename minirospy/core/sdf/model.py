@@ -190,7 +190,6 @@ class Sensor:
     element: Element
     pose: Pose = IDENTITY
     update_rate: float = 0.0  # measurements per second; 0: one in each step
-    is_always_on: bool = False
     topic: str = ""
     plugins: tuple[Plugin, ...] = ()
 
@@ -220,7 +219,6 @@ class Link:
     sensors: tuple[Sensor, ...] = ()
     lights: tuple[Light, ...] = ()
     has_gravity: bool = True
-    is_kinematic: bool = False
     self_collide: bool = False
     linear_damping: float = 0.0
     angular_damping: float = 0.0

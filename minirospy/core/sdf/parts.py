@@ -67,7 +67,6 @@ def read_sensor(element: Element, pose: Pose, source: Source) -> Sensor | None:
         element,
         pose,
         source.amount(element, "update_rate", 0.0, infinite=True),
-        source.flag(element, "always_on", False),
         source.text(element, "topic"),
         read_plugins(element, source),
     )

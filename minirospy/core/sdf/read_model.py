@@ -286,7 +286,6 @@ class _Reader:
             self._parts(element, "sensor", read_sensor, pose_of),
             self._parts(element, "light", read_light, pose_of),
             source.flag(element, "gravity", True),
-            source.flag(element, "kinematic", False),
             source.flag(element, "self_collide", self_collide),
             source.amount(decay, "linear", 0.0),
             source.amount(decay, "angular", 0.0),

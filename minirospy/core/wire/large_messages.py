@@ -1,4 +1,4 @@
-"""How a publisher sent large messages to a subscriber, as text in getBusInfo.
+"""The text in getBusInfo that states how a publisher sent large messages to a subscriber.
 
 It is not part of :mod:`minirospy.core.wire.ring`, because every program imports it, and `import rospy` must be fast.
 """

@@ -44,7 +44,7 @@ class MapError(MinirospyError):
 
 
 class Mode(Enum):
-    """How to convert gray levels to occupancy."""
+    """The rule that converts gray levels to occupancy."""
 
     TRINARY = "trinary"
     SCALE = "scale"

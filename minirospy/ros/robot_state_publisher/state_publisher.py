@@ -24,7 +24,7 @@ from minirospy.ros.robot_state_publisher.frames import LinkPose, RobotFrames, pr
 __all__ = ["StatePublisher", "main"]
 
 _AHEAD = rospy.Duration(0, 500_000_000)
-"""How far in the future to stamp fixed frames on /tf, so that they stay valid until the next message."""
+"""Fixed frames on /tf have stamps this far in the future, so that they stay valid until the next message."""
 
 _OLD = rospy.Duration(30)
 _CONNECT_SECONDS = 0.5

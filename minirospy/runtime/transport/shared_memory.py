@@ -1,4 +1,6 @@
-"""Whether two processes can share memory for large messages, and the reason if they cannot. Linux only; both have the same user.
+"""Finds out whether two processes can share memory for large messages, and the reason if they cannot. Linux only.
+
+Both processes must have the same user.
 
 The publisher's end of such a connection is in :mod:`minirospy.runtime.transport.ring_sender`, the subscriber's in
 :mod:`minirospy.runtime.transport.ring_receiver`. Source: docs/shared_memory.md.
@@ -12,10 +14,7 @@ import sys
 
 from minirospy.runtime.transport.sockets import peer
 
-__all__ = ["FIELD", "ascii_text", "is_possible", "may_share", "obstacle", "why_impossible"]
-
-FIELD = "shared_memory"
-"""The field of the connection header by which a subscriber declares that it can read from a ring."""
+__all__ = ["ascii_text", "is_possible", "may_share", "obstacle", "why_impossible"]
 
 
 def is_possible() -> bool:

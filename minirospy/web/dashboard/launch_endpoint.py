@@ -36,7 +36,7 @@ _LOG_SECONDS = 0.2
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""maximum number of launches kept after they have ended, each with its last lines of output"""
+"""Maximum number of launches kept after they have ended, each with its last lines of output."""
 
 _TAIL_BYTES = 64 * 1024
 

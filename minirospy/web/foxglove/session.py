@@ -42,13 +42,13 @@ __all__ = ["FoxgloveServer", "FoxgloveSession"]
 _log = logging.getLogger(__name__)
 
 _MAX_CALLS = 200
-"""maximum number of concurrent calls and requests per client"""
+"""Maximum number of concurrent calls and requests per client."""
 
 _MAX_CHANNELS = 1000
 """Maximum number of topics that a client may publish, and maximum number of its subscriptions, which all get every message."""
 
 _MAX_PARAMETERS = 10_000
-"""maximum number of parameters that a client may subscribe to by name"""
+"""Maximum number of parameters that a client may subscribe to by name."""
 
 # maximum number of status messages per client message, which may contain thousands of invalid channels
 _MAX_STATUSES = 100

@@ -39,7 +39,7 @@ class Share:
         self.large = 0
         """Total bytes of the large pieces queued for this client. Other clients may share the same pieces."""
         self.shed = shed
-        """called to release some or all of the client's memory"""
+        """Called to release some or all of the client's memory."""
         self._account = account
 
     @property

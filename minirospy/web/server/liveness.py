@@ -8,7 +8,7 @@ __all__ = ["Liveness", "Verdict"]
 
 
 class Verdict(Enum):
-    """What to do with the client, as the result of a check."""
+    """The result of a check: an action for the client."""
 
     PING = auto()
     """Send a ping."""

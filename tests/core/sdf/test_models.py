@@ -320,11 +320,10 @@ class TestLinks:
         link = read('<link name="a"/>').links["a"]
         assert link.inertial == Inertial(1.0, Pose(), (1, 0, 0, 1, 0, 1))
         assert link.has_gravity
-        assert not link.is_kinematic
         assert not link.self_collide
 
     def test_values(self) -> None:
-        body = """<self_collide>1</self_collide><link name="a"><gravity>0</gravity><kinematic>true</kinematic>
+        body = """<self_collide>1</self_collide><link name="a"><gravity>0</gravity>
             <velocity_decay><linear>0.1</linear><angular>0.2</angular></velocity_decay>
             <inertial><pose>0 0 1 0 0 0</pose><mass>3</mass>
             <inertia><ixx>1</ixx><ixy>2</ixy><ixz>3</ixz><iyy>4</iyy><iyz>5</iyz><izz>6</izz></inertia></inertial>
@@ -332,7 +331,7 @@ class TestLinks:
             </link>"""
         link = read(body).links["a"]
         assert link.inertial == Inertial(3.0, Pose((0, 0, 1)), (1, 2, 3, 4, 5, 6))
-        assert (link.has_gravity, link.is_kinematic, link.self_collide) == (False, True, True)
+        assert (link.has_gravity, link.self_collide) == (False, True)
         assert (link.linear_damping, link.angular_damping) == (0.1, 0.2)
         assert [(light.name, light.kind, light.range) for light in link.lights] == [("l", "spot", 5.0)]
 
@@ -352,18 +351,12 @@ class TestLinks:
         assert "link [a] gets the inertia of SDF's default" in model.warnings[0]
 
     def test_sensors_and_plugins(self) -> None:
-        body = """<link name="a"><sensor name="s" type="ray"><always_on>1</always_on><update_rate>20</update_rate>
+        body = """<link name="a"><sensor name="s" type="ray"><update_rate>20</update_rate>
             <topic>t</topic><pose>0 0 1 0 0 0</pose><plugin name="p" filename="libgazebo_ros_laser.so"/></sensor>
             <sensor name="broken"/></link><plugin name="q" filename="lib/own/libdrive.dylib"/><plugin name="r"/>"""
         model = read(body)
         sensor = model.links["a"].sensors[0]
-        assert (sensor.name, sensor.kind, sensor.is_always_on, sensor.update_rate, sensor.topic) == (
-            "s",
-            "ray",
-            True,
-            20.0,
-            "t",
-        )
+        assert (sensor.name, sensor.kind, sensor.update_rate, sensor.topic) == ("s", "ray", 20.0, "t")
         assert [plugin.library for plugin in (*sensor.plugins, *model.plugins)] == [
             "gazebo_ros_laser",
             "drive",

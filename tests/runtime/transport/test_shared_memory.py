@@ -27,6 +27,7 @@ from minirospy.runtime.node.publication import Publication
 from minirospy.runtime.transport import readers, ring_sender, shared_memory, sockets
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.ring_receiver import RingReceiver
+from tests.runtime.transport.conftest import no_memory, refuse
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.skipif(
@@ -544,14 +545,6 @@ def no_memfd(_name: str, _flags: int) -> int:
     raise OSError("no memfd here")
 
 
-def no_memory(_file: int, _offset: int, _size: int) -> None:
-    raise OSError("no space left")
-
-
-def no_map(*_: Any, **__: Any) -> mmap.mmap:
-    raise OSError("no mapping here")
-
-
 @pytest.mark.parametrize(
     ("name", "broken"),
     [("memfd_create", no_memfd), ("posix_fallocate", no_memory), ("eventfd", no_memfd)],
@@ -581,12 +574,6 @@ def test_a_subscriber_that_cannot_map_uses_the_socket(mouth: Mouth, monkeypatch:
     ear.wait(count + 10)
     assert list(map(bytes, ear.frames[count:])) == list(map(whole, frames))
     ear.close()
-
-
-def refuse(self: RingReceiver, sock: socket.socket, _data: bytes) -> None:
-    self.expects_files = False
-    self.close()
-    sock.send(ring.REFUSED)
 
 
 def test_a_subscriber_of_another_user_uses_the_socket(mouth: Mouth, monkeypatch: pytest.MonkeyPatch) -> None:

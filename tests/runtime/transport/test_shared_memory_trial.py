@@ -5,16 +5,15 @@ from __future__ import annotations
 import contextlib
 import mmap
 import os
-import socket
 import sys
 from typing import Any
 
 import pytest
 
-from minirospy.core.wire import ring
 from minirospy.runtime.transport import shared_memory
 from minirospy.runtime.transport.ring_receiver import RingReceiver
 from minirospy.runtime.transport.shared_memory_trial import try_out
+from tests.runtime.transport.conftest import no_map, no_memory, refuse
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not shared_memory.is_possible(), reason="rings need Linux"
@@ -38,20 +37,6 @@ def test_shared_memory_is_tried_out() -> None:
 
 def forbidden(*_: Any) -> Any:
     raise PermissionError(1, "Operation not permitted")
-
-
-def no_memory(_file: int, _offset: int, _size: int) -> None:
-    raise OSError("no space left")
-
-
-def no_map(*_: Any, **__: Any) -> mmap.mmap:
-    raise OSError("no mapping here")
-
-
-def refuse(self: RingReceiver, sock: socket.socket, _data: bytes) -> None:
-    self.expects_files = False
-    self.close()
-    sock.send(ring.REFUSED)
 
 
 @pytest.mark.parametrize(

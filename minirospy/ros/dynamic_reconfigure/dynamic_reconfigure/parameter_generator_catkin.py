@@ -61,7 +61,7 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """As in ROS, raise Exception if a description contains a quote: ROS's C++ header cannot represent one."""
+    """Raise Exception if a description contains a quote, as ROS does: its C++ header cannot represent one."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 

@@ -398,7 +398,6 @@ class SimModel:
         self.record = record
         self.built = built
         self.start = start  # the pose that reset() restores
-        self.is_removed = False
         self.links: Mapping[str, SimLink] = {
             key: SimLink(engine, self, link) for key, link in record.links.items()
         }

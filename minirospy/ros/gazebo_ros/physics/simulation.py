@@ -251,7 +251,6 @@ class Simulation:
 
     def _drop(self, model: SimModel) -> None:
         self._builder.delete(model.built)
-        model.is_removed = True
         del self._models[model.name]
         self.forced.pop(model.name, None)
 

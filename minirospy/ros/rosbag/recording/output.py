@@ -46,7 +46,7 @@ class Controls(Protocol):
 
 
 class Output(Protocol):
-    """Where a player sends its messages. All methods are called in the player's thread."""
+    """The destination of a player's messages. All methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
         """Prepare the output. When its connection to the graph shuts down, end the player.

@@ -25,7 +25,7 @@ _BATCHES = 8
 
 
 class Selection(NamedTuple):
-    """Which messages to play: the topics (empty: all), and the times ``start`` and ``end`` (None: no limit)."""
+    """The messages to play: those of the topics (empty: all) between the times ``start`` and ``end`` (None: no limit)."""
 
     topics: Collection[str] = ()
     start: int | None = None

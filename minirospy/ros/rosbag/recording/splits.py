@@ -14,7 +14,7 @@ _MAX_EMPTY = 100  # maximum number of empty files to write after a long gap with
 
 
 class Next(enum.Enum):
-    """What to do before recording a message."""
+    """The action before a message is recorded."""
 
     CONTINUE = enum.auto()
     SPLIT = enum.auto()  # close the file and continue in the next one
