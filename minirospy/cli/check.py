@@ -280,8 +280,8 @@ def _state(record: Record, exercise: Exercise) -> str:
 
 def _show_class(uri: str) -> int:
     from minirospy.base.escape import escaped
+    from minirospy.course.classroom import class_table, gather
     from minirospy.course.exercise import built_in_names
-    from minirospy.course.results import class_table, gather
 
     students = gather(uri)
     if not students:

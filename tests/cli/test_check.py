@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.environment import Environment
+from minirospy.course.classroom import gather
 from minirospy.course.exercise import built_in_names
-from minirospy.course.results import CLASS_PARAMETER, Record, gather
+from minirospy.course.results import CLASS_PARAMETER, Record
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 from .conftest import Command
