@@ -215,14 +215,15 @@ def parameter_key(name: str) -> str:
 
 
 def result_of(found: Mapping[str, object]) -> Result:
-    failures = found.get("failures", [])
-    texts = (
-        tuple(str(each)[:_MAX_LETTERS] for each in failures[:_MAX_FAILURES])
-        if isinstance(failures, list)
-        else ()
-    )
+    """Return the result of an exercise. Parts of other kinds are left out, because any node may have set the parameter."""
+    passed = found.get("passed") is True
+    failures = found.get("failures")
+    texts = [each for each in failures if isinstance(each, str)] if isinstance(failures, list) else []
     return Result(
-        bool(found["passed"]), _time_of(found.get("time")), bool(found.get("ever", found["passed"])), texts
+        passed,
+        _time_of(found.get("time")),
+        passed or found.get("ever") is True,
+        tuple(each[:_MAX_LETTERS] for each in texts[:_MAX_FAILURES]),
     )
 
 
