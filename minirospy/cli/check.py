@@ -24,6 +24,7 @@ __all__ = ["COMMAND", "main"]
 
 NOT_PASSED = 1
 NOT_CHECKED = 3
+_MAX_NAMED = 5  # maximum number of topics that the warning of --class names
 
 _EPILOG = """\
 Exit status: 0 passed, 1 not passed, 2 usage error, 3 the check itself could not run (no such exercise or program, an error in
@@ -95,7 +96,7 @@ def _parser() -> Parser:
         "--class",
         dest="shows_class",
         action="store_true",
-        help="print the results of all students at the master",
+        help="print the results of all students at the master, and of those who use --share in a fleet",
     )
     return parser
 
@@ -161,7 +162,7 @@ def _check(
             share_state(record, environment)
         return 0
     if shows_class:
-        return _show_class(record.master or environment.master_uri)
+        return _show_class(record.master or environment.master_uri, environment)
     if exercise is None:
         return _list(record)
     try:
@@ -278,14 +279,20 @@ def _state(record: Record, exercise: Exercise) -> str:
     return "-" if result is None else "passed" if result.ever else "not passed"
 
 
-def _show_class(uri: str) -> int:
+def _show_class(uri: str, environment: Environment) -> int:
     from minirospy.base.escape import escaped
+    from minirospy.course.classroom import class_table, gather
     from minirospy.course.exercise import built_in_names
-    from minirospy.course.results import class_table, gather
 
-    students = gather(uri)
+    students, unreadable = gather(uri, environment)
+    if unreadable:
+        more = f", and {len(unreadable) - _MAX_NAMED} more" if len(unreadable) > _MAX_NAMED else ""
+        warn(escaped(f"results are missing: {'; '.join(unreadable[:_MAX_NAMED])}{more}"))
     if not students:
-        print(f"No results at {uri} yet: students type `minirospy check --join {uri} --name NAME` once.")
+        print(
+            f"No results at {uri} yet: students type `minirospy check --join {uri} --name NAME` once, or, in a fleet, "
+            "`minirospy check --share`."
+        )
         return 0
     table = [[escaped(cell) for cell in row] for row in class_table(students, built_in_names())]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
@@ -295,7 +302,7 @@ def _show_class(uri: str) -> int:
         for name, result in student.results.items():
             if not result.passed and result.failures:
                 when = time.strftime(", %H:%M", time.localtime(result.time)) if result.time else ""
-                print(escaped(f"{student.name}, {name}{when}: {result.failures[0]}"))
+                print(escaped(f"{student.title}, {name}{when}: {result.failures[0]}"))
     return 0
 
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from minirospy.base.environment import Environment, split_uri
-from minirospy.base.errors import MasterUnreachableError, MinirospyError, RpcRefused, UsageError
+from minirospy.base.errors import MasterUnreachableError, MinirospyError, UsageError
 from minirospy.base.escape import escaped
 from minirospy.base.private_files import replace_file
 from minirospy.course.checker import Report
@@ -28,23 +28,23 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 __all__ = [
     "CLASS_PARAMETER",
     "MAX_KEY",
+    "MAX_NAME",
+    "SECONDS",
     "Record",
     "Result",
-    "Student",
     "class_master",
-    "class_table",
-    "gather",
     "join",
     "publish",
+    "result_of",
 ]
 
 CLASS_PARAMETER = "/minirospy_class"
 _MAX_FAILURES = 5  # maximum number of sentences about a failed check that the teacher sees
 _MAX_LETTERS = 300  # maximum length of such a sentence, in characters
-_MAX_NAME = 60  # maximum length of a student's name, in characters
+MAX_NAME = 60  # maximum length of a student's name, in characters
 MAX_KEY = 64  # maximum length of a parameter name's last part; the page's classroom.js ignores longer ones
 _MAX_TIME = 4e9  # year 2096 in Unix time: time.localtime rejects far larger values
-_SECONDS = 3.0  # timeout in seconds for the class's master, whose computer may have been shut down
+SECONDS = 3.0  # timeout in seconds for the class's master, whose computer may have been shut down
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Record:
             record.student = str(found.get("student", ""))
             record.master = str(found.get("master", ""))
             record.results = {
-                str(name): _result_of(each) for name, each in dict(found.get("exercises", {})).items()
+                str(name): result_of(each) for name, each in dict(found.get("exercises", {})).items()
             }
         except (OSError, ValueError, TypeError, AttributeError, KeyError):
             pass
@@ -134,15 +134,6 @@ class Record:
         }
 
 
-@dataclass(frozen=True)
-class Student:
-    """A row of the class's table: one computer's results. ``key`` is the last part of the computer's parameter name."""
-
-    key: str
-    name: str
-    results: Mapping[str, Result]
-
-
 def default_name() -> str:
     """Return a default for the student's name in the class's table: the name of the board or the computer."""
     return os.environ.get("MINIROSPY_BOARD") or socket.gethostname().partition(".")[0]
@@ -164,7 +155,7 @@ def join(record: Record, uri: str, name: str) -> None:
             ) from None
         record.master = uri
     if name:
-        record.student = escaped(name)[:_MAX_NAME]
+        record.student = escaped(name)[:MAX_NAME]
     if uri:
         send(record, uri)
 
@@ -199,7 +190,7 @@ def publish(record: Record, environment: Environment) -> str:
 
 def send(record: Record, uri: str) -> None:
     """Send the record to the master at ``uri``. Raise MasterUnreachableError if it does not respond."""
-    master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=_SECONDS)
+    master = MasterProxy(uri, f"/check_{os.getpid()}", timeout=SECONDS)
     try:
         # Set each part separately, to preserve the state that share.py stores under the same parameter.
         for part, value in record.to_parameter().items():
@@ -223,49 +214,16 @@ def parameter_key(name: str) -> str:
     return prefix + text
 
 
-def gather(uri: str) -> list[Student]:
-    """Return the students with results on a master, sorted by name. Raise MasterUnreachableError if it does not respond.
-
-    Values that are not records are skipped; any node may have set them.
-    """
-    master = MasterProxy(uri, f"/class_{os.getpid()}", timeout=_SECONDS)
-    try:
-        found = master.get_param(CLASS_PARAMETER)
-    except RpcRefused:
-        found = {}
-    finally:
-        master.close()
-    students = []
-    for key, value in found.items() if isinstance(found, dict) else ():
-        try:
-            results = {str(name): _result_of(each) for name, each in value["exercises"].items()}
-            students.append(Student(str(key), str(value["student"])[:_MAX_NAME], results))
-        except (KeyError, TypeError, ValueError, AttributeError):
-            continue
-    return sorted(students, key=lambda student: student.name.lower())
-
-
-def class_table(students: list[Student], names: list[str]) -> list[list[str]]:
-    """Return the class's table, including its header. Cells are "yes", "no" (not passed yet), or empty (not tried)."""
-    used = [name for name in names if any(name in student.results for student in students)]
-    used += sorted({name for student in students for name in student.results} - set(names))
-    marks = {student.key: [_mark(student.results.get(name)) for name in used] for student in students}
-    return [["", *used], *([student.name, *marks[student.key]] for student in students)]
-
-
-def _mark(result: Result | None) -> str:
-    return "" if result is None else "yes" if result.ever else "no"
-
-
-def _result_of(found: Mapping[str, object]) -> Result:
-    failures = found.get("failures", [])
-    texts = (
-        tuple(str(each)[:_MAX_LETTERS] for each in failures[:_MAX_FAILURES])
-        if isinstance(failures, list)
-        else ()
-    )
+def result_of(found: Mapping[str, object]) -> Result:
+    """Return the result of an exercise. Parts of other kinds are left out, because any node may have set the parameter."""
+    passed = found.get("passed") is True
+    failures = found.get("failures")
+    texts = [each for each in failures if isinstance(each, str)] if isinstance(failures, list) else []
     return Result(
-        bool(found["passed"]), _time_of(found.get("time")), bool(found.get("ever", found["passed"])), texts
+        passed,
+        _time_of(found.get("time")),
+        passed or found.get("ever") is True,
+        tuple(each[:_MAX_LETTERS] for each in texts[:_MAX_FAILURES]),
     )
 
 

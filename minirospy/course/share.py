@@ -29,6 +29,7 @@ _ASK_SECONDS = 2.0  # timeout in seconds for calls to a master
 _PUBLISH_SECONDS = 1.0  # minimum seconds between messages on the topic, because each has all results (22 kB)
 _TOPIC = CLASS_PARAMETER  # the page's classroom.js also finds this topic with a fleet robot's name before it
 _TOOL = "check_share"  # prefix of the names of the nodes that publish the topic
+_NOT_STUDENTS = f"{_TOOL}_", "check_class_"  # prefixes of the names of nodes that publish or read the topic
 
 
 def share(record: Record, environment: Environment, ended: Callable[[], bool] = lambda: False) -> None:
@@ -118,7 +119,7 @@ class _OwnMaster:
         return self._publisher
 
     def nodes(self) -> list[str]:
-        """Return the names of at most ten nodes, without those that publish the topic. The list is empty without a master."""
+        """Return the names of at most ten nodes, without those that use the topic. The list is empty without a master."""
         master = MasterProxy(self._environment.master_uri, "/check_share", timeout=_ASK_SECONDS)
         self._answers = False
         try:
@@ -129,4 +130,4 @@ class _OwnMaster:
             master.close()
         self._answers = True
         found = {node for table in state for nodes in table.values() for node in nodes} - {"/rosout"}
-        return sorted(name for name in found if not name.rpartition("/")[2].startswith(f"{_TOOL}_"))[:10]
+        return sorted(name for name in found if not name.rpartition("/")[2].startswith(_NOT_STUDENTS))[:10]

@@ -10,15 +10,23 @@ import time
 from pathlib import Path
 
 import pytest
+from std_msgs.msg import String
 
 from minirospy.base.environment import Environment
+from minirospy.course.classroom import Student, gather
 from minirospy.course.exercise import built_in_names
-from minirospy.course.results import CLASS_PARAMETER, Record, gather
+from minirospy.course.results import CLASS_PARAMETER, Record
+from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 from .conftest import Command
 
 PASSES = "name: {}\ntitle: A title\nlive: true\nsteps:\n- {{answer: 'What?', equals: odom, hint: Look.}}\n"
+
+
+def students_at(uri: str) -> list[Student]:
+    """Return the students with results on a master."""
+    return gather(uri, Environment.read()).students
 
 
 @pytest.fixture
@@ -108,7 +116,7 @@ def test_result_is_at_the_master(command: Command, master: str, question: str) -
     words = ("--join", master, "--name", "Anna B.")
     assert command("check", *words).out == f"Anna B.: results go to {master}\n"
     assert command("check", question, "map").status == 1
-    [student] = gather(master)
+    [student] = students_at(master)
     assert student.key.startswith("Anna_B__")
     assert student.name == "Anna B."
     assert not student.results["question"].passed
@@ -145,7 +153,7 @@ def test_master_on_another_computer_gets_the_results(
     monkeypatch.setattr("minirospy.base.environment.is_own_host", lambda host, own="": False)
     assert command("check", "--name", "Anna").out == f"Anna: results go to {master}\n"
     assert command("check", question, "odom").status == 0
-    assert [student.name for student in gather(master)] == ["Anna"]
+    assert [student.name for student in students_at(master)] == ["Anna"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="cmd has other lines")
@@ -193,7 +201,7 @@ def test_one_master_for_an_unknown_shell(command: Command, master: str) -> None:
     result = command("check", "--join", master, "--name", "anna", "--one-master", "tcsh")
     assert result.status == 2
     assert "there is nothing for the shell [tcsh], only for bash" in result.err
-    assert not gather(master)
+    assert not students_at(master)
 
 
 def test_class_has_another_master_than_the_robot(
@@ -203,7 +211,7 @@ def test_class_has_another_master_than_the_robot(
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     assert command("check", "--join", master.removeprefix("http://"), "--name", "Ben").status == 0
     assert command("check", question, "odom").status == 0
-    assert [student.name for student in gather(master)] == ["Ben"]
+    assert [student.name for student in students_at(master)] == ["Ben"]
 
 
 def test_master_that_has_gone_does_not_fail_the_check(command: Command, question: str) -> None:
@@ -228,7 +236,33 @@ def test_values_that_are_no_record_are_left_out(command: Command, master: str, q
     result = command("check", "--class")
     assert result.status == 0
     assert "red\\nblue" in result.out
-    assert len(gather(master)) == 2
+    # Below the names b, c, d and that of this computer are students, although some have no results.
+    assert len(students_at(master)) == 4
+
+
+def test_class_shows_students_whose_topics_a_fleet_forwards(command: Command, master: str) -> None:
+    def text(**led: object) -> str:
+        return json.dumps({"key": "pi", "student": "pi", "exercises": {"led": {"time": 0, **led}}, "now": {}})
+
+    with ToolNode(Environment.read(), "test") as node:
+        for robot, data in (
+            ("robot1", text(passed=True, ever=True)),
+            ("robot2", text(passed=False, failures=["it stays dark"])),
+            ("eve", "{"),
+        ):
+            publisher = node.publisher(f"/{robot}/minirospy_class", String, latch=True)
+            publisher.publish(String(data))
+        result = command("check", "--class")
+        assert result.status == 0
+        assert result.out.splitlines() == [
+            "             led",
+            "pi (robot1)  yes",
+            "pi (robot2)  no",
+            "pi (robot2), led: it stays dark",
+        ]
+        assert result.err == (
+            f"WARNING: results are missing: /eve/minirospy_class of {node.name}: its message is not a student's\n"
+        )
 
 
 @pytest.mark.parametrize("when", [1e300, float("inf"), float("nan"), -1e17, "noon", [1]])

@@ -105,7 +105,8 @@ class Sharing:
         """Return the first message for which ``holds`` is true."""
         end = time.monotonic() + 60
         while time.monotonic() < end:
-            found: dict[str, Any] = json.loads(self._node.classes.read(self._inbox.get(timeout=60)).data)
+            message: Any = self._node.classes.read(self._inbox.get(timeout=60))
+            found: dict[str, Any] = json.loads(message.data)
             if holds(found):
                 return found
         raise AssertionError("no message arrived for which it holds")
@@ -159,63 +160,71 @@ def test_rosnode_kill_ends_the_sharing(master: str, share_as: Callable[[Record],
     assert not sharing.thread.is_alive()
 
 
-def test_class_master_suffices_without_an_own_one(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
-    record = Record.read(Environment.read())
-    record.student, record.master = "Anna", master
-    ended = threading.Event()
-    sharing = threading.Thread(target=share, args=(record, Environment.read(), ended.is_set))
-    sharing.start()
-    try:
-        with contextlib.closing(MasterProxy(master, "/teacher")) as proxy:
-            wait_for(lambda: "/minirospy_class/Anna/now/beat" in proxy.get_param_names())
-    finally:
-        ended.set()
-        sharing.join()
+class Anna:
+    """A thread that runs share() as Anna, and her heartbeats at the class's master."""
+
+    def __init__(self, class_master: str) -> None:
+        self._ended = threading.Event()
+        self._class = MasterProxy(class_master, "/teacher")
+        environment = Environment.read()
+        record = Record.read(environment)
+        record.student, record.master = "Anna", class_master
+        self._thread = threading.Thread(target=share, args=(record, environment, self._ended.is_set))
+        self._thread.start()
+
+    def wait_for_beat(self, number: int) -> None:
+        """Wait until a heartbeat with this number, or a later one, has arrived."""
+        beat = "/minirospy_class/Anna/now/beat"
+        wait_for(lambda: beat in self._class.get_param_names() and self._class.get_param(beat) >= number)
+
+    def stop(self) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def close(self) -> None:
+        self.stop()
+        self._class.close()
 
 
-def test_topic_appears_when_the_own_master_starts_later(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def anna_with(master: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Anna]]:
+    """Return a function that starts Anna's thread on a computer with its own master at the given URI."""
+    with contextlib.ExitStack() as stack:
+
+        def start(uri: str) -> Anna:
+            monkeypatch.setenv("ROS_MASTER_URI", uri)
+            return stack.enter_context(contextlib.closing(Anna(master)))
+
+        yield start
+
+
+def test_class_master_suffices_without_an_own_one(anna_with: Callable[[str], Anna]) -> None:
+    anna_with("http://localhost:1").wait_for_beat(1)
+
+
+def test_topic_appears_when_the_own_master_starts_later(anna_with: Callable[[str], Anna]) -> None:
     port = free_port()
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
-    record = Record.read(Environment.read())
-    record.student, record.master = "Anna", master
-    ended = threading.Event()
-    sharing = threading.Thread(target=share, args=(record, Environment.read(), ended.is_set))
-    sharing.start()
-    try:
-        with contextlib.closing(MasterProxy(master, "/teacher")) as proxy:
-            beat = "/minirospy_class/Anna/now/beat"
-            wait_for(lambda: beat in proxy.get_param_names() and proxy.get_param(beat) >= 3)
-        with running_master(port), ToolNode(Environment.read(), "teacher") as node:
-            inbox: queue.Queue[Received] = queue.Queue()
-            node.measure("/minirospy_class", inbox.put)
-            found = json.loads(node.classes.read(inbox.get(timeout=60)).data)
-            assert found["student"] == "Anna"
-            ended.set()
-            sharing.join()
-    finally:
-        ended.set()
-        sharing.join()
+    anna = anna_with(f"http://localhost:{port}")
+    anna.wait_for_beat(3)
+    with running_master(port), ToolNode(Environment.read(), "teacher") as node:
+        inbox: queue.Queue[Received] = queue.Queue()
+        node.measure("/minirospy_class", inbox.put)
+        message: Any = node.classes.read(inbox.get(timeout=60))
+        assert json.loads(message.data)["student"] == "Anna"
+        # Her node unregisters from this master, which must still run.
+        anna.stop()
 
 
-def test_silent_own_master_does_not_block_the_class(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silent_own_master_does_not_block_the_class(
+    anna_with: Callable[[str], Anna], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    created: list[str] = []
+    monkeypatch.setattr("minirospy.course.share.ToolNode", lambda _, tool: created.append(tool))
     # The system accepts connections for a socket that listens, but nothing answers.
     with socket.create_server(("localhost", 0)) as silent:
-        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
-        record = Record.read(Environment.read())
-        record.student, record.master = "Anna", master
-        created: list[str] = []
-        monkeypatch.setattr("minirospy.course.share.ToolNode", lambda _, tool: created.append(tool))
-        ended = threading.Event()
-        sharing = threading.Thread(target=share, args=(record, Environment.read(), ended.is_set))
-        sharing.start()
-        try:
-            with contextlib.closing(MasterProxy(master, "/teacher")) as proxy:
-                beat = "/minirospy_class/Anna/now/beat"
-                wait_for(lambda: beat in proxy.get_param_names() and proxy.get_param(beat) >= 2)
-        finally:
-            ended.set()
-            sharing.join()
+        anna = anna_with(f"http://localhost:{silent.getsockname()[1]}")
+        anna.wait_for_beat(2)
+        anna.stop()
     # A node would wait for the master for much longer.
     assert not created
 

@@ -13,6 +13,7 @@ import io
 import json
 import math
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -191,6 +192,12 @@ OBJ = "mtllib part.mtl\nusemtl leaf\n" + "".join(
     f"v {' '.join(map(str, corner))}\nvn {' '.join(map(str, normal))}\n" for corner, normal in _box(0, 0.15)
 )
 OBJ += "".join(f"f {at}//{at} {at + 1}//{at + 1} {at + 2}//{at + 2}\n" for at in range(1, 37, 3))
+SMOOTH_OBJ = re.sub(
+    r"v (\S+) (\S+) (\S+)\nvn .*",
+    lambda at: f"{at[0].partition(chr(10))[0]}\nvn {at[1]} {at[2]} {float(at[3]) - 0.15}",
+    OBJ,
+)
+"""The same box with the normals of a ball, so that each side is lit as its corners are."""
 MTL = "newmtl leaf\nKa 0.1 0.1 0.1\nKd 0.1 0.5 0.2\nKe 0.2 0 0.3\nKs 0.4 0.4 0.4\nd 0\n"  # d: RViz ignores it
 
 
@@ -355,6 +362,7 @@ def mesh_robot() -> str:
             (0.6, -1.6, "bare.obj", ""),
             (0.6, 1.2, "picture.dae", ""),
             (1.2, 1.2, "bumps.dae", ""),
+            (1.8, 1.2, "smooth.obj", ""),
         )
     )
     texture = '<material name="squares"><texture filename="package://rviz_meshes/squares.png"/></material>'
@@ -642,6 +650,7 @@ def prepare(folder: Path) -> None:
     (package / "none.dae").write_text(collada(("", "")), encoding="utf-8")
     (package / "bare.obj").write_text(OBJ.partition("v ")[1] + OBJ.partition("v ")[2], encoding="utf-8")
     (package / "leaf.obj").write_text(OBJ, encoding="utf-8")
+    (package / "smooth.obj").write_text(SMOOTH_OBJ, encoding="utf-8")
     (package / "part.mtl").write_text(MTL, encoding="utf-8")
 
 

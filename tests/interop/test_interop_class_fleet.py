@@ -112,6 +112,12 @@ class Student:
         self._running.callback(stop, program)
         return program
 
+    def output(self, *words: str) -> str:
+        """Return what a command of minirospy prints."""
+        program = start([*self._words, *words], self._uri, "ours", stdout=subprocess.PIPE)
+        self._running.callback(stop, program)
+        return program.communicate(timeout=PATIENCE)[0]
+
     def check(self, answer: str) -> None:
         """Check an answer to the exercise missing_frame; odom is the right one."""
         assert self.run("check", "missing_frame", answer).wait(PATIENCE) == (answer != "odom")
@@ -161,3 +167,5 @@ def test_students_of_a_fleet_are_shown_with_their_boards_and_results(
     # A later result is shown.
     students[1].check("odom")
     page.wait(f"return {second}.querySelector('.class-yes')")
+    lines = teacher.output("check", "--class").splitlines()
+    assert lines[:3] == ["             missing_frame", "pi (robot1)  yes", "pi (robot2)  yes"]

@@ -484,6 +484,27 @@ def test_meshes_are_opaque_whatever_the_opacity_in_their_files(
     wait_color(page, (77, 128, 128), 3)
 
 
+def test_light_is_interpolated_between_the_vertices(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rviz_pictures.prepare(tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    visual = '<visual><geometry><mesh filename="package://rviz_meshes/smooth.obj" scale="4 4 4"/></geometry></visual>'
+    text = f'<robot name="r"><link name="map">{visual}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+    publish(served, {"/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    metre = look_down(page)
+    # The normals at the four corners of the upper side have an angle of 54.7 degrees to the light from above.
+    red, green, blue = (
+        round(255 * (0.577 * diffuse + emitted)) for diffuse, emitted in ((0.1, 0.2), (0.5, 0.0), (0.2, 0.3))
+    )
+    end = time.monotonic() + PATIENCE
+    while not is_near({color_at(page, 0.3 * metre, 0.3 * metre)}, (red, green, blue), 3):
+        assert time.monotonic() < end
+
+
 def test_textures_have_the_colors_of_their_pictures(
     serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -529,6 +529,29 @@ def beats(*students: str) -> Iterator[None]:
 
 
 @needs_chromium
+def test_class_on_a_phone_shows_all_exercises_and_the_names_while_it_scrolls(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    served = serve()
+    with contextlib.closing(MasterProxy(os.environ["ROS_MASTER_URI"], "/students")) as master:
+        exercises = {f"exercise_{number}": {"passed": True, "ever": True} for number in range(6)}
+        master.set_param("/minirospy_class/anna", {"student": "Anna", "exercises": exercises})
+        page = browse(address(served, "class"), width=390, height=844)
+        page.wait("return document.querySelectorAll('.class-table .class-yes').length === 6")
+        # Each result is visible, and in one line.
+        heights = page.evaluate(
+            "[...document.querySelectorAll('.class-yes')].map(e => {"
+            " const range = document.createRange(); range.selectNodeContents(e); return range.getClientRects().length; })"
+        )
+        assert heights == [1] * 6
+        page.evaluate("document.querySelector('main .scroll').scrollLeft = 1000")
+        left = "{}.getBoundingClientRect().left"
+        name = left.format("document.querySelector('.class-table tbody th')")
+        last = left.format("document.querySelector('.class-yes:last-child')")
+        page.wait(f"return {last} < 390 && {name} >= 0")
+
+
+@needs_chromium
 def test_classroom_shows_the_exercises_of_each_student(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:

@@ -1,6 +1,7 @@
 // Table of a class: odd values below /minirospy_class, which any node may set, leave it usable.
 
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { classTable, readShared, storeShared } from "../../../minirospy/web/dashboard/page/js/classroom.js";
@@ -139,3 +140,36 @@ test("a full map drops the topics that are no channels any more", () => {
   storeShared(map, "/new/minirospy_class", "newer", () => false);
   assert.equal(map.get("/new/minirospy_class"), "newer");
 });
+
+/** Return [path, value] of each parameter below a value, as the bridge sends them. */
+const leaves = (path, value) =>
+  value && typeof value === "object" && !Array.isArray(value)
+    ? Object.entries(value).flatMap(([name, each]) => leaves(`${path}/${name}`, each))
+    : [[path, value]];
+
+// The same cases are those of `minirospy check --class`, in Python.
+const CASES = JSON.parse(readFileSync(new URL("../../course/classes.json", import.meta.url), "utf-8"));
+for (const { about, parameters, topics, students, unreadable = [] } of CASES) {
+  test(`as minirospy check --class: ${about}`, () => {
+    const read = topics.map(([topic, value]) => [
+      topic,
+      readShared(typeof value === "string" ? value : JSON.stringify(value)),
+    ]);
+    assert.deepEqual(
+      read.filter(([, found]) => !found).map(([topic]) => topic),
+      unreadable,
+    );
+    const table = classTable(
+      new Map(leaves("/minirospy_class", parameters)),
+      new Map(read.filter(([, found]) => found)),
+    );
+    const rows = table.students.map(({ name, robot, results }) => [
+      name,
+      robot,
+      Object.fromEntries(
+        [...results].map(([each, { passed, ever, time, failures }]) => [each, [passed, ever, time, failures]]),
+      ),
+    ]);
+    assert.deepEqual(rows, students);
+  });
+}

@@ -9,14 +9,13 @@ import {
   Group,
   LoadingManager,
   Mesh,
-  MeshLambertMaterial,
   RGBAFormat,
   STLLoader,
   UnsignedByteType,
 } from "../../vendor/three/three.min.js";
 import { t } from "../texts.js";
 import { readMaterials, readObj } from "./obj.js";
-import { bodyMaterial } from "./shapes.js";
+import { BodyMaterial, bodyMaterial } from "./shapes.js";
 
 const cache = new WeakMap(); // link -> Map of uri -> promise of an object
 const EMPTY_PICTURE = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA=";
@@ -78,7 +77,7 @@ function cached(link, uri, load) {
  * and ambient ones are not shown.
  */
 function own(material, paint) {
-  const copy = new MeshLambertMaterial({
+  const copy = new BodyMaterial({
     map: material.map ?? null,
     side: material.side,
     vertexColors: material.vertexColors,
@@ -87,7 +86,7 @@ function own(material, paint) {
   if (material.emissive) copy.emissive.copy(material.emissive);
   // RViz multiplies with the picture once more for each other picture of the material, such as that of bumps.
   const others = [material.normalMap, material.bumpMap].filter(Boolean).length;
-  if (copy.map && others) edit(copy, "map_fragment", "diffuseColor *= sampledDiffuseColor;".repeat(others));
+  if (copy.map && others) copy.edits.push(["map_fragment", "diffuseColor *= sampledDiffuseColor;".repeat(others)]);
   let alpha = paint?.alpha ?? 1;
   if (paint?.tint) {
     // RViz draws the tint over the mesh: at most half of it.
@@ -107,20 +106,10 @@ function own(material, paint) {
 /** Mix the color of a material, also that of its texture, with another one: `part` of it. */
 function mix(material, [r, g, b], part) {
   const color = [r, g, b].map((each) => (each / 255).toFixed(4)).join(", ");
-  edit(material, "color_fragment", `diffuseColor.rgb = mix(diffuseColor.rgb, vec3(${color}), ${part.toFixed(4)});`);
-}
-
-/** Add code to a material's program, after one of its pieces. */
-function edit(material, piece, code) {
-  const edits = (material.userData.edits ??= []);
-  edits.push([`#include <${piece}>`, code]);
-  material.onBeforeCompile = (shader) => {
-    for (const [after, added] of edits) {
-      shader.fragmentShader = shader.fragmentShader.replace(after, `${after}\n  ${added}`);
-    }
-  };
-  // Programs are shared by this key.
-  material.customProgramCacheKey = () => JSON.stringify(edits);
+  material.edits.push([
+    "color_fragment",
+    `diffuseColor.rgb = mix(diffuseColor.rgb, vec3(${color}), ${part.toFixed(4)});`,
+  ]);
 }
 
 function checked(uri) {

@@ -44,12 +44,66 @@ CRATE.setAttribute(
 );
 const SHARED = new Set([SHAFT, HEAD, BOX, BALL, ROLL, CRATE]);
 
+// As in RViz, light is computed at the vertices, and interpolated between them. With interpolated normals, large faces
+// of smooth bodies would be brighter, such as the sides of a PR2's base.
+const LIT_VERTICES = `
+#if NUM_DIR_LIGHTS > 0
+struct DirectionalLight {
+  vec3 direction;
+  vec3 color;
+};
+uniform DirectionalLight directionalLights[NUM_DIR_LIGHTS];
+#endif
+varying vec3 frontLight;
+varying vec3 backLight;
+void main() {
+  frontLight = vec3(0.0);
+  backLight = vec3(0.0);`;
+const LIGHT_OF_VERTEX = `#include <normal_vertex>
+#if NUM_DIR_LIGHTS > 0
+  for (int i = 0; i < NUM_DIR_LIGHTS; i++) {
+    float cosine = dot(normalize(transformedNormal), directionalLights[i].direction);
+    frontLight += max(cosine, 0.0) * directionalLights[i].color;
+    backLight += max(-cosine, 0.0) * directionalLights[i].color;
+  }
+#endif`;
+const LIGHT_OF_FRAGMENT = `#include <lights_fragment_begin>
+  vec3 directLightOfFace = frontLight;
+#ifdef DOUBLE_SIDED
+  if (!gl_FrontFacing) directLightOfFace = backLight;
+#endif
+  reflectedLight.directDiffuse = directLightOfFace * BRDF_Lambert(material.diffuseColor);`;
+
+/** A material of bodies. Directional and ambient lights shine on it. */
+export class BodyMaterial extends MeshLambertMaterial {
+  /** Code for the fragment shader: each inserted after a chunk of three's. */
+  edits = /** @type {[string, string][]} */ ([]);
+
+  onBeforeCompile(shader) {
+    shader.vertexShader = shader.vertexShader
+      .replace("void main() {", LIT_VERTICES)
+      .replace("#include <normal_vertex>", LIGHT_OF_VERTEX);
+    shader.fragmentShader = shader.fragmentShader
+      .replace("void main() {", "varying vec3 frontLight;\nvarying vec3 backLight;\nvoid main() {")
+      .replace("#include <lights_fragment_begin>", LIGHT_OF_FRAGMENT);
+    for (const [chunk, code] of this.edits) {
+      const include = `#include <${chunk}>`;
+      shader.fragmentShader = shader.fragmentShader.replace(include, `${include}\n  ${code}`);
+    }
+  }
+
+  /** Return the key by which materials share a compiled program. */
+  customProgramCacheKey() {
+    return `body ${JSON.stringify(this.edits)}`;
+  }
+}
+
 /**
  * Return the material of a body.
  * @param {number[]} rgb from 0 to 255
  */
 export function bodyMaterial([r, g, b], alpha = 1, options = {}) {
-  const material = new MeshLambertMaterial({
+  const material = new BodyMaterial({
     transparent: alpha < 0.9998,
     opacity: alpha,
     depthWrite: alpha >= 0.9998,

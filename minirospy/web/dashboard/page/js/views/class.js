@@ -18,7 +18,7 @@ export class Class {
     this.count = h("span", { class: "muted" });
     this.head = h("tr", {});
     this.body = h("tbody", {});
-    this.table = h("table", { class: "goals class-table" }, h("thead", {}, this.head), this.body);
+    this.table = h("table", { class: "class-table" }, h("thead", {}, this.head), this.body);
     this.empty = h("p", { class: "empty" });
     this.failed = h("ul", { class: "class-failures" });
     main.append(
