@@ -25,7 +25,7 @@ def find_packages_named_like_scripts() -> None:
     """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
-    # A program started with `python -m` has a spec, and Python does not search its folder.
+    # Do nothing for a program started with `python -m`, which has a spec: Python does not search its folder.
     if (
         not file
         or getattr(main, "__spec__", None)

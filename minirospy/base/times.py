@@ -65,7 +65,7 @@ class TVal:
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
-        # The program may have assigned fractions or numpy values, which overflow.
+        # Convert to int first: the program may have assigned fractions, or numpy values, which overflow.
         whole, rest = _split(secs)
         return whole * _BILLION + rest + int(nsecs)
 
