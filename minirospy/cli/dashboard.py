@@ -371,7 +371,7 @@ def _serve(
             self._opened: list[Dashboard] = []
 
         async def wait(self) -> None:
-            """If nothing listens at the master's address, start serving a page without data, which :meth:`start` replaces."""
+            """Unless the master is reachable, start serving a page without data, which :meth:`start` will replace."""
             if await _is_reachable(self._node.master_uri):
                 return
             for each in ports:

@@ -82,7 +82,7 @@ def _inside(text: str, quote: str) -> str:
     text = text.replace("\n", _LINE_FEED)
     if quote == "'":
         return text.replace("'", r"'\''")
-    # An interactive shell expands ! from its history, even in double quotes.
+    # Put ! in single quotes: an interactive shell expands it from its history, even in double quotes.
     return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
 
 
