@@ -69,7 +69,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if is_interrupt(error):
             if sys.flags.inspect:
-                # `python -i PROGRAM` continues with an interactive session.
+                # Do not exit: `python -i PROGRAM` continues with an interactive session.
                 return
             raise SystemExit(0)
         hooks[0](kind, error, trace)

@@ -172,7 +172,7 @@ class Lifecycle:
         return self.machine.main.awareness is not Awareness.NONE
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down.
+        """Return whether the node has shut down, to a thread that polls.
 
         Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
         """

@@ -287,7 +287,7 @@ class ServiceProxy(Generic[_S_co]):
         return buffer.getvalue()
 
     def _connect(self, request: bytes) -> ServiceClient:
-        """Return a connection for sending ``request``. The request may already have been sent on it."""
+        """Return a new connection, on which to make the call with ``request``. It may already have sent the request."""
         ahead = self._connect_ahead()
         try:
             return self._connect_by_master(ahead, request)

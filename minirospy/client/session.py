@@ -61,7 +61,7 @@ class Session:
 
         self.callback_errors = CallbackErrors()
         self.lifecycle.late_hooks.append(self.callback_errors.close)
-        self.lock = threading.RLock()  # orders registrations, and guards the tables
+        self.lock = threading.RLock()  # orders registrations, and guards the tables of topics and services
         self.clock: Clock = previous.clock if previous else WallClock()
         # Notified whenever the simulated time changes
         self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
@@ -210,7 +210,7 @@ class Session:
         return self.lifecycle.is_shutdown()
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down.
+        """Return whether the node has shut down, to a thread that polls.
 
         Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
         """
@@ -242,7 +242,7 @@ class Session:
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
         # Ignore the two logger services, which every node offers.
         own = {name: each for name, each in self.offered.items() if not name.endswith(_SERVICES_OF_NODES)}
-        # A program that polls, or has waited, exits on purpose, and so does an interactive session.
+        # Do not warn if the program polls or has waited, or in an interactive session: they exit on purpose.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if is_meant or hasattr(sys, "last_value") or not all(state.is_new for state in waiting.values()):
@@ -266,7 +266,7 @@ class Session:
             published.forget_subscribers()
         self.published, self.subscribed, self.offered = {}, {}, {}
         self.node = None
-        # Another thread in the parent may have held the lock during the fork.
+        # Replace the lock, because another thread in the parent may have held it during the fork.
         self.lock = threading.RLock()
         self.signals.release()
 
@@ -349,7 +349,7 @@ def replace_session() -> None:
 
 
 def replace_session_in_fork() -> None:
-    """Replace the session in a fork.
+    """In a fork, replace the parent's session with a new one.
 
     The new session keeps the name, the time and the logging, but not the node, which belongs to the parent.
     """

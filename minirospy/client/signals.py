@@ -103,7 +103,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while the node handles Ctrl-C. Afterwards, a third Ctrl-C terminates the process."""
+        """Flush the program's output while Ctrl-C is still handled. If it was pressed twice, let a third one end the process."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:

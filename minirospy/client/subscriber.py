@@ -182,12 +182,12 @@ class SubscribedTopic(SharedTopic):
 
     @property
     def has_callback(self) -> bool:
-        """Return whether a Subscriber has a callback."""
+        """Return whether any Subscriber of the topic has a callback."""
         return any(handle.callback is not None for handle in self._handles)
 
     @property
     def is_new(self) -> bool:
-        """Return whether the latest Subscriber was created a moment ago and no message has arrived since."""
+        """Return whether the latest Subscriber was created a moment ago, and no link has received a message."""
         has_received = any(link.received for link in self.links)
         return not has_received and time.monotonic() - self._since < NEW_SECONDS
 

@@ -63,7 +63,7 @@ def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
 
 
 class TCPROSTransportProtocol:
-    """The data transferred on a connection: its header's fields, and the class of the received messages."""
+    """Describes the data on a connection: its header's fields, and the class of the received messages."""
 
     def __init__(
         self,
@@ -190,7 +190,7 @@ class Transport:
 
 
 class DeadTransport(Transport):
-    """The statistics of a closed connection."""
+    """What remains of a closed connection: its addresses and statistics."""
 
     def __init__(self, transport: Transport) -> None:
         super().__init__(transport.direction, transport.name)
