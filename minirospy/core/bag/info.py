@@ -250,7 +250,7 @@ def value_of(text: str, key: str) -> str:
 
 
 def _printed(value: object) -> str:
-    """Format a list item as -k prints it."""
+    """Format a list item as `rosbag info -k` prints it."""
     if not isinstance(value, dict):
         return f"  {value}"
     return "\n  ".join(f"{name}: {each}" for name, each in value.items())

@@ -32,7 +32,7 @@ __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
 _TRANSIENT_LOCAL = re.compile(r"durability: *(1|transient_local)\b")  # ROS 2's latching, as rosbag2 stores it
-_MAX_SCHEMA = 1_048_576  # maximum characters in a schema, a ROS 1 full text; the largest in real packages have about 30,000
+_MAX_SCHEMA = 1_048_576  # maximum characters in a schema, the definition of a type and all types in it; real ones reach 30,000
 _MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
@@ -337,7 +337,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the mcap library, which may request reads of any length.
+    """A stream for the mcap library, which may request a length from a damaged file.
 
     A read returns the available data, without allocating the requested length.
     """

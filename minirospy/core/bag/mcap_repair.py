@@ -255,7 +255,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return new message indexes for the last chunk, because its own are incomplete, and add them to its chunk index."""
+        """Rebuild the last chunk's message indexes, which are incomplete, and enter their offsets in its ChunkIndex record."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 

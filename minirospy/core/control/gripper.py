@@ -23,7 +23,7 @@ class GripperLimits(NamedTuple):
 
 
 class GripperCommand(NamedTuple):
-    """The position to hold, the maximum effort, and the goal that requested it, with its time of receipt."""
+    """The position to hold, the maximum effort, the goal that requested them (None: no goal), and the goal's time of receipt."""
 
     position: float
     max_effort: float

@@ -133,7 +133,7 @@ class _Limiter:
         self.enforce: Callable[[float], bool] | None = None
 
     def reset(self, active: Interface | None) -> None:
-        """Restart from the joint's present position, after another interface, or no controller, has commanded it."""
+        """Restart from the present position, or from velocity 0, after another interface or none has commanded the joint."""
         self.active = active
         is_velocity = active is Interface.VELOCITY
         self.previous = 0.0 if is_velocity else self.joint.position

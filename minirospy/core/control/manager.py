@@ -211,7 +211,7 @@ class ControllerTable:
         return switch
 
     def update(self, time: Time, period: Duration, reset_controllers: bool = False) -> None:
-        """Update the running controllers, then perform a requested change. With ``reset_controllers``, first restart them."""
+        """Update the running controllers, after a restart if ``reset_controllers`` is set; then perform a requested change."""
         loaded = self.loaded
         if reset_controllers:
             for each in loaded:

@@ -79,7 +79,7 @@ class _Reader:
     names: set[str] = field(default_factory=set)
     numbers: dict[str, Iterator[int]] = field(
         default_factory=dict
-    )  # for each name in use, the next numbers to append
+    )  # for each repeated name, the numbers to append to it
     ambient: Color = World.ambient
     background: Color = World.background
     camera: Pose | None = None

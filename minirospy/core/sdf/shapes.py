@@ -27,7 +27,7 @@ from minirospy.core.sdf.text import Element
 __all__ = ["read_collision", "read_geometry", "read_surface", "read_visual"]
 
 _SURFACE = Surface()
-_MIN_SIDE = 1e-4  # m; the minimum side of a box: a picture on a wall may have a side of length 0
+_MIN_SIDE = 1e-4  # m; the minimum side of a box: for example, a poster on a wall may have a side of length 0
 _MAX_POINTS = 10_000  # per polyline
 
 

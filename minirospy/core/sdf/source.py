@@ -214,7 +214,7 @@ class Source:
         values = []
         for part in element.text.split():
             try:
-                value = float(part if "_" not in part else "")  # float() accepts underscores, as in 1_000
+                value = float(part if "_" not in part else "")  # reject 1_000, which float() accepts
             except ValueError:
                 raise self.error(
                     element, f"<{element.tag}> is '{_short(element.text)}': '{_short(part)}' is not a number"

@@ -168,7 +168,7 @@ class _Converter:
             stack.extend(joint.child for joint in reversed(self._robot.child_joints(name)))
 
     def _merge(self, name: str) -> None:
-        """Add a link to the bodies, or its parts to its parent's body."""
+        """Make the link a body of its own or, if a fixed joint merges it, add it to the body of its parent."""
         link, joint = self._robot.links[name], self._robot.parent_joint(name)
         target, pose = name, IDENTITY
         if joint is not None and self._is_merged(joint):
@@ -192,7 +192,7 @@ class _Converter:
                 body.inertial = inertial if body.inertial is None else add_inertials(body.inertial, inertial)
 
     def _with_mass(self) -> list[str]:
-        """Return the names of the links that remain, in tree order, and warn about the others."""
+        """Return the links that remain, in tree order. Leave out massless links and all links below them, with a warning."""
         kept: list[str] = []
         lost: dict[str, int] = {}  # dict from the topmost massless link to the links below it
         cause: dict[str, str] = {}

@@ -29,7 +29,7 @@ def tree_lines(robot: Robot) -> Iterator[str]:
 
 
 def _numbered(robot: Robot, link: str) -> list[tuple[int, str]]:
-    """Return a link's children and their numbers, in reverse order."""
+    """Return (number, name) for each child of a link, last child first. The first child's number is 1."""
     return [*enumerate((joint.child for joint in robot.child_joints(link)), 1)][::-1]
 
 
