@@ -173,7 +173,7 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 def _link_latest(folder: Path) -> None:
     """Create the link ``latest`` next to a run's folder, pointing to that folder."""
     link = folder.parent / "latest"
-    # The file system does not support links, or another node created the link first.
+    # Ignore errors: the file system may not support links, or another node may have created the link first.
     with contextlib.suppress(OSError, NotImplementedError):
         if link.is_symlink():
             if link.resolve() == folder.resolve():

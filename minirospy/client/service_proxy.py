@@ -124,7 +124,7 @@ class ServiceProxy(Generic[_S_co]):
                 self._is_calling = False
 
     def _call_in_turn(self, request: Message) -> Message:
-        """Call the service through the transport or the persistent connection, and return the response."""
+        """Call the service through the transport, the persistent connection or else a new one; return the response."""
         # Check for a transport only now: another thread may have taken or closed it while this one waited.
         transport = self._usable_transport()
         if transport is not None:

@@ -101,7 +101,7 @@ class Session:
 
     @property
     def initialized(self) -> bool:
-        """Return whether init_node has been called."""
+        """Return whether init_node has finished."""
         return self.node is not None
 
     @property

@@ -338,7 +338,7 @@ class TCPROSTransport(Transport):
         self.use_header(header)
 
     def use_header(self, header: Mapping[str, str]) -> None:
-        """Set the peer's name and type from its connection header. Raise TransportInitError if the header has no type."""
+        """Set the peer's name and type from its header. Raise TransportInitError if the header has no type or md5sum."""
         for field in ("md5sum", "type"):
             if field not in header:
                 raise TransportInitError(f"header missing required field [{field}]")
