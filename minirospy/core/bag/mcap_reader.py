@@ -261,7 +261,7 @@ class _Selection(NamedTuple):
 class _Run:
     """The messages in one chunk, in time order.
 
-    Each has a time, an index in the chunk, a channel, and the start and end of its body.
+    Each has a time, its record's offset in the chunk, a channel, and the start and end of its body.
     """
 
     def __init__(self, position: int, start: int) -> None:

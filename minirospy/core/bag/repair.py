@@ -133,7 +133,7 @@ class Repair:
         self._total = 0  # total of the message counts in the chunk infos read so far
 
     def run(self) -> Iterator[int]:
-        """Read the chunks; yield the position of each.
+        """Read the records after the bag header; yield the position of each.
 
         Raise BagFormatError if it is not a bag, BagEncryptedError if it is encrypted.
         """

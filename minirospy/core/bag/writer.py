@@ -358,7 +358,7 @@ class BagWriter:
         self._used = []
 
     def _make_room(self, stream: _Stream, length: int) -> None:
-        """Start a new chunk if the message would exceed the format's 32-bit chunk size.
+        """Start a new chunk, because the message would exceed the maximum size of the current one.
 
         Raise BagFormatError if the message does not fit into an empty chunk either.
         """

@@ -181,7 +181,7 @@ class _Converter:
         body.merged.append((name, pose))
 
     def _sum(self, body: _Body) -> None:
-        """Collect the parts of a body's links in sdformat's order: its own parts, then those of merged links, deepest first."""
+        """Collect the parts of a body's links in sdformat's order: its own parts, then those of the merged links, depth first."""
         for name, pose in _deepest_first(body, self._robot):
             link = self._robot.links[name]
             body.visuals += [(name, pose, visual) for visual in link.visuals]
@@ -356,7 +356,7 @@ class _Converter:
     # ---- joints
 
     def _joint(self, joint: UrdfJoint) -> Element | None:
-        """Return the ``<joint>``, or None if a joint of this type does not restrict its child."""
+        """Return the ``<joint>``, or None, with a warning, if Gazebo does not know the type (floating or planar)."""
         kind = self._joint_kind(joint)
         if kind is None:
             what = f"joint [{joint.name}] is {joint.type.value}, which Gazebo does not know: link [{joint.child}] is free"
