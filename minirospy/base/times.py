@@ -160,7 +160,7 @@ class Time(TVal):
 
 
 class Duration(TVal):
-    """A time span. If it is negative, ``secs`` is negative and ``nsecs`` positive."""
+    """A time span. If it is negative, only ``secs`` is negative: -0.5 s is ``secs`` -1 and ``nsecs`` 500_000_000."""
 
     __module__ = "genpy.rostime"
 
