@@ -212,4 +212,4 @@ _READERS: tuple[Callable[..., Message], ...] = (
     lambda number: Done(_natural(number)),
     lambda number, why: Refused(_natural(number), str(why)),
     lambda position: PersonMoved(_position(position)),
-)  # message classes, in the same order as _KINDS
+)  # functions that create a message from its fields, in the order of _KINDS
