@@ -416,7 +416,7 @@ def _catalogue() -> Catalogue:
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
     """Complete a type in two steps, ``pkg/`` and then ``pkg/Type``, because a list of all types would be too long.
 
-    For `rosmsg show`, also return type names without the package.
+    For `rosmsg show`, `info` and `md5`, return type names without the package if no package fits.
     """
     from minirospy.introspect.interfaces import Interfaces, Kind
 
