@@ -124,7 +124,7 @@ class Dispatcher:
             return [ERROR, str(refusal), refused]
 
     def _dispatch_system(self, name: str, args: Sequence[object]) -> object:
-        """Call a standard XML-RPC method: multicall, or one from http://xmlrpc-c.sourceforge.net/introspection.html."""
+        """Call ``system.multicall`` or ``system.listMethods`` (http://xmlrpc-c.sourceforge.net/introspection.html)."""
         if name == "system.listMethods":
             return sorted(self.methods)
         if name == "system.multicall":

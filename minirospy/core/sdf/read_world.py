@@ -121,7 +121,7 @@ class _Reader:
             return _PHYSICS
 
     def apply(self, state: Element) -> None:
-        """Move models and lights to their poses in ``<state>``, and remove deleted ones."""
+        """Move models and lights to their poses in ``<state>``, remove its deletions, and read its insertions."""
         poses = {
             kind: {part.attributes.get("name", ""): part for part in state.all(kind)}
             for kind in ("model", "light")

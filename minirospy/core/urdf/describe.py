@@ -71,7 +71,7 @@ def error_lines(error: UrdfError) -> Iterator[str]:
 
 
 def problem_lines(problem: Problem, file: str) -> Iterator[str]:
-    """Yield the messages that ROS's parser prints about a part that it ignores."""
+    """Yield the messages about a fault that leaves the robot usable, in the format of ROS's parser."""
     level = "Warning:" if problem.is_warning else "Error:  "
     for text in problem.trail:
         yield f"{level} {text}"
