@@ -64,14 +64,14 @@ class Loaded:
 
 @dataclass(slots=True, eq=False)
 class Switch:
-    """A requested change to the set of running controllers. The loop performs the change. Times are in seconds."""
+    """A requested change to the set of running controllers. The loop performs the change."""
 
     start: Sequence[Loaded]
     stop: Sequence[Loaded]
     hardware_start: Sequence[ControllerInfo]  # controllers to start that are not running yet
     hardware_stop: Sequence[ControllerInfo]  # controllers to stop that are running
     start_asap: bool
-    timeout: float  # maximum wait for the hardware; 0 or less: no limit
+    timeout: float  # maximum wait for the hardware in seconds; 0 or less: no limit
     requested: Time
     is_begun: bool = False  # True once the hardware has been asked to switch
     on_done: Callable[[], object] = lambda: None
