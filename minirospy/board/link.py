@@ -185,7 +185,7 @@ class Link:
                 return None
             now = time.time()
             edges = []
-            # A killed server may not have saved the last changes.
+            # The old server may have been killed before it saved the last changes.
             # Repeat the setup of this process's pins, with the last latches that the old server reported.
             for pin in sorted(self._mine):
                 state = self.states[pin]

@@ -101,7 +101,7 @@ class Release(NamedTuple):
 
 
 class Force(NamedTuple):
-    """An operation that drives an input to ``level`` or, like another program, sets an output's latch."""
+    """An operation that, from outside of the program, drives an input to ``level`` or sets an output's latch."""
 
     pin: int
     level: int
