@@ -21,7 +21,7 @@ def report_waiting(*, is_leaving: bool) -> None:
     """
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
-    # The terminal may already be closed.
+    # Ignore errors, because the terminal may already be closed.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
 

@@ -61,7 +61,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
 
-    # The library's own warnings use the same handlers.
+    # Print minirospy's own warnings on the terminal in the same format.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()

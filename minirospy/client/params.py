@@ -104,7 +104,7 @@ def set_param(param_name: str, param_value: object) -> None:
     except ROSException:
         check_sendable(param_value)
         raise
-    # The master notifies other nodes, but not the node that sets the parameter.
+    # Discard the cached value here: the master notifies other nodes, but not the node that sets the parameter.
     current_session().parameter_changed(name)
 
 

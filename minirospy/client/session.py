@@ -210,9 +210,9 @@ class Session:
         return self.lifecycle.is_shutdown()
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, to a thread that polls.
+        """Return whether the node has shut down, and record that the calling thread has asked.
 
-        Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
+        If the node has shut down, the thread then counts as notified, otherwise as polling.
         """
         if self._installs_signals:
             # A fork keeps the default signal handling until it calls is_shutdown() for the first time.
@@ -276,7 +276,7 @@ class Session:
         """Leave the graph. Waits for the master's responses, within Node.close()'s time limits."""
         if self._opened and self._loop:
             try:
-                # After a signal, the watchdog prints what the process is waiting for.
+                # After a signal, print nothing here, because the watchdog prints what the process is waiting for.
                 self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
@@ -303,7 +303,7 @@ class Session:
 
     def _on_shutdown_request(self, reason: str) -> None:
         """Shut down at another process's request. Like rospy, print the reason."""
-        # The terminal may have been closed.
+        # Ignore errors, because the terminal may have been closed.
         with contextlib.suppress(OSError, ValueError):
             print(
                 "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),

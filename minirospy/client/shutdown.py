@@ -124,7 +124,7 @@ class ShutdownMachine:
     def main_ends_by_itself(self) -> bool:
         """Return whether the main thread needs no exception to exit, because it has exited or has been notified."""
         # Trust a main thread that polls to exit by itself.
-        # Do not trust it after a request from another process, because no user is there to press Ctrl-C again.
+        # After a request from another process, trust only a notified one: no user is there to press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 

@@ -243,7 +243,7 @@ class SignalWatchdog:
 
 def _send_to_main(number: int) -> None:
     if sys.platform == "win32":
-        # On Windows, only this signal interrupts time.sleep().
+        # Always send SIGINT on Windows, because only SIGINT interrupts time.sleep() there.
         signal.raise_signal(signal.SIGINT)
     else:
         signal.pthread_kill(threading.main_thread().ident or 0, number)

@@ -121,7 +121,7 @@ class TopicStatisticsCounter:
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)
             window.last_sequence = sequence
-            # A stamp of zero means that the publisher has not set it.
+            # Ignore a stamp of zero, which the publisher has not set.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
 

@@ -347,7 +347,7 @@ class SubscribedTopic(SharedTopic):
             newest = link.latched
             if newest is not None and newest is not frame:
                 # A newer message has arrived in the meantime, and may have been delivered before this older one.
-                # Deliver the newer one again, so that it comes last.
+                # Deliver that newer message again, so that it comes last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:
