@@ -185,7 +185,7 @@ class McapReader(BagReader):
             for index in indexes
             if index.message_end_time >= first
             and index.message_start_time <= last
-            # A chunk without message indexes may contain any channel.
+            # Include chunks without message indexes, which may contain any channel.
             and not (index.message_index_offsets and index.message_index_offsets.keys().isdisjoint(wanted))
         ]
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAGIC", "McapRepair", "chunk_data", "mcap_faults"]
 
-MAGIC = b"\x89MCAP0\r\n"  # the first and last bytes of a file
+MAGIC = b"\x89MCAP0\r\n"  # the first and last bytes of an MCAP file
 
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQ")  # the start of a message: its channel, sequence and time

@@ -107,7 +107,7 @@ def is_convex(part: Mesh) -> bool:
         heights = normals[rows] @ vertices.T - offsets[rows, None]
         if heights.max() > TOLERANCE * size:
             return False
-    # A flat part passes these tests, but has no volume.
+    # Also require a volume, because a flat part passes the tests above.
     return bool(np.linalg.matrix_rank(vertices - vertices[0], tol=FLAT * max(size, 1e-12)) == 3)
 
 

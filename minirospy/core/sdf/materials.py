@@ -98,7 +98,7 @@ def read_material(element: Element, source: Source) -> Material:
     script = element.first("script")
     name = ""
     if script is not None:
-        # Before SDF 1.4, the element itself contains the name.
+        # Also accept the name as the text of ``<script>``, where it was before SDF 1.4.
         name = source.text(script, "name") or script.text.strip()
     known = named_material(name) if name else Material()
     if known is None and script is not None:

@@ -114,7 +114,7 @@ class _Reader:
         )
         try:
             physics = read_physics(chosen or (profiles[0] if profiles else None), self.source)
-            # Since SDF 1.6, gravity belongs to the world.
+            # Prefer the world's ``<gravity>``, which replaces that of ``<physics>`` since SDF 1.6.
             return physics._replace(gravity=self.source.vector(world, "gravity", physics.gravity))
         except SdfError as error:
             self.source.warnings.append(f"physics has its default values: {error}")
