@@ -215,7 +215,7 @@ class Session:
         If the node has shut down, the thread then counts as notified, otherwise as polling.
         """
         if self._installs_signals:
-            # A fork keeps the default signal handling until it calls is_shutdown() for the first time.
+            # Install the handlers now: a fork keeps the default signal handling until it first calls is_shutdown().
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()

@@ -122,9 +122,9 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread needs no exception to exit, because it has exited or has been notified."""
+        """Return whether the main thread needs no exception to exit: it has exited, was notified or, after a signal, polls."""
         # Trust a main thread that polls to exit by itself.
-        # After a request from another process, trust only a notified one: no user is there to press Ctrl-C again.
+        # After a request from another process, trust only a notified thread: no user is there to press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 

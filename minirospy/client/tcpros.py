@@ -231,7 +231,7 @@ class ProtocolHandler:
 
 
 class TCPROSTransport(Transport):
-    """A connection that blocks its thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
+    """A connection that blocks the calling thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
 
     Raise TransportInitError if ``name`` is empty.
     """
