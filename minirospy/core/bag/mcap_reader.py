@@ -156,7 +156,7 @@ class McapReader(BagReader):
         last = _END_OF_TIME if end is None else end
         selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
         # Read a chunk when its first message may be the next one.
-        # This loads each chunk only once, and keeps several chunks in memory only if they overlap in time.
+        # Each chunk is thus loaded only once, and several are in memory only if they overlap in time.
         # Positions are unique, so the heap never compares two runs.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)

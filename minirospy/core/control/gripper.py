@@ -32,7 +32,7 @@ class GripperCommand(NamedTuple):
 
 
 class Gripper:
-    """Follows commands. Other threads replace ``command``; the loop's thread calls :meth:`start` and :meth:`check`."""
+    """Follows commands. Other threads replace ``command``; the loop's thread calls :meth:`hold` and :meth:`check`."""
 
     def __init__(self, limits: GripperLimits) -> None:
         self.limits = limits

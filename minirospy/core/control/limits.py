@@ -94,7 +94,7 @@ def _of_description(joint: UrdfJoint) -> JointLimits:
 
 
 def _limit(parameters: Parameters, flag: str, key: str, given: float, none: float = inf) -> float:
-    """Return a parameter's value if its flag is true, ``none`` if the flag is false, ``given`` if either is not set."""
+    """Return the parameter ``key`` if ``flag`` is true, ``none`` if it is false, ``given`` if one of the two is not set."""
     has = parameters.get(flag)
     if has is False:
         return none

@@ -304,7 +304,7 @@ class JointPath:
         self.current = self._build(self._index)
 
     def set_goal(self, goal: MonitoredGoal | None) -> None:
-        """Assign the current and all later segments to another goal. They keep their tolerances."""
+        """Assign the current and all later segments to another goal. The segments keep their tolerances."""
         self._goal = goal
         self.current.goal = goal
         for segment in self._segments[self._index :]:

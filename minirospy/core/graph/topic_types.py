@@ -78,7 +78,7 @@ class TopicTypes:
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Keep the type of a topic that is no longer registered, as the most recent one."""
+        """Keep the type of a topic that is not registered, as if the topic had just been unregistered."""
         before = self._types.get(topic)
         if before and before.node:
             return

@@ -194,7 +194,7 @@ class _Converter:
     def _with_mass(self) -> list[str]:
         """Return the links that remain, in tree order. Leave out massless links and all links below them, with a warning."""
         kept: list[str] = []
-        lost: dict[str, int] = {}  # dict from the topmost massless link to the links below it
+        lost: dict[str, int] = {}  # dict from the topmost massless link to the number of links below it
         cause: dict[str, str] = {}
         for name, body in self._bodies.items():
             joint = self._robot.parent_joint(name)
