@@ -121,7 +121,7 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # This process is in another program's job, such as an IDE's or a service's, which does not let processes leave.
+            # Start it inside the job: an IDE's or a service's job that contains this process does not let processes leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 

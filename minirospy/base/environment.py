@@ -205,7 +205,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only this machine's addresses can be bound. (Use TCP, because Wine binds any address for datagrams.)
+        # Try to bind: only this machine's addresses can be bound. (Use TCP, because Wine binds any address for datagrams.)
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:

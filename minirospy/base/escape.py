@@ -78,7 +78,7 @@ class SafeTerminal(io.TextIOWrapper):
 
     def close(self) -> None:
         """Write pending output. The terminal itself stays open, because the interpreter's own stream uses it."""
-        # ValueError means that the stream was already closed.
+        # Ignore ValueError, which means that the stream was already closed.
         with contextlib.suppress(ValueError):
             self.flush()
             self.detach()

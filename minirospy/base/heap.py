@@ -23,7 +23,7 @@ def return_large_blocks(least: int = _LARGE) -> None:
         return
     import ctypes
 
-    # musl has no mallopt(), and a Python without libffi has no ctypes.
+    # Ignore errors: musl has no mallopt().
     with contextlib.suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)

@@ -45,7 +45,7 @@ class Keys:
         if sys.platform != "win32" and self.is_terminal and not self._is_closed:
             import termios
 
-            # The terminal cannot be restored if its window is closed.
+            # Ignore errors, because the terminal cannot be restored if its window is closed.
             with contextlib.suppress(termios.error):
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 

@@ -102,7 +102,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             action()
             return
         except PermissionError:
-            # On other systems the cause is the folder's permissions, which waiting does not change.
+            # Do not retry on other systems: there, the cause is the folder's permissions, which waiting does not change.
             if not REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)

@@ -70,7 +70,7 @@ def find_ros1(name: str, path: Sequence[str]) -> ModuleSpec | None:
     """Return the spec of the first top-level package on ``path`` that is not ROS 2's, or None if there is none."""
     for entry in path:
         found = PathFinder.find_spec(name, [entry])
-        # A folder without an __init__.py, whose spec has no loader, hides no package that comes later on the path.
+        # Skip a folder without an __init__.py, whose spec has no loader: it hides no package that comes later on the path.
         if found is not None and found.loader is not None and not is_of_ros2(found):
             return found
     return None

@@ -25,7 +25,7 @@ def find_packages_named_like_scripts() -> None:
     """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
-    # A program started with `python -m` has a spec, and Python does not search its folder.
+    # Do nothing for a program started with `python -m`, which has a spec: Python does not search its folder.
     if (
         not file
         or getattr(main, "__spec__", None)
@@ -33,7 +33,7 @@ def find_packages_named_like_scripts() -> None:
     ):
         return
     path = os.path.abspath(file)
-    # A program copied by catkin_make runs the file in the source folder, but Python searches the folder of the copy.
+    # Use sys.path[0]: a program copied by catkin_make runs the source file, but Python searches the folder of the copy.
     if sys.path and os.path.isfile(os.path.join(sys.path[0], os.path.basename(path))):
         sys.meta_path.insert(0, _Finder(sys.path[0], os.path.basename(path)))
 

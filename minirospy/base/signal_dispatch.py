@@ -28,7 +28,7 @@ def is_dispatching_signal() -> bool:
 
 
 def interrupt_signals() -> list[signal.Signals]:
-    """Return the signals that Ctrl-C sends: SIGINT, and on Windows SIGBREAK.
+    """Return the signals that interrupt a program: SIGINT (Ctrl-C) and, on Windows, SIGBREAK (Ctrl-Break).
 
     On Windows, only SIGBREAK reaches a process in a separate process group.
     """

@@ -17,7 +17,7 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
         # Programs may pass a value that is not a string; no name is similar to that.
         return []
     names = sorted(set(known))
-    # The most common mistake is to omit the package or namespace.
+    # Prefer names that end with ``name``: the most common mistake is to omit the package or namespace.
     tails = [each for each in names if each.rpartition("/")[2] == name]
     return (tails or _similar(name, names, 0.7))[:3]
 
@@ -72,7 +72,7 @@ def _ratio(part: str, meant: str, matcher: SequenceMatcher[str], cutoff: float) 
     shorter, longer = sorted((part, meant), key=len)
     if cutoff < _SLIP and len(shorter) >= _STEM and longer.startswith(shorter):
         return max(cutoff, matcher.quick_ratio())
-    # Both methods are cheap upper bounds of ratio().
+    # Avoid the slow ratio() if one of its cheap upper bounds is too low.
     if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
         return 0.0
     return matcher.ratio()

@@ -65,7 +65,7 @@ class TVal:
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
-        # The program may have assigned fractions or numpy values, which overflow.
+        # Convert to int first: the program may have assigned fractions, or numpy values, which overflow.
         whole, rest = _split(secs)
         return whole * _BILLION + rest + int(nsecs)
 
@@ -160,7 +160,7 @@ class Time(TVal):
 
 
 class Duration(TVal):
-    """A time span. If it is negative, ``secs`` is negative and ``nsecs`` positive."""
+    """A time span. If it is negative, only ``secs`` is negative: -0.5 s is ``secs`` -1 and ``nsecs`` 500_000_000."""
 
     __module__ = "genpy.rostime"
 

@@ -80,7 +80,7 @@ def decode_xml(data: bytes) -> tuple[str, str]:
 
 
 class _Rewriting:
-    """Rewrites one text as well-formed XML. ``notes``: one per kind of fault, in the order of first occurrence."""
+    """Rewrites one document as well-formed XML. ``notes`` has one entry per kind of fault, in order of first occurrence."""
 
     def __init__(self) -> None:
         self.notes: dict[str, Note] = {}

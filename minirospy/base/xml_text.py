@@ -186,5 +186,5 @@ def _parse(parser: expat.XMLParserType, text: str | bytes) -> None:
         why = f"{expat.ErrorString(error.code)} (column {error.offset})"
         raise XmlSyntaxError(error.lineno, why) from None
     except (LookupError, ValueError) as error:
-        # The encoding is unknown, or the text contains a lone surrogate.
+        # Report an unknown encoding, or text with a lone surrogate, as a syntax error.
         raise XmlSyntaxError(0, str(error)) from None

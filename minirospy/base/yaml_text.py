@@ -86,7 +86,7 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
 
 
 def _require_text(text: object) -> None:
-    """Raise TypeError if a value is not a string; that is an error in the program, not in the text."""
+    """Raise TypeError if a value is neither str nor bytes; that is an error in the program, not in the text."""
     if not isinstance(text, str | bytes):
         raise TypeError(f"YAML is a text, not {type(text).__name__}")
 

@@ -25,7 +25,7 @@ def channels_of(channel: object) -> list[int]:
 
 
 def level_of(value: object) -> int:
-    """Convert a level argument to 0 or 1. Raise TypeError if it is neither an integer nor a bool."""
+    """Convert a level argument to 0 or 1. Raise TypeError for None, a string, a list, or an object without ``__bool__``."""
     if isinstance(value, int):
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):

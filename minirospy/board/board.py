@@ -80,7 +80,7 @@ class Board:
         self._link.call(Release(pin))
 
     def set(self, pin: int, level: int) -> None:
-        """Drive an input to ``level`` (0 or 1) from outside, or set an output as another program would."""
+        """From outside of the program, drive an input to ``level`` (0 or 1) or set an output."""
         self._link.call(Force(pin, level))
 
     @property

@@ -82,7 +82,7 @@ class CallbackThread:
         self._thread.start()
 
     def schedule(self, detector: Detector) -> None:
-        """Run all callbacks of ``detector``, unless it is removed before they start."""
+        """Queue a run of all callbacks of ``detector``. If it is removed, the callbacks that have not started are skipped."""
         self._due.put(detector)
 
     def close(self) -> None:

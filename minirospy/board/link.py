@@ -119,7 +119,7 @@ class Link:
                 raise BoardError(f"the virtual board [{self._directory.name}] does not answer")
 
     def write(self, levels: Sequence[tuple[int, int]]) -> None:
-        """Set output pins' latches, in order, without waiting; the mirror shows the levels immediately."""
+        """Set output pins' latches, in order, usually without waiting; :attr:`levels` shows them immediately."""
         with self._lock:
             if len(self._unacknowledged) >= MAX_UNACKNOWLEDGED:
                 self.call(None)
@@ -185,8 +185,8 @@ class Link:
                 return None
             now = time.time()
             edges = []
-            # A killed server may not have saved the last changes.
-            # Repeat the setup of this process's pins, with their last levels in the mirror.
+            # The old server may have been killed before it saved the last changes.
+            # Repeat the setup of this process's pins, with the last latches that the old server reported.
             for pin in sorted(self._mine):
                 state = self.states[pin]
                 latch = state.latch if state.function is Function.OUT else None
@@ -204,7 +204,7 @@ class Link:
         return connection
 
     def _take(self, message: Message) -> Edge | None:
-        """Apply one message to the mirror; return the edge that it reports, if any. The caller holds the lock."""
+        """Apply one message to this process's copy of the pins; return the edge that it reports, if any. Hold the lock."""
         if isinstance(message, Changed):
             self.states[message.pin] = message.state
             level = message.state.level
@@ -337,7 +337,7 @@ def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
     windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    # A temporary board only serves the processes started here, so it need not outlive this one.
+    # A temporary board's server may end with this process, because it only serves processes started here.
     start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
     with open(os.devnull, "a") if windows else private_files.open_text(directory.log_path, "a") as log:
         process = start(

@@ -74,7 +74,7 @@ class Pin(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """Set a pin's function. ``initial`` is an output's first level, or None to keep the latch."""
+    """An operation that sets a pin's function. ``initial`` is an output's first level, or None to keep the latch."""
 
     pin: int
     function: int
@@ -83,25 +83,25 @@ class Setup(NamedTuple):
 
 
 class Write(NamedTuple):
-    """Set the latches of several pins together: ((pin, level), ...)."""
+    """An operation that sets the latches of several pins together: ((pin, level), ...)."""
 
     levels: Sequence[Sequence[int]]
 
 
 class Press(NamedTuple):
-    """Press the button at ``pin``."""
+    """An operation that presses the button at ``pin``."""
 
     pin: int
 
 
 class Release(NamedTuple):
-    """Release the button at ``pin``."""
+    """An operation that releases the button at ``pin``."""
 
     pin: int
 
 
 class Force(NamedTuple):
-    """Drive an input to ``level``, or set an output's latch, as another program would."""
+    """An operation that, from outside of the program, drives an input to ``level`` or sets an output's latch."""
 
     pin: int
     level: int

@@ -60,13 +60,13 @@ class Hello(NamedTuple):
 
 
 class MovePerson(NamedTuple):
-    """Move the person to a position; None removes the person."""
+    """An operation that moves the person to a position; None removes the person."""
 
     position: Position | None
 
 
 class Request(NamedTuple):
-    """A request to perform ``operation``, or None only to get a Done in reply."""
+    """A request to perform ``operation``. If that is None, the request only asks for a Done in reply."""
 
     number: int
     operation: Operation | MovePerson | None
@@ -212,4 +212,4 @@ _READERS: tuple[Callable[..., Message], ...] = (
     lambda number: Done(_natural(number)),
     lambda number, why: Refused(_natural(number), str(why)),
     lambda position: PersonMoved(_position(position)),
-)  # message classes, in the same order as _KINDS
+)  # functions that create a message from its fields, in the order of _KINDS

@@ -228,7 +228,7 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Reset the mode even if no channel was set up: RPi.GPIO only checks whether any pin has been accessed.
+                # Like RPi.GPIO, reset the mode if any pin has been accessed, even if no channel was set up.
                 self._mode = None
 
         if not mine:

@@ -26,7 +26,7 @@ _DARK_EDGE = 0.35  # minimum brightness, from 0 to 1, of a surface seen at a fla
 
 
 class Wall(NamedTuple):
-    """A straight wall between two points. If ``is_reflector`` is true, the wall reflects all light."""
+    """A straight wall between two points. If ``is_reflector`` is true, its intensity is that of a reflector."""
 
     x1: float
     y1: float

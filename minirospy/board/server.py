@@ -106,7 +106,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # A client may have the address file open, which prevents removing it. The next server replaces it.
+            # Ignore errors: on Windows, a file that a client has open cannot be removed. The next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):

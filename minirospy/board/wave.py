@@ -21,10 +21,10 @@ class Output(Protocol):
         """Set the level at a pin."""
 
     def register_wave(self, wave: Wave) -> None:
-        """Record that a wave uses its pin."""
+        """Record that ``wave`` uses the pin ``wave.pin``."""
 
     def unregister_wave(self, wave: Wave) -> None:
-        """Release the pin for another wave."""
+        """Release the pin of ``wave``, so that another wave may use it."""
 
 
 class Wave:

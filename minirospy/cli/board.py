@@ -55,7 +55,7 @@ def _missing_name() -> int:
 
 
 class Picture:
-    """A rich renderable that draws a board: its LEDs, its buttons, the person at the motion sensor, and other pins in use."""
+    """A rich renderable that draws a board: its LEDs, its buttons, the person at the scanner, and other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state

@@ -267,7 +267,7 @@ def _given_token(option: str, given: str | None, variable: str) -> str:
     if given is None:
         return os.environ.get(variable, "")
     if not given:
-        # The argument may be an unset shell variable, which must not open the bridge to everybody.
+        # Reject an empty token: it may come from an unset shell variable, and must not open the bridge to everybody.
         raise Misuse(f"--{option} wants a token of 8 to 200 characters, and got an empty one")
     return given
 
@@ -291,8 +291,8 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     is_any = options.address in ("0.0.0.0", "::")
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
-        # localhost may resolve to ::1, where another user's server would receive the token.
-        # A certificate rules this out, because it identifies the server.
+        # Print an address instead of localhost, which may resolve to ::1, where another user's server would receive the token.
+        # With a certificate, localhost is safe, because the certificate identifies the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     served = {"Foxglove protocol": listener}

@@ -126,7 +126,7 @@ def _check(
     if one_master is not None:
         from minirospy.cli.completion.shell import shell_name
 
-        # The shell that evaluates the lines may not be the login shell in SHELL, but all Unix shells accept sh's syntax.
+        # Use sh's syntax by default, which all Unix shells accept: SHELL may not name the shell that evaluates the lines.
         in_cmd = sys.platform == "win32" and "SHELL" not in os.environ
         one_master = shell_name(one_master or ("bat" if in_cmd else "sh"))
     if join is not None or name is not None:

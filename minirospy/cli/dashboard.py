@@ -341,13 +341,13 @@ def _serve(
     from minirospy.web.dashboard.waiting_page import WaitingPage
     from minirospy.web.serve import run
 
-    # The user may name a bag in any folder, not only below the working folder.
+    # Also serve the bags that the user has named, which may be outside of the working folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     if not is_loopback(serving.bound) and not listen:
         raise Misuse(f"--address {serving.address} lets other machines connect: add --listen")
     tokens = _tokens(Environment.read().home, must_be_kept=listen, must_be_new=embeds)
-    # Behind a proxy, clients on other machines appear to be local.
+    # Require the token behind a proxy (--host-name), where clients on other machines appear to be local.
     requires_token = listen or bool(serving.host_name)
     access = Access(
         hosts=(*host_names(), *serving.host_name),
@@ -371,7 +371,7 @@ def _serve(
             self._opened: list[Dashboard] = []
 
         async def wait(self) -> None:
-            """If nothing listens at the master's address, start serving a page without data, which :meth:`start` replaces."""
+            """Unless the master is reachable, start serving a page without data, which :meth:`start` will replace."""
             if await _is_reachable(self._node.master_uri):
                 return
             for each in ports:

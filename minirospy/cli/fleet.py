@@ -334,7 +334,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
             parameters.set_parameter(graph, name, machine)
             print(f"robot [{robot}]: only machine {machine} is shown (parameter {name})")
             return 0
-        # There is nothing to delete if no machine has been chosen.
+        # Ignore a missing parameter: no machine has been chosen yet.
         with contextlib.suppress(NotFoundError):
             parameters.delete_parameter(graph, name)
     print(f"robot [{robot}]: the machine that came first is shown")

@@ -201,7 +201,7 @@ class _Listing:
             await asyncio.sleep(_LOOK_SECONDS)
             looks += 1
             if looks < _LONELY_LOOKS and not self._bridge.side.nodes():
-                # ROS 2 has not discovered the other nodes yet.
+                # Wait on, because ROS 2 has not discovered the other nodes yet.
                 continue
             found = await self._bridge.pairs()
             quiet = quiet + 1 if found == before else 0

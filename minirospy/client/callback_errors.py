@@ -21,14 +21,14 @@ _log = logging.getLogger("rosout")
 
 
 class _Repeated:
-    """An error that has been logged in full."""
+    """An error that has been logged in full. Later occurrences are counted, and logged on one line at intervals."""
 
     __slots__ = ("due", "line", "omitted")
 
     def __init__(self, due: float, line: str) -> None:
         self.due = due  # time when the next line may be logged
-        self.line = line  # description of the last error
-        self.omitted = 0  # number of errors not logged since the last line
+        self.line = line  # one-line description of the last occurrence
+        self.omitted = 0  # number of occurrences since the last line that was logged
 
 
 class CallbackErrors:
@@ -38,7 +38,7 @@ class CallbackErrors:
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Create the log. ``clock()`` returns the time in seconds."""
+        """Create a log without errors. ``clock()`` returns the time in seconds."""
         self._clock = clock
         # Keyed by the error's type, the callback's name, the file and the line.
         # The table stays small, because a program raises errors in few places.

@@ -21,9 +21,9 @@ class Connection(NamedTuple):
 
     ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` is the topic; ``id`` is unique in the node.
     ``endpoint_id`` is the URI of the publisher's Slave API, or the name of the subscribing node. ``callerid_pub``,
-    ``header``, ``type`` and ``md5sum`` have the values that the publisher sent; they are empty if this node is the publisher.
-    ``stat_bytes`` and ``stat_num_msg`` count the bytes and messages received or sent. ``transport_type`` is always TCPROS;
-    :meth:`get_transport_info` names a Unix socket.
+    ``header``, ``type`` and ``md5sum`` have the values that the publisher sent; they are "unknown" or None if this node is
+    the publisher. ``stat_bytes`` and ``stat_num_msg`` count the bytes and messages received or sent. ``transport_type`` is
+    always TCPROS; :meth:`get_transport_info` names a Unix socket.
     """
 
     link: InLink | OutLink

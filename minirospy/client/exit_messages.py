@@ -21,7 +21,7 @@ def report_waiting(*, is_leaving: bool) -> None:
     """
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
-    # The terminal may already be closed.
+    # Ignore errors, because the terminal may already be closed.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
 
@@ -69,7 +69,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if is_interrupt(error):
             if sys.flags.inspect:
-                # `python -i PROGRAM` continues with an interactive session.
+                # Do not exit: `python -i PROGRAM` continues with an interactive session.
                 return
             raise SystemExit(0)
         hooks[0](kind, error, trace)

@@ -29,7 +29,7 @@ class Identity:
     """
 
     def __init__(self, previous: Identity | None = None) -> None:
-        """Create an identity that equals ``previous``, except for topic names, until :meth:`take_name` is called."""
+        """Create an identity that equals ``previous`` until :meth:`take_name` is called, except in :meth:`resolve_topic`."""
         # New names, keyed by the resolved old names and by __name and similar keys; empty before init_node.
         # Programs may change this dict and `mappings`.
         self.remappings: dict[str, str] = previous.remappings if previous else {}
@@ -43,7 +43,7 @@ class Identity:
 
     @property
     def environment(self) -> Environment:
-        """The environment when the process started."""
+        """The environment, as read by :meth:`take_name`; before that, as read when it was first needed."""
         if self._environment is None:
             self._environment = _read_environment()
         return self._environment

@@ -172,9 +172,9 @@ class Lifecycle:
         return self.machine.main.awareness is not Awareness.NONE
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down.
+        """Return whether the node has shut down, and record that the calling thread has asked.
 
-        Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
+        If the node has shut down, the thread then counts as notified, otherwise as polling.
         """
         self.deferral.poll()
         is_shutdown = self.shutting_down.is_set()

@@ -123,7 +123,7 @@ def write(
     place = at.f_code.co_filename, at.f_lineno
     record = logger.makeRecord(logger.name, level, *place, msg, args, error, function, extra, stack)
     if args or not isinstance(msg, str):
-        # An error in one log call must not end the node, even if the program's own handlers do not catch exceptions.
+        # Format the message once now: an error in a log call must not end the node, even in handlers that do not catch it.
         check_message(record)
     with current_session().lifecycle.deferral:
         logger.handle(record)

@@ -69,16 +69,16 @@ class RosStreamHandler(DeferringHandler):
             try:
                 stream.write(line + "\n")
             except UnicodeEncodeError:
-                # The terminal's encoding may lack some characters, for example on Windows.
+                # Escape characters that the terminal's encoding lacks, for example on Windows.
                 encoding = stream.encoding or "ascii"
                 stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             stream.flush()
         except RuntimeError:
-            # Writing fails if a signal handler logs while it is interrupting another write.
+            # Write to the file descriptor: a signal handler logs while it is interrupting a write to the stream.
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # There is no terminal, or it has been closed; neither is the program's fault.
+            # Drop the line: there is no terminal, or it has been closed, and neither is the program's fault.
             pass
 
 

@@ -61,7 +61,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
 
-    # The library's own warnings use the same handlers.
+    # Print minirospy's own warnings on the terminal in the same format.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
@@ -173,7 +173,7 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 def _link_latest(folder: Path) -> None:
     """Create the link ``latest`` next to a run's folder, pointing to that folder."""
     link = folder.parent / "latest"
-    # The file system does not support links, or another node created the link first.
+    # Ignore errors: the file system may not support links, or another node may have created the link first.
     with contextlib.suppress(OSError, NotImplementedError):
         if link.is_symlink():
             if link.resolve() == folder.resolve():

@@ -95,7 +95,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
 def set_param(param_name: str, param_value: object) -> None:
     """Set a parameter; a dictionary sets a whole namespace. Numpy numbers and arrays are sent as numbers and lists.
 
-    Raise TypeError or OverflowError if XML-RPC has no type for a value, ROSException if the master fails.
+    Raise TypeError, OverflowError or ValueError if XML-RPC cannot represent a value, ROSException if the master fails.
     """
     name = current_session().resolve(param_name)
     warn_of_illegal_name(param_name)
@@ -104,7 +104,7 @@ def set_param(param_name: str, param_value: object) -> None:
     except ROSException:
         check_sendable(param_value)
         raise
-    # The master notifies other nodes, but not the node that sets the parameter.
+    # Discard the cached value here: the master notifies other nodes, but not the node that sets the parameter.
     current_session().parameter_changed(name)
 
 
@@ -228,7 +228,7 @@ def as_xmlrpc_client(value: object) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """Raise the same exception as rospy if XML-RPC has no type for a value."""
+    """Raise the same exception as rospy if XML-RPC has no type for a value, ValueError if XML lacks a character in it."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
 

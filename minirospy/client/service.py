@@ -96,7 +96,7 @@ class Service(Generic[_S_co]):
 
     @property
     def is_new(self) -> bool:
-        """Return whether the service was registered only a moment ago and has not been called yet."""
+        """Return whether the service was created only a moment ago and has not answered a call yet."""
         return not self.seq and time.monotonic() - self._since < NEW_SECONDS
 
     @property

@@ -114,7 +114,7 @@ class ServiceProxy(Generic[_S_co]):
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
             if self._is_calling:
-                # A shutdown hook interrupted this thread's call, and the call's response is still to be read from the connection.
+                # Use a new connection: a shutdown hook interrupted this thread's call, whose response is still to be read.
                 body = self._serialize(request)
                 return self._exchange(self._connect(body), body, keep=False)
             self._is_calling = True
@@ -124,7 +124,7 @@ class ServiceProxy(Generic[_S_co]):
                 self._is_calling = False
 
     def _call_in_turn(self, request: Message) -> Message:
-        """Call the service through the transport or the persistent connection, and return the response."""
+        """Call the service through the transport, the persistent connection or else a new one; return the response."""
         # Check for a transport only now: another thread may have taken or closed it while this one waited.
         transport = self._usable_transport()
         if transport is not None:
@@ -249,7 +249,7 @@ class ServiceProxy(Generic[_S_co]):
         """Return the persistent connection for sending ``request``; connect if there is none, or if it has ended."""
         client = self._client
         if client and (client.has_ended() or self._client_session is not current_session()):
-            # In a fork the connection belongs to the parent: the two processes would read each other's responses.
+            # In a fork, do not use the parent's connection: the two processes would read each other's responses.
             with self._handover:
                 self._disconnect()
             client = None
@@ -287,7 +287,7 @@ class ServiceProxy(Generic[_S_co]):
         return buffer.getvalue()
 
     def _connect(self, request: bytes) -> ServiceClient:
-        """Return a connection for sending ``request``. The request may already have been sent on it."""
+        """Return a new connection, on which to make the call with ``request``. It may already have sent the request."""
         ahead = self._connect_ahead()
         try:
             return self._connect_by_master(ahead, request)
@@ -336,7 +336,7 @@ class ServiceProxy(Generic[_S_co]):
         uri = self._find_uri()
         try:
             if ahead and ahead.uri == uri:
-                # The server may have been about to exit when it accepted the connection, so connect again.
+                # If the connection breaks, connect again: the server may have been about to exit when it accepted the connection.
                 # Do not retry if the server does not respond, because it may have received the request.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)

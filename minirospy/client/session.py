@@ -61,7 +61,7 @@ class Session:
 
         self.callback_errors = CallbackErrors()
         self.lifecycle.late_hooks.append(self.callback_errors.close)
-        self.lock = threading.RLock()  # orders registrations, and guards the tables
+        self.lock = threading.RLock()  # orders registrations, and guards the tables of topics and services
         self.clock: Clock = previous.clock if previous else WallClock()
         # Notified whenever the simulated time changes
         self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
@@ -101,7 +101,7 @@ class Session:
 
     @property
     def initialized(self) -> bool:
-        """Return whether init_node has been called."""
+        """Return whether init_node has finished."""
         return self.node is not None
 
     @property
@@ -210,12 +210,12 @@ class Session:
         return self.lifecycle.is_shutdown()
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down.
+        """Return whether the node has shut down, and record that the calling thread has asked.
 
-        Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
+        If the node has shut down, the thread then counts as notified, otherwise as polling.
         """
         if self._installs_signals:
-            # A fork keeps the default signal handling until it calls is_shutdown() for the first time.
+            # Install the handlers now: a fork keeps the default signal handling until it first calls is_shutdown().
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()
@@ -242,7 +242,7 @@ class Session:
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
         # Ignore the two logger services, which every node offers.
         own = {name: each for name, each in self.offered.items() if not name.endswith(_SERVICES_OF_NODES)}
-        # A program that polls, or has waited, exits on purpose, and so does an interactive session.
+        # Do not warn if the program polls or has waited, or in an interactive session: they exit on purpose.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if is_meant or hasattr(sys, "last_value") or not all(state.is_new for state in waiting.values()):
@@ -266,7 +266,7 @@ class Session:
             published.forget_subscribers()
         self.published, self.subscribed, self.offered = {}, {}, {}
         self.node = None
-        # Another thread in the parent may have held the lock during the fork.
+        # Replace the lock, because another thread in the parent may have held it during the fork.
         self.lock = threading.RLock()
         self.signals.release()
 
@@ -276,7 +276,7 @@ class Session:
         """Leave the graph. Waits for the master's responses, within Node.close()'s time limits."""
         if self._opened and self._loop:
             try:
-                # After a signal, the watchdog prints what the process is waiting for.
+                # After a signal, print nothing here, because the watchdog prints what the process is waiting for.
                 self._loop.run(self._opened.close(announces=not self.lifecycle.machine.signals))
             except RuntimeError as error:
                 _log.debug("closing the node: %s", error)
@@ -303,7 +303,7 @@ class Session:
 
     def _on_shutdown_request(self, reason: str) -> None:
         """Shut down at another process's request. Like rospy, print the reason."""
-        # The terminal may have been closed.
+        # Ignore errors, because the terminal may have been closed.
         with contextlib.suppress(OSError, ValueError):
             print(
                 "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),
@@ -349,7 +349,7 @@ def replace_session() -> None:
 
 
 def replace_session_in_fork() -> None:
-    """Replace the session in a fork.
+    """In a fork, replace the parent's session with a new one.
 
     The new session keeps the name, the time and the logging, but not the node, which belongs to the parent.
     """

@@ -15,7 +15,7 @@ _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 # Seconds for the main thread to exit by itself after another process has requested the shutdown.
 # The time is longer than after a signal, because no user is waiting at the terminal.
-# A main thread that polls is_shutdown() may be in a long iteration of its loop.
+# It is longest for a main thread that polls is_shutdown(), because it may be in a long iteration of its loop.
 _REQUEST_GRACE_SECONDS = 2.0
 _REQUEST_GRACE_OF_POLLS_SECONDS = 5.0
 
@@ -113,7 +113,7 @@ class ShutdownMachine:
         return due
 
     def drop_request(self) -> None:
-        """Forget the request from another process, because the main thread must not be interrupted for it.
+        """Forget the request from another process, so that it does not cause an exception in the main thread.
 
         A signal from the user may still interrupt the main thread.
         """
@@ -122,9 +122,9 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread needs no exception to exit, because it has exited or has been notified."""
+        """Return whether the main thread needs no exception to exit: it has exited, was notified or, after a signal, polls."""
         # Trust a main thread that polls to exit by itself.
-        # Do not trust it after a request from another process, because no user is there to press Ctrl-C again.
+        # After a request from another process, trust only a notified thread: no user is there to press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 

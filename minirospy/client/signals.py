@@ -103,7 +103,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while the node handles Ctrl-C. Afterwards, a third Ctrl-C terminates the process."""
+        """Flush the program's output while Ctrl-C is still handled. If it was pressed twice, let a third one end the process."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:
@@ -243,7 +243,7 @@ class SignalWatchdog:
 
 def _send_to_main(number: int) -> None:
     if sys.platform == "win32":
-        # On Windows, only this signal interrupts time.sleep().
+        # Always send SIGINT on Windows, because only SIGINT interrupts time.sleep() there.
         signal.raise_signal(signal.SIGINT)
     else:
         signal.pthread_kill(threading.main_thread().ident or 0, number)

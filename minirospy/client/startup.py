@@ -140,7 +140,7 @@ def _install_process_hooks() -> None:
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []
 
-        # Python drops a signal that reaches the child before the child is set up; Pool.terminate() would then wait forever.
+        # Block signals during a fork: Python drops one that reaches the child too early, and Pool.terminate() then waits forever.
         def block_signals() -> None:
             mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
 

@@ -30,8 +30,8 @@ _FIRST_WINDOW = 2.0
 class WindowLimits(NamedTuple):
     """The limits within which the length of a statistics window is adapted.
 
-    The window's length doubles if it has fewer than ``min_elements`` messages, and halves if it has more than
-    ``max_elements``. The length stays between ``min_size`` and ``max_size`` seconds.
+    The window's length doubles, up to ``max_size`` seconds, if it has fewer than ``min_elements`` messages. The length halves,
+    down to ``min_size``, if it has more than ``max_elements``.
     """
 
     min_elements: float = 10
@@ -121,7 +121,7 @@ class TopicStatisticsCounter:
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)
             window.last_sequence = sequence
-            # A stamp of zero means that the publisher has not set it.
+            # Ignore a stamp of zero, which the publisher has not set.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
 

@@ -182,12 +182,12 @@ class SubscribedTopic(SharedTopic):
 
     @property
     def has_callback(self) -> bool:
-        """Return whether a Subscriber has a callback."""
+        """Return whether any Subscriber of the topic has a callback."""
         return any(handle.callback is not None for handle in self._handles)
 
     @property
     def is_new(self) -> bool:
-        """Return whether the latest Subscriber was created a moment ago and no message has arrived since."""
+        """Return whether the latest Subscriber was created a moment ago, and no link has received a message."""
         has_received = any(link.received for link in self.links)
         return not has_received and time.monotonic() - self._since < NEW_SECONDS
 
@@ -347,7 +347,7 @@ class SubscribedTopic(SharedTopic):
             newest = link.latched
             if newest is not None and newest is not frame:
                 # A newer message has arrived in the meantime, and may have been delivered before this older one.
-                # Deliver the newer one again, so that it comes last.
+                # Deliver that newer message again, so that it comes last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:

@@ -63,7 +63,7 @@ def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
 
 
 class TCPROSTransportProtocol:
-    """The data transferred on a connection: its header's fields, and the class of the received messages."""
+    """Describes the data on a connection: its header's fields, and the class of the received messages."""
 
     def __init__(
         self,
@@ -190,7 +190,7 @@ class Transport:
 
 
 class DeadTransport(Transport):
-    """The statistics of a closed connection."""
+    """What remains of a closed connection: its addresses and statistics."""
 
     def __init__(self, transport: Transport) -> None:
         super().__init__(transport.direction, transport.name)
@@ -231,7 +231,7 @@ class ProtocolHandler:
 
 
 class TCPROSTransport(Transport):
-    """A connection that blocks its thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
+    """A connection that blocks the calling thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
 
     Raise TransportInitError if ``name`` is empty.
     """
@@ -338,7 +338,7 @@ class TCPROSTransport(Transport):
         self.use_header(header)
 
     def use_header(self, header: Mapping[str, str]) -> None:
-        """Set the peer's name and type from its connection header. Raise TransportInitError if the header has no type."""
+        """Set the peer's name and type from its header. Raise TransportInitError if the header has no type or md5sum."""
         for field in ("md5sum", "type"):
             if field not in header:
                 raise TransportInitError(f"header missing required field [{field}]")

@@ -23,7 +23,7 @@ __all__ = [
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """Return [topic, type] for each published topic at or below ``namespace``. Raise ROSException if the master fails."""
+    """Return [topic, type] for each published topic below ``namespace``. Raise ROSException if the master fails."""
     try:
         return [list(pair) for pair in current_session().master.get_published_topics(namespace or "")]
     except (MasterUnreachableError, RpcError) as error:

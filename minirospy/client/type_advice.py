@@ -30,7 +30,7 @@ def advice_for_callback(
             return ""
         if list(message.__slots__) == ["data"] and type(message).__name__ in str(error):
             return f"the value of a {message._type} is its field: message.data"
-    # `is` would narrow the message's type to object.
+    # Compare with id(), because `is` would make mypy narrow the message's type to object.
     if isinstance(error, AttributeError) and id(error.obj) == id(message):
         return f"a {message._type} has the fields {', '.join(message.__slots__)}"
     return ""

@@ -153,7 +153,7 @@ def run(
         wrong = error.object[error.start : error.end]
         return complain(name, UsageError(f"the argument {wrong!r} is not UTF-8 text"), 2)
     except BrokenPipeError:
-        # The program that reads stdout, such as `| head`, has exited.
+        # Succeed if the program that reads stdout, such as `| head`, has exited.
         _flush()
         return 0
     except OSError as error:

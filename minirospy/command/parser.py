@@ -324,7 +324,7 @@ def _filled(text: str) -> str:
 
 
 def _ros_options(title: str, actions: Iterable[argparse.Action]) -> str:
-    """Return a section of options: ``-b BAGFILE, --bag=BAGFILE``, with the help next to or below each option."""
+    """Format a section of the help: options such as ``-b BAGFILE, --bag=BAGFILE``, each with its help next to or below it."""
     rows = []
     for action in actions:
         if action.help == argparse.SUPPRESS:

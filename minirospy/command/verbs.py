@@ -79,7 +79,7 @@ def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB")
 def with_options(
     options: Callable[..., _Options], body: Callable[[_Options], int | None]
 ) -> Callable[..., int | None]:
-    """Return a function that takes a parser's arguments as keywords, and passes them to ``body`` in a single record.
+    """Return a function that takes a parser's arguments as keywords, makes a record of them, and calls ``body(record)``.
 
     ``options`` is the record's class, whose fields have the names of the parser's arguments: a NamedTuple, because
     importing dataclasses takes longer than a command runs.

@@ -75,7 +75,7 @@ def candidates(
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # The package or type is unknown, which the command itself will report.
+        # Offer nothing if the package or type is unknown: the command itself will report that.
         return []
 
 

@@ -138,7 +138,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return the contents of the folder named in ``word``, as paths that start with ``shown`` in place of ``root``."""
+    """Return the paths of the entries in the folder of ``word``, a path that starts with ``shown`` in place of ``root``."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -383,7 +383,7 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # A list or dictionary is written on one line.
+    # Write a list or dictionary on one line.
     # Omit long values: nobody edits a whole robot description on a command line.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
@@ -416,7 +416,7 @@ def _catalogue() -> Catalogue:
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
     """Complete a type in two steps, ``pkg/`` and then ``pkg/Type``, because a list of all types would be too long.
 
-    For `rosmsg show`, also return type names without the package.
+    For `rosmsg show`, `info` and `md5`, return type names without the package if no package fits.
     """
     from minirospy.introspect.interfaces import Interfaces, Kind
 
@@ -486,7 +486,7 @@ def request_text(cursor: Cursor) -> Iterable[str]:
 def _text(spec: MessageSpec, catalogue: Catalogue) -> Text:
     from minirospy.introspect.prototype import prototype
 
-    # Within double quotes, an interactive shell would replace !! with the previous command.
+    # Write empty bytes as []: an interactive shell would replace !! with the previous command, even in double quotes.
     return Text(prototype(spec, catalogue).replace('!!binary ""', "[]"))
 
 

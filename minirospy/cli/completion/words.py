@@ -68,7 +68,7 @@ def _read_posix(word: str) -> Word:
 
 
 def _write_posix(text: str, word: Word) -> str:
-    """Return ``text`` in the shell's syntax: within the user's open quote, or in double quotes for a :class:`Text`."""
+    """Return ``text`` in the shell's syntax: within the user's open quote, in double quotes (a :class:`Text`) or escaped."""
     if word.quote:
         # Leave the quote open after a folder, because the user may continue the path.
         end = "" if text.endswith("/") else word.quote
@@ -82,7 +82,7 @@ def _inside(text: str, quote: str) -> str:
     text = text.replace("\n", _LINE_FEED)
     if quote == "'":
         return text.replace("'", r"'\''")
-    # An interactive shell expands ! from its history, even in double quotes.
+    # Put ! in single quotes: an interactive shell expands it from its history, even in double quotes.
     return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
 
 

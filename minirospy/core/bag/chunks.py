@@ -174,7 +174,7 @@ class ChunkStream:
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
         """Return (offset, time, rank, connection) for each requested message, from a chunk's index records.
 
-        Also return the offsets of all messages, keyed by connection.
+        Also return the offsets of all messages, in one array per index record.
         """
         limit = size_of(self.stream)
         self.stream.seek(header.end)

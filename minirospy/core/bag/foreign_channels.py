@@ -26,7 +26,7 @@ class Ros1Channel(Protocol):
 
     @property
     def definition(self) -> str:
-        """The ROS 1 type's full text."""
+        """The ROS 1 type's definition, with those of all types that it uses."""
 
     def to_ros1(self, data: bytes | memoryview, /) -> bytes:
         """Convert a serialized message. Raise DeserializationError if it does not match its definition."""

@@ -82,7 +82,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
     if reader.chunks:
         start, end = seconds(reader.chunks[0].start_time), seconds(reader.chunks[-1].end_time)
         if not reader.version:
-            # ROS cannot read MCAP files, so there is no output to match.
+            # Use the true span of an MCAP file: ROS cannot read MCAP files, so there is no output to match.
             start, end = _span(reader)
         for chunk in reader.chunks:
             counts.update(chunk.counts)
@@ -250,7 +250,7 @@ def value_of(text: str, key: str) -> str:
 
 
 def _printed(value: object) -> str:
-    """Format a list item as -k prints it."""
+    """Format a list item as `rosbag info -k` prints it."""
     if not isinstance(value, dict):
         return f"  {value}"
     return "\n  ".join(f"{name}: {each}" for name, each in value.items())
@@ -370,7 +370,7 @@ def _local_time(stamp: float) -> str:
     try:
         return time.strftime("%b %d %Y %H:%M:%S", time.localtime(stamp)) + fraction
     except (OSError, OverflowError, ValueError):
-        # The time is outside the range of the system calendar, for example in a damaged bag.
+        # Print the number if the time is outside the range of the system calendar, for example in a damaged bag.
         return f"{stamp:.2f}"
 
 

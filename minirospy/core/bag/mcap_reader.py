@@ -32,7 +32,7 @@ __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
 _TRANSIENT_LOCAL = re.compile(r"durability: *(1|transient_local)\b")  # ROS 2's latching, as rosbag2 stores it
-_MAX_SCHEMA = 1_048_576  # maximum characters in a schema, a ROS 1 full text; the largest in real packages have about 30,000
+_MAX_SCHEMA = 1_048_576  # maximum characters in a schema, the definition of a type and all types in it; real ones reach 30,000
 _MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
@@ -156,7 +156,7 @@ class McapReader(BagReader):
         last = _END_OF_TIME if end is None else end
         selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
         # Read a chunk when its first message may be the next one.
-        # This loads each chunk only once, and keeps several chunks in memory only if they overlap in time.
+        # Each chunk is thus loaded only once, and several are in memory only if they overlap in time.
         # Positions are unique, so the heap never compares two runs.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
@@ -185,7 +185,7 @@ class McapReader(BagReader):
             for index in indexes
             if index.message_end_time >= first
             and index.message_start_time <= last
-            # A chunk without message indexes may contain any channel.
+            # Include chunks without message indexes, which may contain any channel.
             and not (index.message_index_offsets and index.message_index_offsets.keys().isdisjoint(wanted))
         ]
 
@@ -261,7 +261,7 @@ class _Selection(NamedTuple):
 class _Run:
     """The messages in one chunk, in time order.
 
-    Each has a time, an index in the chunk, a channel, and the start and end of its body.
+    Each has a time, its record's offset in the chunk, a channel, and the start and end of its body.
     """
 
     def __init__(self, position: int, start: int) -> None:
@@ -337,7 +337,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the mcap library, which may request reads of any length.
+    """A stream for the mcap library, which may request a length from a damaged file.
 
     A read returns the available data, without allocating the requested length.
     """

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAGIC", "McapRepair", "chunk_data", "mcap_faults"]
 
-MAGIC = b"\x89MCAP0\r\n"  # the first and last bytes of a file
+MAGIC = b"\x89MCAP0\r\n"  # the first and last bytes of an MCAP file
 
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQ")  # the start of a message: its channel, sequence and time
@@ -255,7 +255,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return new message indexes for the last chunk, because its own are incomplete, and add them to its chunk index."""
+        """Rebuild the last chunk's message indexes, which are incomplete, and enter their offsets in its ChunkIndex record."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 

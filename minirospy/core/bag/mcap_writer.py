@@ -108,7 +108,7 @@ class McapWriter:
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
         """Write a message received at ``time``, in nanoseconds.
 
-        Raise BagFormatError if the message exceeds a limit, OSError if the stream fails.
+        Raise BagFormatError if the time is before 1970, OSError if the stream fails.
         """
         if time < 0:
             raise BagFormatError(f"the time {time} ns is before 1970")

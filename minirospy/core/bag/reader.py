@@ -229,7 +229,7 @@ class _Merge:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the messages as blocks, in order."""
-        # The run's number is the tie-breaker for runs whose next messages have the same time, connection and offset.
+        # Ordered by the time and rank of each run's next message, then by the chunk's position. The number prevents ties.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:

@@ -143,7 +143,7 @@ class Reader12(ScannedReader):
             raise BagFormatError(f"an index of {count} messages has only {record.data_size} bytes")
         entries = list(_ENTRY.iter_unpack(self.stream.read(count * _ENTRY.size)))
 
-        # A topic's first message is preceded by its definition, and the index entry refers to the definition.
+        # Read the definition: it precedes a topic's first message, and the first index entry refers to it.
         self._seek(entries[0][2], limit)
         definition = records.read_record(self.stream, limit)
         definition.expect(records.OP_MESSAGE_DEFINITION)
@@ -168,7 +168,7 @@ class Reader12(ScannedReader):
     def _connection_of(self, record: Record) -> int:
         topic = record.text("topic")
         if topic not in self._by_topic:
-            # A definition is stored once per type; other topics with that type refer to it.
+            # Copy the definition from a topic with the same type, because definitions are stored once per type.
             type_ = record.text("type")
             like = next((each for each in self.connections.values() if each.type == type_), None)
             if like is None:

@@ -318,7 +318,7 @@ def parse_bag_header(record: Record) -> BagHeader:
 
 
 def parse_connection(record: Record, data: bytes) -> Connection:
-    """Parse a connection record. Raise BagFormatError if the record is invalid or lacks the type."""
+    """Parse a connection record. Raise BagFormatError if it is invalid or lacks the type, md5sum or definition."""
     record.expect(OP_CONNECTION)
     header = parse_fields(data, record.position)
     for name in ("type", "md5sum", "message_definition"):

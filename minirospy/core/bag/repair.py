@@ -46,7 +46,7 @@ class _Content(NamedTuple):
         return any(each[0] >= _END_OF_TIME for each in self.messages)
 
     def info(self, position: int) -> ChunkInfo:
-        """Return the chunk's info."""
+        """Return the chunk info record for this chunk at ``position``."""
         times = _times(self.entries)
         return ChunkInfo(position, times[0], times[-1], dict(Counter(each[1] for each in self.messages)))
 
@@ -133,7 +133,7 @@ class Repair:
         self._total = 0  # total of the message counts in the chunk infos read so far
 
     def run(self) -> Iterator[int]:
-        """Read the chunks; yield the position of each.
+        """Read the records after the bag header; yield the position of each.
 
         Raise BagFormatError if it is not a bag, BagEncryptedError if it is encrypted.
         """
@@ -260,7 +260,7 @@ class Repair:
         return self.end
 
     def _keep_index(self, record: Record, content: _Content, limit: int) -> int:
-        """Schedule a chunk's index records for rewriting if they are damaged; return the position after them."""
+        """Check a chunk's index records, and schedule a rewrite if they are damaged; return the position after them."""
         end, entries = _read_index(self._stream, record.end, limit)
         is_whole = entries == content.entries
         if is_whole and is_record(self._stream, end, limit):

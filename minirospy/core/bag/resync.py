@@ -39,7 +39,7 @@ def next_chunk(stream: BinaryIO, start: int, limit: int) -> int | None:
             at = block.find(_MARK, at + 1)
         if position + len(block) >= limit:
             return None
-        # Let the blocks overlap: the mark may cross the end of a block, and the header starts before the mark.
+        # Let the blocks overlap: the mark may cross the end of a block, and the chunk starts before the mark.
         position += max(len(block) - len(_MARK) - 4 - _BEFORE[-1], 1)
     return None
 

@@ -313,7 +313,7 @@ class BagWriter:
         self._closed = True
 
         while True:
-            # The last chunk ends where the next one would start.
+            # Drop chunks that end after ``end``: the last one ends at the position of the next.
             while self.chunks and self._position > end:
                 dropped = self.chunks.pop()
                 lost += sum(dropped.counts.values())
@@ -335,7 +335,7 @@ class BagWriter:
     def _set_compression(self, name: str) -> None:
         check_compression(name)
         self._compression = name
-        # Random data grows when it is compressed, and minirospy's readers reject larger chunks.
+        # Limit compressed chunks further: random data grows when compressed, and minirospy's readers reject larger chunks.
         self._limit = MAX_UINT32 if name == NONE else MAX_CHUNK_SIZE
 
     def _continue(self, connections: Iterable[Connection], chunks: Iterable[ChunkInfo], end: int) -> None:
@@ -358,7 +358,7 @@ class BagWriter:
         self._used = []
 
     def _make_room(self, stream: _Stream, length: int) -> None:
-        """Start a new chunk if the message would exceed the format's 32-bit chunk size.
+        """Start a new chunk, because the message would exceed the maximum size of the current one.
 
         Raise BagFormatError if the message does not fit into an empty chunk either.
         """
@@ -412,7 +412,7 @@ class BagWriter:
         connections = self.connections
         self._put([encode_connection(one) for one in connections])
         self._put([b"".join(map(encode_chunk_info, self.chunks))])
-        # The index must be on disk before the header refers to it.
+        # Flush first, so that the header never refers to an index that has not been written.
         self._stream.flush()
         self._stream.seek(self._header_position)
         self._put([encode_bag_header(BagHeader(self._position, len(connections), len(self.chunks)))])
@@ -423,6 +423,6 @@ class BagWriter:
         write = self._stream.write
         for piece in pieces:
             count = write(piece)
-            # An unbuffered stream may write only part of the data.
+            # Write the rest, because an unbuffered stream may write only part of the data.
             while count is not None and count < len(piece):
                 count += write(memoryview(piece)[count:])

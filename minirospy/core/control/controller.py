@@ -117,9 +117,9 @@ class Resources:
 class Controller:
     """A controller. While it runs, the loop calls ``update`` once per cycle. Subclasses override the methods that they need.
 
-    ``init`` runs in a service thread. All other methods run in the loop's thread, and must neither block nor call services. An
-    exception in ``update`` stops only this controller. Each controller is a separate instance of its class, created without
-    arguments.
+    ``init`` runs in a service thread, and so does ``close``, except at the end of the loop. All other methods run in the loop's
+    thread, and must neither block nor call services. An exception in ``update`` stops only this controller. Each controller is a
+    separate instance of its class, created without arguments.
     """
 
     interfaces: ClassVar[tuple[Interface, ...]] = ()

@@ -23,7 +23,7 @@ class GripperLimits(NamedTuple):
 
 
 class GripperCommand(NamedTuple):
-    """The position to hold, the maximum effort, and the goal that requested it, with its time of receipt."""
+    """The position to hold, the maximum effort, the goal that requested them (None: no goal), and the goal's time of receipt."""
 
     position: float
     max_effort: float
@@ -32,7 +32,7 @@ class GripperCommand(NamedTuple):
 
 
 class Gripper:
-    """Follows commands. Other threads replace ``command``; the loop's thread calls :meth:`start` and :meth:`check`."""
+    """Follows commands. Other threads replace ``command``; the loop's thread calls :meth:`hold` and :meth:`check`."""
 
     def __init__(self, limits: GripperLimits) -> None:
         self.limits = limits

@@ -164,8 +164,8 @@ def find_conflicts(controllers: Iterable[ControllerInfo]) -> list[Conflict]:
 class RobotHardware:
     """A robot's hardware: its joints and sensors by name. A driver overrides :meth:`read` and :meth:`write`.
 
-    In each cycle the loop calls ``read``, then updates the controllers, then calls ``write``. All methods run in the loop's
-    thread, except ``prepare_switch``, which runs in a service thread.
+    In each cycle the loop calls ``read``, then updates the controllers, then calls ``write``. ``find_conflicts``,
+    ``prepare_switch`` and ``resources`` run in a service thread, all other methods in the loop's thread.
     """
 
     joints: dict[str, Joint] = field(default_factory=dict)

@@ -94,7 +94,7 @@ def _of_description(joint: UrdfJoint) -> JointLimits:
 
 
 def _limit(parameters: Parameters, flag: str, key: str, given: float, none: float = inf) -> float:
-    """Return a parameter's value if its flag is true, ``none`` if the flag is false, ``given`` if either is not set."""
+    """Return the parameter ``key`` if ``flag`` is true, ``none`` if it is false, ``given`` if one of the two is not set."""
     has = parameters.get(flag)
     if has is False:
         return none
@@ -133,7 +133,7 @@ class _Limiter:
         self.enforce: Callable[[float], bool] | None = None
 
     def reset(self, active: Interface | None) -> None:
-        """Restart from the joint's present position, after another interface, or no controller, has commanded it."""
+        """Restart from the present position, or from velocity 0, after another interface or none has commanded the joint."""
         self.active = active
         is_velocity = active is Interface.VELOCITY
         self.previous = 0.0 if is_velocity else self.joint.position

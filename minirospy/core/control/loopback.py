@@ -87,7 +87,7 @@ class LoopbackHardware(RobotHardware):
         self._follow()
 
     def add_sensors(self, imus: Mapping[str, str], force_torque_sensors: Mapping[str, str]) -> None:
-        """Add sensors that measure a robot at rest, each with its frame."""
+        """Add sensors that measure a robot at rest. Each dict contains the frames of the sensors, by name."""
         for name, frame in imus.items():
             self.imus[name] = ImuSensor(
                 name,

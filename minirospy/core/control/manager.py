@@ -64,14 +64,14 @@ class Loaded:
 
 @dataclass(slots=True, eq=False)
 class Switch:
-    """A requested change to the set of running controllers. The loop performs the change. Times are in seconds."""
+    """A requested change to the set of running controllers. The loop performs the change."""
 
     start: Sequence[Loaded]
     stop: Sequence[Loaded]
     hardware_start: Sequence[ControllerInfo]  # controllers to start that are not running yet
     hardware_stop: Sequence[ControllerInfo]  # controllers to stop that are running
     start_asap: bool
-    timeout: float  # maximum wait for the hardware; 0 or less: no limit
+    timeout: float  # maximum wait for the hardware in seconds; 0 or less: no limit
     requested: Time
     is_begun: bool = False  # True once the hardware has been asked to switch
     on_done: Callable[[], object] = lambda: None
@@ -211,7 +211,7 @@ class ControllerTable:
         return switch
 
     def update(self, time: Time, period: Duration, reset_controllers: bool = False) -> None:
-        """Update the running controllers, then perform a requested change. With ``reset_controllers``, first restart them."""
+        """Update the running controllers, after a restart if ``reset_controllers`` is set; then perform a requested change."""
         loaded = self.loaded
         if reset_controllers:
             for each in loaded:

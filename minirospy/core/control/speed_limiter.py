@@ -17,7 +17,7 @@ class Range:
     high: float
 
     def clamp(self, value: float, factor: float = 1.0) -> float:
-        """Return the nearest value within the range multiplied by ``factor``."""
+        """Return the number nearest to ``value`` in the range [low * factor, high * factor]."""
         return min(max(self.low * factor, value), self.high * factor)
 
 

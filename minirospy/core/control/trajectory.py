@@ -38,7 +38,7 @@ __all__ = [
 NEVER = 1 << 100  # ns; a time that is later than any uptime, even if ROS time often jumps ahead
 _SECOND = 1_000_000_000  # ns
 MAX_MAGNITUDE = 1e100  # maximum position or derivative; larger values could overflow a segment's coefficients
-# rad; this close to a half turn, rounding may flip the shorter way's sign: use the position difference's sign instead
+# rad; so close to a half turn, rounding could reverse the shorter way: keep the sign of the position difference
 _SINGULARITY = 1e-9
 
 
@@ -130,7 +130,7 @@ class Segment:
 
 
 def _coefficients(first: State, last: State, t: float) -> tuple[float, ...]:
-    """Return the polynomial's coefficients, lowest degree first, then the additional coefficients of its derivatives."""
+    """Return the polynomial's coefficients c0 to c5, then v1 to v4 of the velocity and a1 to a3 of the acceleration."""
     p0, v0, a0 = first
     p1, v1, a1 = last
     distance = p1 - p0
@@ -304,7 +304,7 @@ class JointPath:
         self.current = self._build(self._index)
 
     def set_goal(self, goal: MonitoredGoal | None) -> None:
-        """Assign the current and all later segments to another goal. They keep their tolerances."""
+        """Assign the current and all later segments to another goal. The segments keep their tolerances."""
         self._goal = goal
         self.current.goal = goal
         for segment in self._segments[self._index :]:

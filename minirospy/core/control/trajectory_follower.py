@@ -36,7 +36,7 @@ from minirospy.core.urdf.model import JointType, Robot
 __all__ = ["FollowedJoint", "GoalTolerance", "JointsError", "Plan", "TrajectoryFollower", "read_joints"]
 
 _SECOND = 1_000_000_000  # ns
-_MAX_REQUESTS = 100  # trajectories queued while the loop is paused; the oldest are dropped
+_MAX_REQUESTS = 100  # maximum trajectories queued while the loop is paused; beyond it, the oldest are dropped
 _remainder, _turn = math.remainder, math.tau
 _SUCCEEDED = Outcome(GoalEvent.SUCCEED, (ErrorCode.SUCCESSFUL, ""))
 
@@ -62,7 +62,7 @@ class GoalTolerance(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A valid message. For each of the controller's joints: its column in the message, or None, and its tolerances."""
+    """A checked trajectory. For each joint of the controller: its column in the message (None: not there), its tolerances."""
 
     points: Points
     columns: Sequence[int | None]
@@ -189,7 +189,7 @@ class TrajectoryFollower:
 
     @property
     def waiting(self) -> int:
-        """Return the number of plans and holds queued for the next update. Drop the oldest if there are too many."""
+        """Return the number of plans and holds that the next update will carry out. Beyond 100, the oldest are dropped."""
         return len(self._requests)
 
     def sample(self, time: int) -> list[tuple[float, float, float]] | None:

@@ -54,7 +54,7 @@ def _read(element: Element, warn_of: Callable[[str], object]) -> list[Transmissi
         )
         return []
 
-    # Older descriptions name the interface in the actuator element.
+    # Use the interfaces of the actuators for joints without one, as older descriptions require.
     shared = [each for actuator in actuators for each in actuator.all("hardwareInterface")]
     found = []
     for joint in joints:

@@ -124,7 +124,7 @@ class Dispatcher:
             return [ERROR, str(refusal), refused]
 
     def _dispatch_system(self, name: str, args: Sequence[object]) -> object:
-        """Call a standard XML-RPC method: multicall, or one from http://xmlrpc-c.sourceforge.net/introspection.html."""
+        """Call ``system.multicall`` or ``system.listMethods`` (http://xmlrpc-c.sourceforge.net/introspection.html)."""
         if name == "system.listMethods":
             return sorted(self.methods)
         if name == "system.multicall":
@@ -162,12 +162,12 @@ def _fault(text: str) -> dict[str, object]:
 
 
 def anything(value: object, name: str, caller_id: str) -> object:
-    """Return any value."""
+    """Return the value unchanged; any value is valid."""
     return value
 
 
 def some(value: object, name: str, caller_id: str) -> object:
-    """Return any non-empty value."""
+    """Return a value of any type, except an empty one, 0 or False."""
     if not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be specified and non-empty")
     return value

@@ -57,13 +57,13 @@ Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
 
 
 class MasterApi(ABC):
-    """One method per API call; the XML-RPC server calls ``serve``."""
+    """The Master API: one method per call. An XML-RPC server passes each call to :meth:`dispatch`."""
 
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
         self.log: Callable[[str], object] = nothing  # called with a log line for each registration
-        # Called with the journal's record for each change
+        # Called with each change, as a record for the journal
         self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal; returns the number by which a change refers to it."""
@@ -129,7 +129,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notifications to a node about ``topic`` (or PARAMETERS) while it receives a response about the same one."""
+        """Delay notifications to a node about ``topic`` (or PARAMETERS) while a response with the topic's state is on its way."""
 
     @abstractmethod
     def stop(self) -> None:
@@ -390,7 +390,7 @@ class MasterApi(ABC):
         return finish(steps) if actions <= _FEW else steps
 
     def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
-        """Perform the first action and return the others.
+        """Send the first notification and return the others.
 
         The first one may stop a node whose name was taken over; that node's parameters must be dropped before the change is
         recorded.
@@ -438,5 +438,5 @@ def nothing(*_: object) -> None:
 
 
 def key_of_node(key: str) -> str:
-    """Return a parameter's key in a node's table, which also contains topics and services."""
+    """Return a parameter's key in the form in which the registry stores it: without the final slash."""
     return key.rstrip("/") or "/"

@@ -54,7 +54,7 @@ class ParametersFullError(MinirospyError):
 
 
 class ParameterUpdate(NamedTuple):
-    """Notify the node at ``uri`` that ``key`` (which ends with a slash) has this value, or {} if it is not set."""
+    """A notification to the node at ``uri`` with the value of ``key``, which ends with a slash, at the time of sending."""
 
     uri: str
     key: str
@@ -188,7 +188,7 @@ class ParameterTree:
         assert isinstance(root, dict)
         # The namespaces that contain the current item.
         # Do not use a recursive function: its closure and this list would form a reference cycle.
-        # The master's garbage collector does not examine old objects.
+        # The master's garbage collector, which does not examine old objects, might never free it.
         around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
 
         while around:
@@ -318,7 +318,7 @@ class ParameterTree:
             key = self._keys[at]
             for each in list(self._subscribers[key]):
                 yield ParameterUpdate(each.uri, key)
-            # The subscriptions may have changed while the caller processed the update.
+            # Search for the next key again: the subscriptions may have changed while the caller processed the update.
             at = bisect_right(self._keys, key)
 
 

@@ -32,14 +32,14 @@ _FEW_BYTES, _MANY_BYTES = 50_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):
-    """Send the subscriber at ``uri`` the complete list of a topic's publishers at the time of sending."""
+    """A notification to the subscriber at ``uri`` with the complete list of a topic's publishers at the time of sending."""
 
     uri: str
     topic: str
 
 
 class NodeShutdown(NamedTuple):
-    """Shut down the node at ``uri``, because another node has registered with its name."""
+    """A request to the node at ``uri`` to shut down, because another node has registered with its name."""
 
     uri: str
     name: str
@@ -120,7 +120,7 @@ class Registry:
         return Registered(list(subscribers.values()), chain(actions, self._updates(topic)))
 
     def unregister_publisher(self, node: str, topic: str, uri: str) -> Iterable[Action] | None:
-        """Unregister ``node`` as a publisher of ``topic``. Return None if ``node`` was not registered from ``uri``."""
+        """Unregister a publisher of ``topic``. Return the updates to send, or None if it was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
         self._drop(self._publishers, topic, node, PUBLISHES)
@@ -206,7 +206,7 @@ class Registry:
 
     @property
     def is_crowded(self) -> bool:
-        """Return whether all memory is in use, except the part reserved for nodes with few registrations."""
+        """Return whether little memory is left, apart from the part reserved for hosts and ports with few registrations."""
         return self.shares.total > self.shares.shared * 7 // 8
 
     def node_uri(self, node: str) -> str | None:
@@ -237,7 +237,7 @@ class Registry:
         return entry.names(SUBSCRIBES) if entry else []
 
     def topic_types(self) -> dict[str, str]:
-        """Return the type of each topic that has ever been registered with a type."""
+        """Return the type of each topic that is registered, or was: see :class:`TopicTypes`."""
         return dict(self.type_rows())
 
     def publishers(self) -> dict[str, list[str]]:

@@ -13,7 +13,7 @@ __all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
 MAX_PUBLISHERS = 1000  # maximum publishers of one topic that a node connects to
 
-# Size of the groups in which to connect to new publishers, and seconds between groups, to spread out any refusals
+# Connect to new publishers in groups of this size, with this pause in seconds, so that any refusals are spread out
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
 FIRST_DELAY = 0.1
@@ -22,7 +22,7 @@ _MAX_DELAY = 8.0
 
 @dataclass(frozen=True)
 class Connect:
-    """After ``delay`` seconds, connect to the publisher whose Slave API is at ``uri``."""
+    """An instruction to connect, after ``delay`` seconds, to the publisher whose Slave API is at ``uri``."""
 
     uri: str
     delay: float = 0.0
@@ -30,7 +30,7 @@ class Connect:
 
 @dataclass(frozen=True)
 class Disconnect:
-    """Drop the connection to ``uri``."""
+    """An instruction to drop the connection to the publisher at ``uri``."""
 
     uri: str
 
@@ -49,7 +49,7 @@ class SubscriptionPlan:
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """Apply the master's list of publishers. If ``keep`` is set, the list lacks some existing publishers.
+        """Apply the master's list of publishers. If ``keep`` is set, keep connections to publishers that the list lacks.
 
         Publishers beyond MAX_PUBLISHERS are ignored, because any process may send a list.
         """

@@ -25,7 +25,7 @@ class _Type(NamedTuple):
 
 
 class TopicTypes:
-    """A table from topic to type, in the order of the first registrations.
+    """A table from topic to type, also for the topics unregistered last, in the order of the first registrations.
 
     ``count`` is called with a node and the bytes added to its share, or removed from it if negative.
     """
@@ -72,13 +72,13 @@ class TopicTypes:
         self._count(node, _size_of(type_))
 
     def add(self, topic: str, type_: str, node: str) -> None:
-        """Set a topic's type, unless it has one."""
+        """Set a topic's type, unless it has one. Charge the type to ``node``, unless another node is charged."""
         before = self._types.get(topic)
         if not (before and before.node):
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Keep the type of a topic that is no longer registered, as the most recent one."""
+        """Keep the type of a topic that is not registered, as if the topic had just been unregistered."""
         before = self._types.get(topic)
         if before and before.node:
             return

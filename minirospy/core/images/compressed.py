@@ -60,8 +60,8 @@ def require_library() -> None:
 def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Pixels:
     """Decode a compressed image, with its channels in OpenCV's order: gray, BGR or BGRA.
 
-    Raise ValueError, before decoding anything, if it is not an image or has more than ``max_pixels`` pixels. If the limit is
-    lower than the default, also reject an image whose size cannot be determined in advance.
+    Raise ValueError if it is not an image or, before decoding it, if its header states more than ``max_pixels`` pixels. If the
+    limit is lower than the default, also reject an image whose size cannot be determined in advance.
     """
     import numpy as np
 

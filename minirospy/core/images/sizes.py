@@ -46,7 +46,7 @@ def _bmp(data: bytes) -> tuple[int, int]:
     if head == 12:
         return _pair("<HH", data, 18)
     width, height = _pair("<ii", data, 18)
-    # A negative height means that the first row is the top one.
+    # Drop the sign: a negative height only means that the first row is the top one.
     return abs(width), abs(height)
 
 

@@ -225,7 +225,7 @@ class _Reader:
         return values
 
     def _values(self, url: str, count: int) -> Matrix | None:
-        """Return the first ``count`` numbers in each entry of a source, or None if the source does not exist."""
+        """Return the first ``count`` numbers in each entry of a source; None if the source is missing or has shorter entries."""
         source = self._by_id.get(_reference(url))
         array = _child(source, "float_array") if source is not None else None
         if source is None or array is None:

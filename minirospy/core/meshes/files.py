@@ -70,9 +70,9 @@ def _with_textures(mesh: Mesh, folder: Path) -> Mesh:
 
 
 def _picture(name: str, folder: Path) -> str:
-    """Return the path of a picture that is named in a mesh file in ``folder``, or an empty string.
+    """Return the path of the texture ``name`` of a mesh file in ``folder``, or "" if there is no such file.
 
-    Gazebo's models store their pictures in ``materials/textures``.
+    Gazebo's models store their textures in ``materials/textures``.
     """
     name = unquote(name.removeprefix("file://")).replace("\\", "/")
     if not name or "\0" in name:

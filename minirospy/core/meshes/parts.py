@@ -20,7 +20,7 @@ from minirospy.core.meshes.mesh import Mesh
 __all__ = ["Parts", "collision_parts", "connected_parts", "is_convex", "is_hollow"]
 
 MAX_HULLS = 32  # maximum hulls for a moving mesh; a mesh with more parts gets a single hull
-# Maximum flat patches in a static mesh; a mesh with more is simplified, because worlds have many small, fine meshes.
+# Maximum flat patches in a static mesh. A finer mesh is simplified, because a world may have many meshes.
 MAX_PRISMS = 1500
 MIN_PRISMS = 100  # the limit on a mesh's flat patches is at least this number
 PRISMS_PER_METER = 200  # limit on a mesh's flat patches, per metre of its longest side
@@ -77,7 +77,7 @@ def collision_parts(
 
 
 def connected_parts(mesh: Mesh) -> list[Mesh]:
-    """Return the connected parts, which share no vertices, in the order of their first triangles."""
+    """Return the mesh's connected components, in the order of their first triangles."""
     labels = _labels(len(mesh.vertices), mesh.triangles)
     of_triangle = labels[mesh.triangles[:, 0]]
     order = np.argsort(of_triangle, kind="stable")
@@ -107,7 +107,7 @@ def is_convex(part: Mesh) -> bool:
         heights = normals[rows] @ vertices.T - offsets[rows, None]
         if heights.max() > TOLERANCE * size:
             return False
-    # A flat part passes these tests, but has no volume.
+    # Also require a volume, because a flat part passes the tests above.
     return bool(np.linalg.matrix_rank(vertices - vertices[0], tol=FLAT * max(size, 1e-12)) == 3)
 
 

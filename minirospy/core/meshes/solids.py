@@ -56,7 +56,7 @@ def _ears(points: NDArray[np.float64]) -> list[tuple[int, int, int]]:
 
 
 def _is_ear(points: NDArray[np.float64], left: list[int], at: int, limit: float) -> bool:
-    """Return whether a corner's triangle has more than the given area, and contains no other corner."""
+    """Return whether twice the area of a corner's triangle is at least ``limit``, and no other corner is in the triangle."""
     a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
 
     def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -68,14 +68,14 @@ def _is_ear(points: NDArray[np.float64], left: list[int], at: int, limit: float)
         return False
     others = points[[each for each in left if each not in (a, b, c)]]
     sides = np.minimum(np.minimum(side(pa, pb, others), side(pb, pc, others)), side(pc, pa, others))
-    # A corner on an edge would leave a triangle without area, so it counts as inside at first.
+    # Unless ``limit`` is 0, a corner on an edge counts as inside: it would later leave a triangle without area.
     return bool(((sides <= 0) if not limit else (sides < 0)).all())
 
 
 def terrain(path: str) -> NDArray[np.float64]:
-    """Return a grey picture's heights (0 to 1), with the first row at the smallest y. Raise MeshError if it is unreadable.
+    """Return a greyscale image's heights (0 to 1), first row at the smallest y. Raise MeshError if the image is unreadable.
 
-    A floating-point picture contains elevations in metres, as in digital elevation models. Height 1 is the highest elevation;
+    A floating-point image contains elevations in metres, as in digital elevation models. Height 1 is the highest elevation;
     height 0 is sea level, or the lowest elevation if all are above or all below sea level.
     """
     try:

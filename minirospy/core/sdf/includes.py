@@ -33,7 +33,7 @@ class Included:
 
 
 def open_include(element: Element, source: Source) -> Included | None:
-    """Return the included element, or None if the file contains neither a model nor a light.
+    """Return the included element, or None if the file contains no model, light or actor.
 
     Raise SdfError if the file does not exist or cannot be read.
     """
@@ -57,7 +57,7 @@ def open_include(element: Element, source: Source) -> Included | None:
 
 
 def sdf_version(root: Element) -> tuple[int, int]:
-    """Return a document's SDF version; the newest if it states none or its root is neither ``<sdf>`` nor ``<gazebo>``."""
+    """Return a document's SDF version; 1.7 if it states none or its root is neither ``<sdf>`` nor ``<gazebo>``."""
     match = re.match(r"\s*(\d+)\.(\d+)", root.attributes.get("version", ""))
     if match is None or root.tag not in ("sdf", "gazebo"):
         return (1, 7)

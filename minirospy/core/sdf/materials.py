@@ -21,7 +21,7 @@ _COLOR = re.compile(r"^\s*(ambient|diffuse|emissive)\s+([\d.eE+\- \t]+)", re.MUL
 _TEXTURE = re.compile(r"^\s*texture\s+(\S+)", re.MULTILINE)
 
 
-# Diffuse colours, each with the names of its materials. A material with a picture has the picture's average colour.
+# Diffuse colours, each with the names of its materials. A material with a texture has the texture's average colour.
 _TABLE: dict[Color, str] = {
     (0.7, 0.7, 0.7, 1.0): "Grey Gray",
     (0.175, 0.175, 0.175, 1.0): "DarkGrey DarkGray",
@@ -98,7 +98,7 @@ def read_material(element: Element, source: Source) -> Material:
     script = element.first("script")
     name = ""
     if script is not None:
-        # Before SDF 1.4, the element itself contains the name.
+        # Also accept the name as the text of ``<script>``, where it was before SDF 1.4.
         name = source.text(script, "name") or script.text.strip()
     known = named_material(name) if name else Material()
     if known is None and script is not None:
@@ -115,7 +115,7 @@ def read_material(element: Element, source: Source) -> Material:
 
 
 def _map(element: Element, source: Source) -> str:
-    """Return the path of the picture in ``<pbr><metal><albedo_map>``, or an empty string."""
+    """Return the path of the texture in an ``<albedo_map>`` of ``<pbr>``, or "" if there is none."""
     pbr = element.first("pbr")
     for workflow in pbr.children if pbr else ():
         uri = source.text(workflow, "albedo_map")

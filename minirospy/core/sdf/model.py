@@ -97,7 +97,7 @@ class MeshShape(NamedTuple):
 
 
 class Heightmap(NamedTuple):
-    """A terrain: a square grey picture with 2^n + 1 pixels per side, the terrain's size, and the position of its centre."""
+    """A terrain: a square greyscale image with 2^n + 1 pixels per side, the terrain's size, and the position of its centre."""
 
     path: str
     size: Vector = (1.0, 1.0, 1.0)
@@ -119,7 +119,7 @@ class Material(NamedTuple):
 
     color: Color | None = None
     script: str = ""
-    texture: str = ""  # the path of a picture
+    texture: str = ""  # the path of an image file
     emissive: Color | None = None
 
 
@@ -183,7 +183,7 @@ class Plugin:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor; its kind has SDF's name (``ray``, ``gpu_ray``, ``camera``, ``depth``, ``imu``, ``contact``, ...)."""
+    """A sensor. ``kind`` is SDF's sensor type: ``ray``, ``gpu_ray``, ``camera``, ``depth``, ``imu``, ``contact``, ..."""
 
     name: str
     kind: str

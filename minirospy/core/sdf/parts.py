@@ -106,7 +106,7 @@ def read_inertial(link: Element, source: Source, is_static: bool, pose_of: PoseR
     try:
         xx, xy, xz, yy, yz, zz = (source.number(part, key, default) for key, default in keys.items())
     except SdfError as error:
-        # Gazebo's building editor writes NaN.
+        # For example NaN, which Gazebo's building editor writes.
         source.warn(part, f"link [{name}] gets the inertia of SDF's default: {error.text}")
         xx, xy, xz, yy, yz, zz = keys.values()
     inertia = (xx, xy, xz, yy, yz, zz)

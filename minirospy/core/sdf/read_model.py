@@ -232,7 +232,7 @@ class _Reader:
         return Frame(*self._placed(part.first("pose"), default))
 
     def _placed(self, pose: Element | None, default: str) -> tuple[str, Pose]:
-        """Return the frame that a pose element refers to, and its pose."""
+        """Return the frame that a ``<pose>`` refers to (or ``default``), and the pose in that frame."""
         if pose is None:
             return default, IDENTITY
         return self._reference(pose) or default, self.source.pose(pose)

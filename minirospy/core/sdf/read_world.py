@@ -79,7 +79,7 @@ class _Reader:
     names: set[str] = field(default_factory=set)
     numbers: dict[str, Iterator[int]] = field(
         default_factory=dict
-    )  # for each name in use, the next numbers to append
+    )  # for each repeated name, the numbers to append to it
     ambient: Color = World.ambient
     background: Color = World.background
     camera: Pose | None = None
@@ -114,14 +114,14 @@ class _Reader:
         )
         try:
             physics = read_physics(chosen or (profiles[0] if profiles else None), self.source)
-            # Since SDF 1.6, gravity belongs to the world.
+            # Prefer the world's ``<gravity>``, which replaces that of ``<physics>`` since SDF 1.6.
             return physics._replace(gravity=self.source.vector(world, "gravity", physics.gravity))
         except SdfError as error:
             self.source.warnings.append(f"physics has its default values: {error}")
             return _PHYSICS
 
     def apply(self, state: Element) -> None:
-        """Move models and lights to their poses in ``<state>``, and remove deleted ones."""
+        """Move models and lights to their poses in ``<state>``, remove its deletions, and read its insertions."""
         poses = {
             kind: {part.attributes.get("name", ""): part for part in state.all(kind)}
             for kind in ("model", "light")

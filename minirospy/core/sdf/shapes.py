@@ -27,12 +27,12 @@ from minirospy.core.sdf.text import Element
 __all__ = ["read_collision", "read_geometry", "read_surface", "read_visual"]
 
 _SURFACE = Surface()
-_MIN_SIDE = 1e-4  # m; the minimum side of a box: a picture on a wall may have a side of length 0
+_MIN_SIDE = 1e-4  # m; the minimum side of a box: for example, a poster on a wall may have a side of length 0
 _MAX_POINTS = 10_000  # per polyline
 
 
 def read_visual(element: Element, pose: Pose, source: Source) -> Visual | None:
-    """Read ``<visual>``. Return None, with a warning, if its shape cannot be shown."""
+    """Read ``<visual>``. Return None if :func:`read_geometry` returns no shape."""
     geometry = read_geometry(element, source)
     if geometry is None:
         return None
@@ -43,7 +43,7 @@ def read_visual(element: Element, pose: Pose, source: Source) -> Visual | None:
 
 
 def read_collision(element: Element, pose: Pose, source: Source) -> Collision | None:
-    """Read ``<collision>``. Return None, with a warning, if it has no shape."""
+    """Read ``<collision>``. Return None if :func:`read_geometry` returns no shape."""
     geometry = read_geometry(element, source)
     if geometry is None:
         return None
@@ -69,7 +69,7 @@ def read_surface(element: Element | None, source: Source) -> Surface:
 
 
 def read_geometry(owner: Element, source: Source) -> Geometry | None:
-    """Return a visual's or collision's shape. If it is missing or unknown, or has no file, return None with a warning."""
+    """Return a visual's or collision's shape; None for ``<empty>`` or, with a warning, if the shape is missing or unusable."""
     name = f"{owner.tag} [{owner.attributes.get('name', '')}]"
     geometry = owner.first("geometry")
     shapes = geometry.children if geometry is not None else []

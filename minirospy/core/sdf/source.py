@@ -52,7 +52,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Source:
-    """A file that is being read, and its context.
+    """A file that is being read, with its folder, its SDF version, and the files that include it.
 
     file: its name in messages. folder: the base of relative URIs, or an empty string. version: its SDF version. chain: the paths
     of the including files, ending with its own. depth: the number of enclosing models.
@@ -155,7 +155,7 @@ class Source:
         raise self.error(child, f"<{tag}> is '{child.text.strip()}': write true or false")
 
     def number(self, element: Element | None, tag: str, default: float, *, infinite: bool = False) -> float:
-        """Return a child's number. Raise SdfError if it is not a number, or infinite and ``infinite`` is false."""
+        """Return a child's number. Raise SdfError if it is not a number, or if it is infinite although ``infinite`` is false."""
         if (child := _given(element, tag)) is None:
             return default
         return (self.numbers if infinite else self.finite)(child, (1,))[0]
@@ -214,7 +214,7 @@ class Source:
         values = []
         for part in element.text.split():
             try:
-                value = float(part if "_" not in part else "")  # float() accepts underscores, as in 1_000
+                value = float(part if "_" not in part else "")  # reject 1_000, which float() accepts
             except ValueError:
                 raise self.error(
                     element, f"<{element.tag}> is '{_short(element.text)}': '{_short(part)}' is not a number"

@@ -168,7 +168,7 @@ class _Converter:
             stack.extend(joint.child for joint in reversed(self._robot.child_joints(name)))
 
     def _merge(self, name: str) -> None:
-        """Add a link to the bodies, or its parts to its parent's body."""
+        """Make the link a body of its own or, if a fixed joint merges it, add it to the body of its parent."""
         link, joint = self._robot.links[name], self._robot.parent_joint(name)
         target, pose = name, IDENTITY
         if joint is not None and self._is_merged(joint):
@@ -181,7 +181,7 @@ class _Converter:
         body.merged.append((name, pose))
 
     def _sum(self, body: _Body) -> None:
-        """Collect the parts of a body's links in sdformat's order: its own parts, then those of merged links, deepest first."""
+        """Collect the parts of a body's links in sdformat's order: its own parts, then those of the merged links, depth first."""
         for name, pose in _deepest_first(body, self._robot):
             link = self._robot.links[name]
             body.visuals += [(name, pose, visual) for visual in link.visuals]
@@ -192,9 +192,9 @@ class _Converter:
                 body.inertial = inertial if body.inertial is None else add_inertials(body.inertial, inertial)
 
     def _with_mass(self) -> list[str]:
-        """Return the names of the links that remain, in tree order, and warn about the others."""
+        """Return the links that remain, in tree order. Leave out massless links and all links below them, with a warning."""
         kept: list[str] = []
-        lost: dict[str, int] = {}  # dict from the topmost massless link to the links below it
+        lost: dict[str, int] = {}  # dict from the topmost massless link to the number of links below it
         cause: dict[str, str] = {}
         for name, body in self._bodies.items():
             joint = self._robot.parent_joint(name)
@@ -356,7 +356,7 @@ class _Converter:
     # ---- joints
 
     def _joint(self, joint: UrdfJoint) -> Element | None:
-        """Return the ``<joint>``, or None if a joint of this type does not restrict its child."""
+        """Return the ``<joint>``, or None, with a warning, if Gazebo does not know the type (floating or planar)."""
         kind = self._joint_kind(joint)
         if kind is None:
             what = f"joint [{joint.name}] is {joint.type.value}, which Gazebo does not know: link [{joint.child}] is free"

@@ -37,7 +37,7 @@ class StampedTransform(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """The samples on the path between two frames, from each frame up to their common ancestor, and the time of the samples."""
+    """The samples on the path between two frames, from each frame up to a common ancestor, and the time of the samples."""
 
     time: int
     from_source: list[Sample]
@@ -179,10 +179,10 @@ class TransformBuffer(FrameTree):
         return None
 
     def _walk(self, time: int, target: Frame, source: Frame) -> _Walk:
-        """Return the samples from the source and from the target up to their common ancestor; the frames must differ.
+        """Return the samples from the source and from the target up to a common ancestor; the frames must differ.
 
-        Both paths lead up to the root, or to a frame for which the source's path has no data. The parts above the common
-        ancestor are omitted, because they cancel out. Raise the same exceptions as :meth:`lookup`.
+        The common ancestor is one of the two frames, or the root, or the first frame for which the source's path has no data.
+        Raise the same exceptions as :meth:`lookup`.
         """
         if time == 0:
             time = self._common_time(target, source)

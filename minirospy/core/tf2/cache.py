@@ -90,7 +90,7 @@ class TimeCache:
         return None
 
     def at(self, time: int) -> Sample | None:
-        """Return the sample at ``time``, interpolated between its neighbours, or None if there is none.
+        """Return the sample at ``time`` (0: the newest), interpolated between its neighbours, or None if there is none.
 
         If the neighbours have different parents, return the older one.
         """

@@ -62,7 +62,7 @@ def _edge(frame: Frame, now: int) -> str:
 
 
 def _root(frame: Frame, now: int) -> str:
-    """Return the graph's legend for a frame without a parent. Without ``now``, the frame must once have had a parent."""
+    """Return the graph's legend if the frame has no parent. Without ``now``, only if it had one before, as in tf2."""
     is_root = bool(now) if frame.cache is None else frame.cache.at(0) is None
     if not is_root:
         return ""

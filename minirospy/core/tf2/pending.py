@@ -64,7 +64,7 @@ def read_transforms(data: bytes) -> list[TransformSample]:
 
 
 class Layout:
-    """The messages that contain the same frames in the same order."""
+    """The layout of all messages with the same frames in the same order, and the stored messages with this layout."""
 
     def __init__(self, found: list[_Offsets]) -> None:
         self._offsets = found
@@ -82,7 +82,7 @@ class Layout:
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
-        """Store a message and drop expired ones; return the frames that the caller has to decode now."""
+        """Store a message and drop expired ones; return the frames to decode now, so that their messages can be dropped."""
         self._arrivals.append(arrival)
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
@@ -101,7 +101,7 @@ class Layout:
         self._arrivals.clear()
 
     def _drop_expired(self, span: int) -> list[str]:
-        """Drop the oldest blocks that no frame needs any more; return the frames to decode.
+        """Drop the oldest blocks that no frame needs any more; return the frames to decode so that more can be dropped.
 
         A frame does not need messages that it has decoded, or whose samples its cache would have dropped. The cache drops
         samples that are too old compared with the newest message, if it accepts that message, whose transform must be
@@ -139,7 +139,7 @@ class Layout:
 
 
 class Layouts:
-    """All known layouts, looked up by a message's bytes."""
+    """All known layouts. :meth:`find` looks one up by a message's bytes."""
 
     def __init__(self) -> None:
         # For messages with one transform: dict from the bytes that contain both frame names to the layout

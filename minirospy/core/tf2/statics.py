@@ -25,7 +25,7 @@ class StaticTransforms:
     """Stores the newest transform of each frame as bytes: at most :data:`MAX_FRAMES` frames, :data:`MAX_BYTES` in total."""
 
     def __init__(self) -> None:
-        self.left_out = 0  # number of transforms omitted because their frames exceed the limit
+        self.left_out = 0  # number of transforms omitted because they exceed a limit
         self._by_child: dict[bytes, bytes] = {}
         self._bytes = 0
 

@@ -75,7 +75,7 @@ class FrameTree:
         is_regular = not is_static
         for parent, child, stamp, translation, rotation in read_transforms(data):
             self._insert(parent, child, stamp, translation, rotation, authority, is_static)
-            # The frame exists: a layout is added only if all its frames exist and have samples.
+            # Add a layout only if all its frames exist and have samples.
             frame = self._frames.get(child)
             is_regular = (
                 is_regular and frame is not None and frame.cache is not None and parent in self._frames

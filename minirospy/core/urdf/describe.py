@@ -29,7 +29,7 @@ def tree_lines(robot: Robot) -> Iterator[str]:
 
 
 def _numbered(robot: Robot, link: str) -> list[tuple[int, str]]:
-    """Return a link's children and their numbers, in reverse order."""
+    """Return (number, name) for each child of a link, last child first. The first child's number is 1."""
     return [*enumerate((joint.child for joint in robot.child_joints(link)), 1)][::-1]
 
 
@@ -71,7 +71,7 @@ def error_lines(error: UrdfError) -> Iterator[str]:
 
 
 def problem_lines(problem: Problem, file: str) -> Iterator[str]:
-    """Yield the messages that ROS's parser prints about a part that it ignores."""
+    """Yield the messages about a fault that leaves the robot usable, in the format of ROS's parser."""
     level = "Warning:" if problem.is_warning else "Error:  "
     for text in problem.trail:
         yield f"{level} {text}"

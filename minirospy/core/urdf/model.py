@@ -190,7 +190,7 @@ class Link:
 
 
 class Problem(NamedTuple):
-    """A fault that ROS's parser reports before it continues. ``trail`` lists the messages that it prints, the cause first."""
+    """A fault that leaves the robot usable. ``trail``: the messages that ROS's parser prints, or minirospy's, the cause first."""
 
     line: int
     trail: tuple[str, ...]

@@ -112,7 +112,7 @@ def matrix_from_quaternion(rotation: Quaternion) -> Matrix:
 
 
 def quaternion_from_matrix(matrix: Matrix) -> Quaternion:
-    """Return a matrix's unit quaternion; the largest component is positive."""
+    """Return a matrix's unit quaternion: w is positive or, if the trace is not, the largest of the others."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix
     trace = xx + yy + zz
     if trace > _EPSILON:
