@@ -69,7 +69,7 @@ class StopGuard:
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until any deadlines have passed; return their functions, or [] if there are no deadlines."""
+        """Wait until a deadline passes; remove and return the functions that are due. Return [] if there are no deadlines."""
         with self._lock:
             while self.deadlines:
                 now = self._clock()

@@ -232,7 +232,7 @@ class Journal:
                     return
             size += self._write_since(self._second)
 
-            # Sync in a thread: a sync can be slow, and other writes to the file wait for it.
+            # Sync in a thread, so that a slow sync does not block the loop. A write to this file would wait for the sync.
             syncing = _Sync(self._second)
             syncing.start()
             while syncing.is_alive():

@@ -225,8 +225,8 @@ class RpcServer:
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate between new and other connections, so that many of one kind do not delay the other kind.
-            # The other connections are idle ones that disconnect, and busy ones.
+            # Alternate between new connections and those that have already made a request, so that many of one kind do not
+            # delay the other kind.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:
