@@ -202,7 +202,9 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Copy the messages for which ``keep`` is true to a new bag; pass the value of ``show`` for each message to ``on_shown``.
+    """Copy the messages for which ``keep`` is true to a new bag.
+
+    With ``show``, call ``on_shown(is kept, value of show)`` for each message of the source.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.

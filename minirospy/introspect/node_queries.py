@@ -103,7 +103,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
-        """Query a node for one key. Return True if it responded and the key is still present."""
+        """Query a node and store the result under ``key``. Return False if the query failed, or ``key`` is no longer present."""
         started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
@@ -125,7 +125,7 @@ class NodeQueries(Generic[_Key, _Found]):
             try:
                 found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
             except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
-                return  # the master removes the key if the node has exited
+                return  # keep the old result; if the node has exited, look() removes it
             except Exception as error:  # noqa: BLE001 - of one node: its result is kept
                 self._reporter.report(error)
                 return

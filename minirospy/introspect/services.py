@@ -47,7 +47,7 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and its providers. The provider registered last receives the calls."""
+    """A service and the nodes that provide it. The node that registered it last receives the calls."""
 
     name: str
     nodes: tuple[str, ...]

@@ -81,7 +81,7 @@ class DoctorNode:
         self._loop.close()
 
     def register(self) -> None:
-        """Register the node's topics: its own message, and /rosout, which every node publishes.
+        """Register the node's topics: ``letter``, which has a test message, and /rosout, which every node publishes.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
