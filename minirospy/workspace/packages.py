@@ -173,7 +173,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if a hidden package with the same name as ``found`` has the file, otherwise ""."""
+        """Return a hint if another folder with this package, hidden by ``found``, has the file ``name``, otherwise ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -369,7 +369,7 @@ _PROGRAM = re.compile(r"\badd_executable\s*\(\s*([^\s)]+)")
 
 
 def is_compiled_program(folder: Path, name: str) -> bool:
-    """Return whether CMakeLists.txt in ``folder`` defines a C++ program of this name; catkin_make skips such programs."""
+    """Return whether CMakeLists.txt in ``folder`` declares a C++ program ``name``; minirospy's catkin_make builds no C++."""
     try:
         text = (folder / "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -234,7 +234,7 @@ class _Collector:
 
     @property
     def commands(self) -> Collection[str]:
-        """Return the names of the commands that have an effect."""
+        """Return the names of the commands that :meth:`read` evaluates."""
         return self._readers.keys()
 
     def read(self, command: Command) -> None:
@@ -274,7 +274,7 @@ class _Collector:
                 "generate_messages() is missing: messages, services and actions are added, but not generated"
             )
             self.warn(first.file, first.line, text)
-            # As in catkin, continue without the definitions.
+            # As in catkin, generate no classes, and continue.
             self._definitions.clear()
 
     def plan(self) -> Plan:
