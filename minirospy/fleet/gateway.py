@@ -251,7 +251,7 @@ class Gateway:
             await asyncio.gather(opening, ending, return_exceptions=True)
 
     def _hidden(self) -> list[str]:
-        """Return the names of the robots whose topics this gateway imports."""
+        """Return the names of the imported robots, whose topics must not be announced again."""
         return self.importer.names if self.importer else []
 
     async def _pong(self, _: str, __: bytes) -> bytes:

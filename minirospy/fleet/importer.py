@@ -409,7 +409,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Once many names were removed, schedule returning free memory to the system: later, because links close with a delay."""
+        """Count removed names; after TRIM_NAMES, return free memory to the system a little later, when the links have closed."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()

@@ -81,7 +81,7 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
 
 
 async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
-    """Return the claim to a robot's name, or None if there is none.
+    """Return the claim of the gateway that represents a robot, or None if no gateway claims its name.
 
     If there are several claims, return the one that the control rooms show; raise BridgeError if the control rooms disagree.
     """
