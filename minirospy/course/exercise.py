@@ -1,7 +1,7 @@
 """Exercises: read and check the YAML file of an exercise. Pure, except for the functions that read files.
 
-An exercise lists the student's programs (``work``) and the steps. Each step is an action or an expectation. Its kind is the only
-key that is not an option common to all steps: ``{press: 11}``, ``{led: 7, is: on, within: 1, hint: Is the pin an output?}``.
+An exercise lists the student's programs (``work``) and the steps. Each step is an action or an expectation. One of its keys is
+its kind, the others are options: ``{press: 11}``, ``{led: 7, is: on, within: 1, hint: Is the pin an output?}``.
 """
 
 from __future__ import annotations
