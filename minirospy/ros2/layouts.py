@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """Raised if a ROS 1 type cannot be converted to a ROS 2 type; the message states the reason."""
+    """Raised if a type cannot be bridged, because it is missing or incompatible on one side; the message states the reason."""
 
 
 _WIDTHS = {

@@ -350,7 +350,7 @@ class ActionServer:
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # rclpy may finish the response in a task that runs after this code.
+            # Set the event in another task, because rclpy may send the last response in a task that runs after this one.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:

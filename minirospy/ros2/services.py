@@ -149,7 +149,7 @@ class ServiceBridge:
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return the services that should be bridged, each with the reason if that is impossible. ``ros1``: ROS 1's services."""
+        """Return the services to bridge, each with the reason if that is impossible. ``ros1`` maps ROS 1 services to nodes."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
