@@ -65,7 +65,7 @@ class StopGuard:
             for stop in due:
                 try:
                     stop()
-                except Exception:  # noqa: BLE001 - whatever it is, the others are stopped
+                except Exception:  # noqa: BLE001 - one function's error must not prevent the other calls
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
