@@ -110,7 +110,7 @@ class NodeQueries(Generic[_Key, _Found]):
         except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
             is_quick = asyncio.get_running_loop().time() - started < REFUSED_SECONDS
             self._failed(key, is_quick=is_quick)
-        except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
+        except Exception as error:  # noqa: BLE001 - retry this node later, like one that does not respond
             self._reporter.report(error)
             self._failed(key)
         else:
@@ -126,7 +126,7 @@ class NodeQueries(Generic[_Key, _Found]):
                 found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
             except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
                 return  # keep the old result; if the node has exited, look() removes it
-            except Exception as error:  # noqa: BLE001 - of one node: its result is kept
+            except Exception as error:  # noqa: BLE001 - keep this node's old result
                 self._reporter.report(error)
                 return
             if key in self._present and self.found.get(key) != found:
