@@ -130,7 +130,7 @@ class Packages:
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return the commands for a program in a package, given its name or path: several folders may contain such a program.
+        """Return the commands for a program, given its name or path. The package may have several files with this name.
 
         Raise the same exceptions as :meth:`find_executable`.
         """
