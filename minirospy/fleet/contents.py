@@ -99,7 +99,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway without names, because no removal of a token would remove it.
+        # Do not store a gateway without tokens: it would never be removed, because gateways are removed with their last token.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed

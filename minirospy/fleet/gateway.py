@@ -278,7 +278,7 @@ class Gateway:
                 await work
             except (MasterUnreachableError, RpcError, QueryFailed) as error:
                 self._failures.warning("%s", error)
-            except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+            except Exception as error:  # noqa: BLE001 - nothing else would report a task's exception
                 self._reporter.report(error)
 
         task = asyncio.ensure_future(guarded())

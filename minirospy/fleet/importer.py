@@ -271,7 +271,7 @@ class Importer:
             known.robot = robot
             try:
                 await self._update(known)
-            except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
+            except Exception as error:  # noqa: BLE001 - one robot's error must not affect the others
                 self._reporter.report(error)
                 self._soon(AGAIN_SECONDS)
 
@@ -303,7 +303,7 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log each gateway that is not shown because another gateway holds its name, once per gateway.
+        """Log, once each, the gateways that are not imported because another gateway holds their name.
 
         If both run on the same machine, challenge the holder instead.
         """

@@ -218,7 +218,7 @@ class FleetNetwork:
                     sample.payload.to_bytes(),
                     attachment.to_bytes() if attachment else b"",
                 )
-            except Exception as error:  # noqa: BLE001 - Zenoh would print it, or end its thread
+            except Exception as error:  # noqa: BLE001 - otherwise Zenoh would print the error, or end its thread
                 self._reporter.report(error)
 
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
@@ -434,7 +434,7 @@ class FleetNetwork:
             reply = functools.partial(query.reply, own_key or query.key_expr, body)
         except MinirospyError as error:
             reply = functools.partial(query.reply_err, str(error).encode(errors="replace"))
-        except Exception as error:  # noqa: BLE001 - the peer waits for an answer, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the peer needs a reply, even after an error
             self._reporter.report(error)
             reply = functools.partial(query.reply_err, f"the gateway failed: {type(error).__name__}".encode())
         finally:
