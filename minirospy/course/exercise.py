@@ -138,7 +138,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Work:
-    """A program or launch file to be written by the student. ``default`` is the course page's PACKAGE/PROGRAM, or empty."""
+    """A program or launch file that the student writes. ``default`` is the PACKAGE/PROGRAM on the course page, or empty."""
 
     about: str
     default: str = ""
@@ -272,7 +272,7 @@ class _Reader:
         words = {str(key): value for key, value in found.items()}
         known = {**ACTIONS, **EXPECTATIONS}
         kinds = [key for key in words if key in known]
-        # `rate` and `message` are both kinds of step and options of other kinds.
+        # `rate` and `message` are kinds of step, and also options of other kinds.
         if len(kinds) > 1:
             kinds = [
                 kind for kind in kinds if not any(kind in known[other] for other in kinds if other != kind)
