@@ -63,7 +63,7 @@ class Ros2Probe(Protocol):
 
 
 class Reachable(Protocol):
-    """A client for a service or an action. Methods may be called from any thread."""
+    """The common interface of clients for services and for actions. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:

@@ -293,14 +293,14 @@ class Client:
             return
         try:
             pending = self._client.call_async(self._calls.deserialize(data, self._class.Request))
-        except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+        except Exception as error:  # noqa: BLE001 - rclpy may raise any error
             _fail(answered, BridgeError(f"ROS 2 does not send the request: {_line(error)}"))
             return
 
         def arrived(done: RclpyFuture) -> None:
             try:
                 data = self._calls.serialize(done.result())
-            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+            except Exception as error:  # noqa: BLE001 - rclpy may raise any error
                 _fail(answered, BridgeError(f"the response of ROS 2 cannot be read: {_line(error)}"))
                 return
             with contextlib.suppress(InvalidStateError):

@@ -327,7 +327,7 @@ class _InRos2:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:
             answered.set_exception(BridgeError(str(error)))
-        except Exception as error:  # noqa: BLE001 - the other side waits for the answer, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the client needs a response, even after an error
             answered.set_exception(BridgeError(f"{type(error).__name__}: {error}"))
         else:
             answered.set_result(result)

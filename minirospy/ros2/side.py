@@ -287,7 +287,7 @@ class RclpySide:
                 return
             except NotAnsweredError:
                 continue
-            except Exception:  # noqa: BLE001 - whatever rclpy raises
+            except Exception:  # noqa: BLE001 - rclpy may raise any error
                 # Only this callback has failed, so continue with the other callbacks.
                 _log.exception("a message of ROS 2 could not be passed on")
 

@@ -300,7 +300,7 @@ class ZenohActionServer:
         def guarded() -> None:
             try:
                 work()
-            except Exception:  # noqa: BLE001 - the others go on
+            except Exception:  # noqa: BLE001 - one task's error must not stop the others
                 _log.exception("action [%s] of ROS 1", self._name)
 
         # RuntimeError: after close(), the thread accepts no more work.
