@@ -50,9 +50,9 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state recovered from a killed master's journal. ``age``: seconds since the journal was last written.
+    """The state recovered from a killed master's journal. ``age``: seconds since the journal was last written or touched.
 
-    ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
+    ``copy`` is the path of the copy of a damaged journal, or None if there is no copy.
     """
 
     recovered: Recovered
@@ -255,7 +255,7 @@ class Journal:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write to the new file the records appended since the rewrite started; return the number of bytes written.
+        """Write to the new file the records appended since the rewrite or the last call; return the number of bytes written.
 
         Raise OSError if the disk fails.
         """
@@ -302,7 +302,7 @@ class Journal:
                 _log.warning("the journal %s is written again", self.path)
 
     def touch(self) -> None:
-        """Record that this master is alive; :meth:`read` uses the time of this record to compute the journal's age."""
+        """Record that this master is alive, in the file's modification time, from which :meth:`read` computes the age."""
         if self._lock is None:
             return
         with contextlib.suppress(OSError):

@@ -277,7 +277,7 @@ class Node:
         await self.registrations.update(("Service", server.name))
 
     async def unserve(self, server: ServiceServer) -> None:
-        """Stop offering a service; cancel the calls in progress."""
+        """Stop offering a service. Calls in progress still get their responses."""
         if self.services.get(server.name) is server:
             del self.services[server.name]
             server.close()

@@ -120,7 +120,7 @@ class Registrations:
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
-        """Cancel the calls that are waiting for a response."""
+        """Cancel the registrations in progress, and the watch."""
         tasks = [*self._registering, *([self.watching] if self.watching else [])]
         for task in tasks:
             task.cancel()

@@ -55,7 +55,7 @@ accepting: the number of connections, and the seconds per iteration.
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
-_ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from them
+_ACCEPTS_BETWEEN = 64  # maximum number of connections to accept between reads
 
 # Number of connections to read before accepting new ones, about 1 ms of work; thousands may be readable together
 _READS_AT_ONCE = 16
@@ -289,7 +289,7 @@ class RpcServer:
         self._limited_log.warning("a request from %s was refused: %s", name, why)
 
     def limit_held(self, connection: Connection) -> bool:
-        """Reject the largest requests if their total exceeds the limit; return whether ``connection`` is still open."""
+        """Refuse the largest requests if the total exceeds the limit; return whether ``connection`` was not refused."""
         while self.held > MAX_HELD:
             largest = max(self.holders, key=self.holders.__getitem__)
             if self.holders[largest] <= LARGE_REQUEST:
