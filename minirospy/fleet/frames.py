@@ -69,7 +69,7 @@ class FrameRewriter:
 
 
 def prefixed(prefix: str) -> Callable[[bytes], bytes]:
-    """Return a function that changes ``base_link`` to ``robot1/base_link``; empty or prefixed ids stay unchanged."""
+    """Return a function that changes ``base_link`` to ``robot1/base_link``. It adds no prefix to empty or prefixed ids."""
     start = prefix.encode() + b"/"
 
     def change(frame: bytes) -> bytes:

@@ -286,7 +286,7 @@ class Importer:
             self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
 
     def _report_machine(self, claim: Claim) -> None:
-        """Log that another machine now holds a robot's name."""
+        """Record the machine that holds a robot's name; log if it was another machine before."""
         before = self._machines.get(claim.name, claim.host)
         if before != claim.host:
             is_chosen = claim.name in self.contents.holders.machines

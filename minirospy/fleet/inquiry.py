@@ -89,7 +89,7 @@ async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Cla
     if len(claims) > 1:
         _, controls = await fleet_status(network, seconds)
         shown = [claim for claim in claims if is_shown(claim, controls)]
-        # Use each machine's newest claim, because the token of a previous gateway may still exist.
+        # If all claims are from one machine, use the newest, because the token of a previous gateway may still exist.
         claims = (
             [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
         )

@@ -84,7 +84,7 @@ _STAMP = struct.Struct("<Iq")
 class Claim(NamedTuple):
     """A gateway's claim to represent a robot. ``start`` is in ns of the gateway's clock; ``host`` is its machine.
 
-    Neither ``start`` nor ``host`` is verified; no decision depends on ``start``.
+    Neither ``start`` nor ``host`` is verified; ``start`` is only compared between claims from the same machine.
     """
 
     name: str

@@ -115,7 +115,10 @@ class FleetNetwork:
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
-        """Open a session; if ``waits``, wait for a peer. Raise BridgeError if the configuration is invalid."""
+        """Open a session; if ``waits``, retry until a peer is reached.
+
+        Raise BridgeError if the configuration is invalid, or if there is no peer and ``waits`` is false.
+        """
         has_many_links = bool(options.listen or options.config)
         require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")
@@ -337,7 +340,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return a dict from key to reply, with at most ``most`` replies of at most ``size`` bytes each.
+        """Return at most ``most`` replies, keyed by key. Errors and replies of more than ``size`` bytes are QueryFailed objects.
 
         Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """

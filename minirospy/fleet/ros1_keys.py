@@ -131,7 +131,7 @@ def beacon_pattern(namespace: str) -> str:
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return the resource of a beacon, or None if the beacon has no type because its subscriber accepts any type.
+    """Return the resource of a beacon, or None for a service client, or a subscriber that accepts any type.
 
     Raise BridgeError if the beacon is invalid.
     """

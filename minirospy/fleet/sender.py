@@ -39,7 +39,7 @@ class _Worker:
         self._is_closed = False
 
     def close(self) -> None:
-        """Stop the thread. Do not wait for it, because it may be blocked in Zenoh. Idempotent."""
+        """Stop the thread. Wait for it at most two seconds, because it may be blocked in Zenoh. Idempotent."""
         with self._lock:
             self._is_closed = True
             self._condition.notify_all()
