@@ -325,7 +325,7 @@ class PassingToRos2(TopicPassing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait until existing subscribers are connected, because they would miss messages that are published earlier."""
+        """Wait at most two seconds until a subscriber is connected, because it would miss messages that are published earlier."""
         loop = asyncio.get_running_loop()
         end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:

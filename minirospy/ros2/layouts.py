@@ -48,7 +48,7 @@ _MAX_ITEMS = 8_000
 
 
 def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
-    """Return a type's spec, built from its ROS 2 class's ``get_fields_and_field_types()``.
+    """Return a type's spec, built from its fields as ``get_fields_and_field_types()`` of its ROS 2 class returns them.
 
     ``full_name`` is ``pkg/Name``. Raise TypesDiffer if a field's type does not exist in ROS 1.
     """

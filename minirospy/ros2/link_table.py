@@ -77,7 +77,7 @@ class LinkTable(Generic[_L, _O]):
             except (TypesDiffer, ROSException, ValueError) as error:
                 self._refuse(link, str(error))
             except MinirospyError:
-                raise  # the master returned an error, so the caller retries
+                raise  # a call to the master failed, so the caller retries
             except Exception as error:  # noqa: BLE001 - rclpy may raise any error; still open the other links
                 self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
         return bool(gone or new)

@@ -174,7 +174,7 @@ class RclpySide:
         return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a reliable publisher, which is compatible with all subscribers.
+        """Return a reliable publisher, which best-effort subscribers accept, too.
 
         Raise TypesDiffer, as for an incompatible type, if it is not installed.
         """
