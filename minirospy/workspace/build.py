@@ -320,7 +320,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of the messages in other workspaces; it changes if one of those workspaces is rebuilt."""
+        """Return a fingerprint of the messages in other workspaces; it changes if one of their files does."""
         known = [name for name in names if name in self._folders]
         return _key(
             path

@@ -157,7 +157,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Find a launch file in a package, given its name or its path in the package.
+        """Find a file in a package, such as a launch file, given its name or its path in the package.
 
         Raise NotFoundError if there is none.
         """

@@ -257,7 +257,7 @@ class _Collector:
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
-        """Warn about definitions that are not in any macro, and about a missing generate_messages()."""
+        """Warn about definitions that no macro names, malformed .srv files, and a missing generate_messages()."""
         for macro, kind in _FOLDERS.items():
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
@@ -384,7 +384,7 @@ class _Collector:
             self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
-        """Check that package.xml declares each package in CATKIN_DEPENDS as a build and a run dependency."""
+        """Check that package.xml has run dependencies for CATKIN_DEPENDS, and build dependencies for those in find_package()."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
 
