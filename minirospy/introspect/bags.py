@@ -292,9 +292,10 @@ def check_bag_name(path: str) -> None:
 
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield a writer for a new bag, which compresses chunks in parallel. After an error or Ctrl-C, the file is a valid bag.
+    """Yield a writer for a new bag, which compresses chunks in parallel.
 
-    Raise UsageError before writing if the name has an MCAP file's extension.
+    The file is a valid bag even after Ctrl-C or an error, except an OSError. Raise UsageError before writing if the name has
+    an MCAP file's extension.
     """
     check_bag_name(path)
     with contextlib.ExitStack() as stack:

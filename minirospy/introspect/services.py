@@ -133,7 +133,8 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """Call a service and return the response.
 
-    Raise NotFoundError if the service does not exist, or ServiceException, with the server's message, if the call fails.
+    Raise NotFoundError if the service does not exist, NodeUnreachableError if its node does not respond, or ServiceException,
+    with the server's message, if the call fails.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.introspect.messages import check, serialize

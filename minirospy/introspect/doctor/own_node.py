@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """Context manager that registers a node; the node publishes a latched message.
+    """Context manager that starts a node. After :meth:`register`, the node publishes a latched message.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """
