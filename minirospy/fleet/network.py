@@ -300,7 +300,7 @@ class FleetNetwork:
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # A peer replies under its own key to a query with wildcards.
+        # The key to reply under, even if the query has wildcards; "" means the query's key.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -340,7 +340,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return at most ``most`` replies, keyed by key. Errors and replies of more than ``size`` bytes are QueryFailed objects.
+        """Return a dict from key to at most ``most`` replies. An error, or a reply above ``size`` bytes, is a QueryFailed.
 
         Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """
