@@ -294,7 +294,7 @@ class Node:
         if subscription:
             subscription.publishers_changed(uris)
             if topic in self._left and topic not in self._requesting:
-                # The list may be for an earlier subscription, because rosmaster queues its updates.
+                # Request the list again: this one may be for an earlier subscription, because rosmaster queues its updates.
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 

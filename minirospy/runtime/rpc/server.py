@@ -276,7 +276,7 @@ class RpcServer:
         connection = Connection(self, peer, loop)
         self.connections[connection] = None
         if reads:
-            # The first request has usually arrived by now.
+            # Read immediately, because the first request has usually arrived by now.
             connection.read()
 
     def log_refusal(self, sock: socket.socket, why: str) -> None:
