@@ -91,7 +91,7 @@ class _Types:
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
-        """Return an installed message type. Raise TypesDiffer, as for an incompatible type, if it is not installed."""
+        """Return an installed message type. Raise TypesDiffer if the type is not installed, as for an incompatible type."""
         try:
             return self._catalogue.message(name), self._catalogue.message
         except (NotFoundError, DefinitionError) as error:

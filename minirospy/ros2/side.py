@@ -170,13 +170,13 @@ class RclpySide:
         )
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer, as for an incompatible type, if it is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if the type is not installed, as for an incompatible type."""
         return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
         """Return a reliable publisher, which best-effort subscribers accept, too.
 
-        Raise TypesDiffer, as for an incompatible type, if it is not installed.
+        Raise TypesDiffer if the type is not installed, as for an incompatible type.
         """
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
         publisher = self._node.create_publisher(self.message_class(type_), topic, profile)
@@ -194,7 +194,7 @@ class RclpySide:
     ) -> Ros2Handle:
         """Subscribe to a topic; call ``deliver`` for each serialized message, in the executor's thread.
 
-        Raise TypesDiffer, as for an incompatible type, if it is not installed.
+        Raise TypesDiffer if the type is not installed, as for an incompatible type.
         """
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
         return TopicSubscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
