@@ -53,7 +53,7 @@ class Handle:
 async def registered(
     register: Callable[[_T], Awaitable[None]], part: _T, what: str, faults: RateLimitedLogger
 ) -> None:
-    """Wait for a registration to finish. If the master refuses it, log the refusal instead of raising, as rospy does."""
+    """Wait for a registration to finish. If it fails, log the error instead of raising it, as rospy does."""
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:

@@ -52,7 +52,7 @@ class ParameterWatch:
             self._loop.call_soon_threadsafe(self._changed, name, value)
 
     def forgotten_in_worker(self) -> None:
-        """Subscribe again after the master has restarted."""
+        """Subscribe again, because the master has restarted and lost the subscriptions."""
         self._node._later(self._add_again)
 
     def _changed(self, name: str, value: object) -> None:

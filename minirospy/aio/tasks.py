@@ -49,7 +49,7 @@ async def keep_running(
     while True:
         try:
             await work()
-        except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+        except Exception as error:  # noqa: BLE001 - nothing else would report a task's exception
             reporter.report(error)
         else:
             return

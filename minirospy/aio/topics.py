@@ -129,7 +129,7 @@ class Subscription(Handle, Generic[_M_co]):
         message = self._message_class()
         try:
             message.deserialize(frame if self._takes_memoryview else bytes(frame))
-        except Exception as error:  # noqa: BLE001 - whatever a foreign message class raises on bad bytes
+        except Exception as error:  # noqa: BLE001 - a third-party class may raise any error on invalid bytes
             self._misfits.error(
                 "a message on %s from %s does not fit %s: %s",
                 self.topic,

@@ -20,7 +20,7 @@ from minirospy.course.world import World
 __all__ = ["Finding", "Report", "check", "words_of"]
 
 START_SECONDS = 15.0  # timeout for a node to register, on a slow laptop with a virus scanner
-OWN_START_SECONDS = 60.0  # timeout for a program of the exercise itself; without it, the check fails
+OWN_START_SECONDS = 60.0  # timeout for a program of the exercise itself, without which the check fails
 EXIT_SECONDS = 1.0  # time between a failed program's traceback and its exit
 _LAST_LINES = 8  # number of lines of a program's output in a report
 _PRESS_SECONDS = 0.25  # time that `click` holds a button: more than two periods of 10 Hz polling
@@ -57,12 +57,12 @@ class Report:
 
     @property
     def passed(self) -> bool:
-        """Return whether all expectations hold."""
+        """Return whether every finding holds: none has failed or was skipped."""
         return bool(self.findings) and all(finding.holds for finding in self.findings)
 
     @property
     def failures(self) -> list[Finding]:
-        """Return the expectations that do not hold."""
+        """Return the findings that have failed."""
         return [finding for finding in self.findings if finding.holds is False]
 
 

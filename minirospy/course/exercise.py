@@ -1,7 +1,7 @@
 """Exercises: read and check the YAML file of an exercise. Pure, except for the functions that read files.
 
-An exercise lists the student's programs (``work``) and the steps. Each step is an action or an expectation. Its kind is the only
-key that is not an option common to all steps: ``{press: 11}``, ``{led: 7, is: on, within: 1, hint: Is the pin an output?}``.
+An exercise lists the student's programs (``work``) and the steps. Each step is an action or an expectation. One of its keys is
+its kind, the others are options: ``{press: 11}``, ``{led: 7, is: on, within: 1, hint: Is the pin an output?}``.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Work:
-    """A program or launch file to be written by the student. ``default`` is the course page's PACKAGE/PROGRAM, or empty."""
+    """A program or launch file that the student writes. ``default`` is the PACKAGE/PROGRAM on the course page, or empty."""
 
     about: str
     default: str = ""
@@ -272,7 +272,7 @@ class _Reader:
         words = {str(key): value for key, value in found.items()}
         known = {**ACTIONS, **EXPECTATIONS}
         kinds = [key for key in words if key in known]
-        # `rate` and `message` are both kinds of step and options of other kinds.
+        # `rate` and `message` are kinds of step, and also options of other kinds.
         if len(kinds) > 1:
             kinds = [
                 kind for kind in kinds if not any(kind in known[other] for other in kinds if other != kind)

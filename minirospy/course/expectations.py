@@ -278,7 +278,7 @@ def _service(trial: Trial, step: Step) -> Outcome:
 def call(trial: Trial, step: Step) -> object:
     """Wait for a service and call it; return the response. Raise NotFoundError or ServiceException if that fails."""
     world, name = trial.world, step.subject
-    # The service may belong to one of the exercise's own programs.
+    # Wait even if the student's programs have exited, because a program of the exercise may provide the service.
     world.wait_until(lambda: name in world.graph.state().services, step.within, needs_work=False)
     type_ = service_type(world.graph, name)
     request = fill_request(type_, [step.options.get("request", {})])

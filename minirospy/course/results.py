@@ -140,7 +140,7 @@ def default_name() -> str:
 
 
 def join(record: Record, uri: str, name: str) -> None:
-    """Store the class's master and the student's name for later checks.
+    """Set the class's master and the student's name in the record; send the record to that master if ``uri`` is given.
 
     Raise UsageError if the URI is invalid, MasterUnreachableError if no master responds there.
     """

@@ -27,7 +27,7 @@ _POLL_SECONDS = 0.2  # seconds between pin readings; changes are missed if an LE
 _BEAT_SECONDS = 3.0  # seconds between heartbeats; the page marks a computer as gone after missing three
 _ASK_SECONDS = 2.0  # timeout in seconds for calls to a master
 _PUBLISH_SECONDS = 1.0  # minimum seconds between messages on the topic, because each has all results (22 kB)
-_TOPIC = CLASS_PARAMETER  # the page's classroom.js also finds this topic with a fleet robot's name before it
+_TOPIC = CLASS_PARAMETER  # the page's classroom.js also finds this topic in a fleet robot's namespace
 _TOOL = "check_share"  # prefix of the names of the nodes that publish the topic
 _NOT_STUDENTS = f"{_TOOL}_", "check_class_"  # prefixes of the names of nodes that publish or read the topic
 
@@ -112,7 +112,7 @@ class _OwnMaster:
         try:
             self._publisher = node.publisher(_TOPIC, type(self._message), latch=True)
         except BaseException:
-            # The node has recorded the topic locally, so the next attempt needs a new node.
+            # The node has recorded the topic, and would reject a second attempt, so the next attempt creates a new node.
             node.close()
             raise
         self._node = node

@@ -50,7 +50,7 @@ def action_phrase(step: Step) -> str:
 
 
 def button_name(pin: int) -> str:
-    """Return a button's name: its number on the board, if it has one, or its pin."""
+    """Return a button's name: its number on the board, if it has one, and its pin."""
     return f"button {BUTTONS.index(pin) + 1} (GPIO {pin})" if pin in BUTTONS else f"the button at GPIO {pin}"
 
 
@@ -65,7 +65,7 @@ def leds_text(pins: Sequence[int]) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value as YAML on one line of at most 80 characters."""
+    """Return a value on one line of at most 80 characters, similar to YAML."""
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, dict):

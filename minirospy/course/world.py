@@ -45,7 +45,7 @@ LAST_EFFECT_SECONDS = 1.0  # seconds after a program's exit in which its last ac
 _KEPT_MESSAGES = 5000  # messages kept per topic: one minute at 80 Hz
 _STOP_SECONDS = 10.0  # timeout in seconds for a program to exit after Ctrl-C
 _LAUNCH_STOP_SECONDS = 25.0  # timeout in seconds for roslaunch, which gives a node up to 15 s after Ctrl-C
-# ROS variables that the tested programs inherit. All others would describe the student's own master and network.
+# ROS variables that the tested programs inherit. Others are removed, because they describe the student's master and network.
 _PASSED_ON = ("ROS_PACKAGE_PATH", "ROS_HOME")
 _GUARDIAN_SECONDS = (
     "2",

@@ -27,7 +27,7 @@ MAX_TOKENS = 200_000
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot shown by other gateways. ``duplicates`` are further claims to its name, which are ignored."""
+    """A robot, as announced by its gateway. ``duplicates`` are other gateways' claims to the same name, which are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]
@@ -36,7 +36,7 @@ class Robot:
 
 
 class Refused(NamedTuple):
-    """A gateway that is not shown, because another gateway holds its name.
+    """A gateway that :meth:`FleetContents.robots` omits, because another gateway holds its robot's name.
 
     ``holder`` is the claim that has the name, or had it until recently.
     """
@@ -99,7 +99,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway without names, because no removal of a token would remove it.
+        # Do not store a gateway without tokens: it would never be removed, because gateways are removed with their last token.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed

@@ -69,7 +69,7 @@ class FrameRewriter:
 
 
 def prefixed(prefix: str) -> Callable[[bytes], bytes]:
-    """Return a function that changes ``base_link`` to ``robot1/base_link``; empty or prefixed ids stay unchanged."""
+    """Return a function that changes ``base_link`` to ``robot1/base_link``. It adds no prefix to empty or prefixed ids."""
     start = prefix.encode() + b"/"
 
     def change(frame: bytes) -> bytes:
@@ -146,7 +146,7 @@ def _run(
     change: Callable[[bytes], bytes],
     pieces: list[bytes],
 ) -> tuple[int, int]:
-    """Process ``data`` from offset ``at``. Return the offsets at which the copied part and the processed part end."""
+    """Rewrite ``data`` from offset ``at`` on, into ``pieces``. Return the offsets up to which it was copied and parsed."""
     for step in steps:
         if isinstance(step, _Skip):
             at += step.size

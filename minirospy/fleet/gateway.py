@@ -251,7 +251,7 @@ class Gateway:
             await asyncio.gather(opening, ending, return_exceptions=True)
 
     def _hidden(self) -> list[str]:
-        """Return the names of the robots whose topics this gateway imports."""
+        """Return the names of the imported robots, whose topics must not be announced again."""
         return self.importer.names if self.importer else []
 
     async def _pong(self, _: str, __: bytes) -> bytes:
@@ -278,7 +278,7 @@ class Gateway:
                 await work
             except (MasterUnreachableError, RpcError, QueryFailed) as error:
                 self._failures.warning("%s", error)
-            except Exception as error:  # noqa: BLE001 - the edge of a task: nobody else would read it
+            except Exception as error:  # noqa: BLE001 - nothing else would report a task's exception
                 self._reporter.report(error)
 
         task = asyncio.ensure_future(guarded())

@@ -14,7 +14,7 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # seconds to reserve a departed robot's name: Zenoh closes a silent link after as long
+HOLD_SECONDS = 10.0  # seconds to reserve a departed robot's name; Zenoh also closes a silent link after 10 s
 # maximum number of names reserved for departed robots; limited because peers choose the names
 MAX_HOLDS = 5_000
 
@@ -27,7 +27,7 @@ class _Hold:
 
 
 class Holders:
-    """Decides which of several claims holds a name, and remembers the decision."""
+    """Decides which gateway represents a robot if several claim its name, and remembers the decision."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """Create an instance in which no name is held. ``clock`` returns monotonic seconds."""

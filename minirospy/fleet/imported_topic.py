@@ -281,7 +281,7 @@ class ImportedTopic:
         except DeserializationError as error:
             self._misfits.error("a message on %s: %s", self.name, error)
         except ROSException:
-            return  # the topic was closed during the await
+            return  # the loop has closed the topic in the meantime
 
     # --- messages to the robot
 

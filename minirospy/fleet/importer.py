@@ -271,7 +271,7 @@ class Importer:
             known.robot = robot
             try:
                 await self._update(known)
-            except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
+            except Exception as error:  # noqa: BLE001 - one robot's error must not affect the others
                 self._reporter.report(error)
                 self._soon(AGAIN_SECONDS)
 
@@ -286,7 +286,7 @@ class Importer:
             self._comings.info("%d robots have %s: %s%s", len(names), what, shown, more)
 
     def _report_machine(self, claim: Claim) -> None:
-        """Log that another machine now holds a robot's name."""
+        """Record the machine that holds a robot's name; log if it was another machine before."""
         before = self._machines.get(claim.name, claim.host)
         if before != claim.host:
             is_chosen = claim.name in self.contents.holders.machines
@@ -303,7 +303,7 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log each gateway that is not shown because another gateway holds its name, once per gateway.
+        """Log, once each, the gateways that are not imported because another gateway holds their name.
 
         If both run on the same machine, challenge the holder instead.
         """
@@ -409,7 +409,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Once many names were removed, schedule returning free memory to the system: later, because links close with a delay."""
+        """Count removed names; after TRIM_NAMES, return free memory to the system a little later, when the links have closed."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()

@@ -42,7 +42,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 
 
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
-    """Run a coroutine on a node's loop; wait until it has finished.
+    """Run a coroutine on a node's loop; wait at most ten seconds until it has finished. Ignore its exceptions.
 
     Waiting keeps further messages in the receiver's queue while the loop is slow.
     """

@@ -81,7 +81,7 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
 
 
 async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
-    """Return the claim to a robot's name, or None if there is none.
+    """Return the claim of the gateway that represents a robot, or None if no gateway claims its name.
 
     If there are several claims, return the one that the control rooms show; raise BridgeError if the control rooms disagree.
     """
@@ -89,7 +89,7 @@ async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Cla
     if len(claims) > 1:
         _, controls = await fleet_status(network, seconds)
         shown = [claim for claim in claims if is_shown(claim, controls)]
-        # Use each machine's newest claim, because the token of a previous gateway may still exist.
+        # If all claims are from one machine, use the newest, because the token of a previous gateway may still exist.
         claims = (
             [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
         )

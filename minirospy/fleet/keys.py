@@ -84,7 +84,7 @@ _STAMP = struct.Struct("<Iq")
 class Claim(NamedTuple):
     """A gateway's claim to represent a robot. ``start`` is in ns of the gateway's clock; ``host`` is its machine.
 
-    Neither ``start`` nor ``host`` is verified; no decision depends on ``start``.
+    Neither ``start`` nor ``host`` is verified; ``start`` is only compared between claims from the same machine.
     """
 
     name: str
@@ -107,7 +107,7 @@ class TopicToken(NamedTuple):
     has_frames: bool = False
 
     def has_same_messages(self, other: TopicToken) -> bool:
-        """Return whether the other token's topic has the same messages, so that a subscriber to either topic receives both."""
+        """Return whether both tokens announce the same published messages; the tokens may differ in subscribers and latching."""
         ends = other._replace(is_subscribed=self.is_subscribed, is_latched=self.is_latched)
         return self.is_published and ends == self
 

@@ -115,7 +115,10 @@ class FleetNetwork:
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
-        """Open a session; if ``waits``, wait for a peer. Raise BridgeError if the configuration is invalid."""
+        """Open a session; if ``waits``, retry until a peer is reached.
+
+        Raise BridgeError if the configuration is invalid, or if there is no peer and ``waits`` is false.
+        """
         has_many_links = bool(options.listen or options.config)
         require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")
@@ -218,7 +221,7 @@ class FleetNetwork:
                     sample.payload.to_bytes(),
                     attachment.to_bytes() if attachment else b"",
                 )
-            except Exception as error:  # noqa: BLE001 - Zenoh would print it, or end its thread
+            except Exception as error:  # noqa: BLE001 - otherwise Zenoh would print the error, or end its thread
                 self._reporter.report(error)
 
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
@@ -297,7 +300,7 @@ class FleetNetwork:
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # A peer replies under its own key to a query with wildcards.
+        # The key to reply under, even if the query has wildcards; "" means the query's key.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -337,7 +340,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return a dict from key to reply, with at most ``most`` replies of at most ``size`` bytes each.
+        """Return a dict from key to at most ``most`` replies. An error, or a reply above ``size`` bytes, is a QueryFailed.
 
         Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """
@@ -434,7 +437,7 @@ class FleetNetwork:
             reply = functools.partial(query.reply, own_key or query.key_expr, body)
         except MinirospyError as error:
             reply = functools.partial(query.reply_err, str(error).encode(errors="replace"))
-        except Exception as error:  # noqa: BLE001 - the peer waits for an answer, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the peer needs a reply, even after an error
             self._reporter.report(error)
             reply = functools.partial(query.reply_err, f"the gateway failed: {type(error).__name__}".encode())
         finally:

@@ -43,8 +43,8 @@ class RobotGraph:
     ) -> None:
         """Create the graph.
 
-        ``hidden`` contains the names of robots whose topics are imported. ``gateways(snapshot)`` returns the nodes of
-        other gateways; their endpoints, like this node's, are ignored.
+        ``hidden()`` returns the names of the imported robots. ``gateways(snapshot)`` returns the nodes of other gateways;
+        their endpoints, like this node's, are ignored.
         """
         self.is_master_reached = True
         self.topics: dict[str, TopicToken] = {}
@@ -146,7 +146,7 @@ class RobotGraph:
         )
 
     async def _publisher(self, key: tuple[str, str]) -> Header:
-        """Query a publisher for its topic's type and latching."""
+        """Return a publisher's connection header, which contains the type and whether it latches."""
         header = await self._definitions.texts.header_of(*key)
         self._definitions.learn(
             header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")

@@ -131,7 +131,7 @@ def beacon_pattern(namespace: str) -> str:
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return the resource of a beacon, or None if the beacon has no type because its subscriber accepts any type.
+    """Return the resource of a beacon, or None for a service client, or a subscriber that accepts any type.
 
     Raise BridgeError if the beacon is invalid.
     """
@@ -228,7 +228,7 @@ class Sightings:
         return is_new
 
     def extend(self, seconds: float, now: float) -> None:
-        """Extend the expiry of all resources by ``seconds``, at most to that of a resource whose beacon arrives now."""
+        """Let all resources expire ``seconds`` later, but no later than if their beacons arrived now."""
         self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
 
     def forget_lost(self, now: float) -> bool:

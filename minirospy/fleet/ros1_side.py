@@ -81,7 +81,7 @@ class Ros1Side:
     ) -> None:
         """Create this half of the bridge.
 
-        ``hidden`` contains the names of robots whose topics are imported; ``namespace`` is the keys' namespace.
+        ``hidden()`` returns the names of the imported robots; ``namespace`` is the keys' namespace.
         """
         # Exclude /rosout_agg, which repeats /rosout: forwarding both would return each log message to its own master.
         if rules.topics == NameFilter():

@@ -93,7 +93,7 @@ class GatewayRules:
 
 @dataclass(frozen=True)
 class Export:
-    """A topic that has local nodes other than gateways."""
+    """A topic to announce, with its local publishers and subscribers, except gateways."""
 
     topic: str
     type: str

@@ -39,7 +39,7 @@ class _Worker:
         self._is_closed = False
 
     def close(self) -> None:
-        """Stop the thread. Do not wait for it, because it may be blocked in Zenoh. Idempotent."""
+        """Stop the thread. Wait for it at most two seconds, because it may be blocked in Zenoh. Idempotent."""
         with self._lock:
             self._is_closed = True
             self._condition.notify_all()
@@ -140,7 +140,7 @@ class _PriorityWorker(_Worker):
                         outlet.undeclare()
                 if taken and outflow:
                     self.put(outflow, *taken[1])
-            except Exception as error:  # noqa: BLE001 - Zenoh's own, of a session that is closed or a link that broke
+            except Exception as error:  # noqa: BLE001 - Zenoh raises if the session is closed or a link is lost
                 _log.debug("a message was not sent: %s", error)
 
     def put(self, outflow: Outflow, key: str, message: bytes) -> None:
@@ -253,5 +253,5 @@ class Receiver(_Worker):
                 deliver, message, attachment = taken[1]
                 try:
                     deliver(message, attachment)
-                except Exception as error:  # noqa: BLE001 - of one message: the others go on
+                except Exception as error:  # noqa: BLE001 - one message's error must not stop the others
                     self._reporter.report(error)

@@ -28,7 +28,7 @@ _HEADER = 16
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return ``body`` with all velocities set to zero, or None if they already are zero or ``body`` is invalid."""
+    """Return ``body`` with all velocities set to zero, or None if they are zero, ``body`` is invalid, or the type has none."""
     find = _FIELDS.get(type_)
     if find is None:
         return None

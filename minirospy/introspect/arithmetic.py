@@ -74,7 +74,7 @@ def arithmetic(text: str) -> float:
     try:
         return float(_Evaluator().value(ast.parse(text.strip(), mode="eval").body))
     except TypeError as error:
-        # Examples: 1 << 0.5, or a function call with the wrong number of arguments.
+        # Raised, for example, by 1 << 0.5, and by a function call with the wrong number of arguments.
         raise ValueError(str(error)) from error
 
 
@@ -220,7 +220,7 @@ def _inverted(number: Number) -> Number:
 
 def _power(base: Number, exponent: Number) -> Number:
     if not (isinstance(base, int) and isinstance(exponent, int) and exponent >= 0):
-        # Convert to floats, so that the result is never complex.
+        # Unlike **, math.pow() raises ValueError if the result would be complex.
         return math.pow(base, exponent)
     if base.bit_length() * exponent > 2 * _MAX_BITS and abs(base) > 1:
         raise OverflowError("int too large to convert to float")

@@ -2,8 +2,8 @@
 
 A table has one row for each message. Its columns are those of a notebook's data frames (``introspect/columns.py``), except that
 each element of an array has its own column: ``ranges[7]``, ``transforms[0].transform.translation.x``. Byte arrays, such as
-images, are left out. The bag is read in batches. If its messages contain arrays, it is read twice, because the columns depend on
-the arrays' lengths.
+images, are left out. The bag is read in batches. It is read twice for Parquet, or if its messages contain arrays, because the
+columns then depend on all messages.
 """
 
 from __future__ import annotations

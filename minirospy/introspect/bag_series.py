@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 MAX_EXACT = 20_000  # maximum number of points returned unchanged per series; the page draws at most 6,000
-MAX_POINTS = 2_000_000  # maximum number of unchanged points of all series in a request, at 16 bytes each
+MAX_POINTS = 2_000_000  # maximum number of points that a request, with all its series, stores unchanged, at 16 bytes each
 MAX_SERIES = 200  # maximum number of series per request
 MAX_LABELS = 50  # maximum number of series per path; nested slices could select more
 _SECOND = 10**9
@@ -184,7 +184,7 @@ def _first_series(found: Iterable[Point]) -> Iterator[Point]:
 
 
 class Budget:
-    """The numbers of points (stored unchanged) and of series that a request may still use."""
+    """The number of points that a request may still store unchanged, and the number of series that it may still add."""
 
     def __init__(self) -> None:
         self.points = MAX_POINTS

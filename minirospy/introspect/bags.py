@@ -202,7 +202,9 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Copy the messages for which ``keep`` is true to a new bag; pass the value of ``show`` for each message to ``on_shown``.
+    """Copy the messages for which ``keep`` is true to a new bag.
+
+    With ``show``, call ``on_shown(is kept, value of show)`` for each message of the source.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.
@@ -290,9 +292,10 @@ def check_bag_name(path: str) -> None:
 
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield a writer for a new bag, which compresses chunks in parallel. After an error or Ctrl-C, the file is a valid bag.
+    """Yield a writer for a new bag, which compresses chunks in parallel.
 
-    Raise UsageError before writing if the name has an MCAP file's extension.
+    The file is a valid bag even after Ctrl-C or an error, except an OSError. Raise UsageError before writing if the name has
+    an MCAP file's extension.
     """
     check_bag_name(path)
     with contextlib.ExitStack() as stack:

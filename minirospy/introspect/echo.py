@@ -130,7 +130,7 @@ class Echo:
         if self._is_shown_whole(value):
             return strify_message(value, fixed_numeric_width=self._width) + "\n---\n"
 
-        # ROS prints a char[] field as bytes and fails on uint8[].
+        # Like ROS, print a char[] field as bytes. Print uint8[], on which ROS fails, as a list.
         if isinstance(value, bytes) and not self._type.startswith("char"):
             value = list(value)
         if not (self._strings and self._arrays):

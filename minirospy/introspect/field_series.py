@@ -188,7 +188,7 @@ def _slots(value: Any) -> Sequence[str]:
 
 
 def _number(value: Any) -> float | None:
-    """Return a number as a float and a time in seconds; return None for any other value."""
+    """Convert a number to a float, and a time or duration to seconds; return None for any other value."""
     if isinstance(value, int | float):
         return float(value)
     if hasattr(type(value), "to_nsec"):

@@ -103,14 +103,14 @@ class NodeQueries(Generic[_Key, _Found]):
         self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
-        """Query a node for one key. Return True if it responded and the key is still present."""
+        """Query a node and store the result under ``key``. Return False if the query failed, or ``key`` is no longer present."""
         started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
         except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
             is_quick = asyncio.get_running_loop().time() - started < REFUSED_SECONDS
             self._failed(key, is_quick=is_quick)
-        except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
+        except Exception as error:  # noqa: BLE001 - retry this node later, like one that does not respond
             self._reporter.report(error)
             self._failed(key)
         else:
@@ -125,8 +125,8 @@ class NodeQueries(Generic[_Key, _Found]):
             try:
                 found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
             except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
-                return  # the master removes the key if the node has exited
-            except Exception as error:  # noqa: BLE001 - of one node: its result is kept
+                return  # keep the old result; if the node has exited, look() removes it
+            except Exception as error:  # noqa: BLE001 - keep this node's old result
                 self._reporter.report(error)
                 return
             if key in self._present and self.found.get(key) != found:

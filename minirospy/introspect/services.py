@@ -47,7 +47,7 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and its providers. The provider registered last receives the calls."""
+    """A service and the nodes that provide it. The node that registered it last receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
@@ -133,7 +133,8 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """Call a service and return the response.
 
-    Raise NotFoundError if the service does not exist, or ServiceException, with the server's message, if the call fails.
+    Raise NotFoundError if the service does not exist, NodeUnreachableError if its node does not respond, or ServiceException,
+    with the server's message, if the call fails.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.introspect.messages import check, serialize

@@ -160,7 +160,7 @@ def _topics(
 
 
 def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
-    """Return a node's counters for each outbound connection, or {} if the rows are not in the documented format."""
+    """Return a node's counters for each outbound connection. Skip rows that are not in the documented format."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
     }

@@ -139,7 +139,7 @@ class ServiceInfo:
 
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
-    """Return the service type that a connection header names. Raise NotFoundError if it is not installed."""
+    """Return the service type that a connection header names. Raise NotFoundError unless it is installed, with this md5sum."""
     from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")

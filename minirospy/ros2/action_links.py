@@ -16,7 +16,7 @@ _GOAL_TYPE = "ActionGoal"
 
 @dataclass(frozen=True)
 class ActionLink:
-    """An action with a server on one side and a client on the other. Goals are sent in ``direction``."""
+    """An action with a server on one side, to be offered on the other. Goals are sent in ``direction``."""
 
     action: str
     direction: Direction

@@ -156,7 +156,7 @@ class GoalsToRos1:
             accepted.set_exception(BridgeError(f"its server has not answered within {SERVER_SECONDS:g} s"))
         except (DeserializationError, ROSException) as error:
             accepted.set_exception(BridgeError(str(error)))
-        except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the client needs an answer, even after an error
             self._reporter.report(error)
             accepted.set_exception(BridgeError(f"the bridge failed: {type(error).__name__}"))
 

@@ -196,7 +196,7 @@ class GoalsToRos2:
             goal.step(GoalEvent.REJECT, f"the server in ROS 2 has not answered within {ACCEPT_SECONDS:g} s")
         except (BridgeError, DeserializationError) as error:
             goal.fail(" ".join(str(error).split()))
-        except Exception as error:  # noqa: BLE001 - the client waits for the goal's end, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the client needs a result, even after an error
             self._reporter.report(error)
             goal.fail(f"the bridge failed: {type(error).__name__}")
 

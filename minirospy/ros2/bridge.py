@@ -91,7 +91,7 @@ class _Types:
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
-        """Return an installed message type. Raise TypesDiffer if the type is not installed."""
+        """Return an installed message type. Raise TypesDiffer if the type is not installed, as for an incompatible type."""
         try:
             return self._catalogue.message(name), self._catalogue.message
         except (NotFoundError, DefinitionError) as error:
@@ -325,7 +325,7 @@ class PassingToRos2(TopicPassing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait until existing subscribers are connected, because they would miss messages that are published earlier."""
+        """Wait at most two seconds until a subscriber is connected, because it would miss messages that are published earlier."""
         loop = asyncio.get_running_loop()
         end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:

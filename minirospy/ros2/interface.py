@@ -63,7 +63,7 @@ class Ros2Probe(Protocol):
 
 
 class Reachable(Protocol):
-    """A client for a service or an action. Methods may be called from any thread."""
+    """The common interface of clients for services and for actions. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
@@ -101,7 +101,7 @@ class Ros2ActionClient(Reachable, Protocol):
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return a future for the accepted goal, or for None if the goal is rejected.
 
-        The future fails with BridgeError.
+        The future may fail with BridgeError.
         """
 
     def close(self) -> None: ...
@@ -148,7 +148,7 @@ class Ros2Side(Protocol):
     def ends(self, topic: str) -> Ros2Topic: ...
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer if the type is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if the type is unknown or its definition is incompatible."""
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher: ...
 
@@ -170,7 +170,7 @@ class Ros2Side(Protocol):
         """Return the services of all nodes except this bridge, as a dict from name to type."""
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""
+        """Return the fields of a service's request and response. Raise TypesDiffer like :meth:`fields`."""
 
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
@@ -181,7 +181,7 @@ class Ros2Side(Protocol):
         """
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if the action type is not installed."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer like :meth:`fields`."""
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 

@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """Raised if a ROS 1 type cannot be converted to a ROS 2 type; the message states the reason."""
+    """Raised if a type cannot be bridged, because it is missing or incompatible on one side; the message states the reason."""
 
 
 _WIDTHS = {
@@ -48,7 +48,7 @@ _MAX_ITEMS = 8_000
 
 
 def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
-    """Return a type's spec, built from its ROS 2 class's ``get_fields_and_field_types()``.
+    """Return a type's spec, built from its fields as ``get_fields_and_field_types()`` of its ROS 2 class returns them.
 
     ``full_name`` is ``pkg/Name``. Raise TypesDiffer if a field's type does not exist in ROS 1.
     """

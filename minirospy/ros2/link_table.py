@@ -77,8 +77,8 @@ class LinkTable(Generic[_L, _O]):
             except (TypesDiffer, ROSException, ValueError) as error:
                 self._refuse(link, str(error))
             except MinirospyError:
-                raise  # the master returned an error, so the caller retries
-            except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are opened
+                raise  # a call to the master failed, so the caller retries
+            except Exception as error:  # noqa: BLE001 - rclpy may raise any error; still open the other links
                 self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
         return bool(gone or new)
 
@@ -110,6 +110,6 @@ class LinkTable(Generic[_L, _O]):
     async def _close(self, link: _L) -> None:
         try:
             await self.links.pop(link).close()
-        except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are closed
+        except Exception as error:  # noqa: BLE001 - rclpy may raise any error; still close the other links
             self._reporter.report(error)
         self._log.info("no longer bridging %s (%s)", link.title, link.direction.value)

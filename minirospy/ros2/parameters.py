@@ -157,7 +157,7 @@ class ParameterBridge:
         found: list[str] = []
         for name, namespace in self._side.nodes():
             node = f"{namespace.rstrip('/')}/{name}"
-            # The node has no parameter services, or has just exited.
+            # Skip a node that has no parameter services, or has just exited.
             with contextlib.suppress(BridgeError):
                 names = await self._waited(functools.partial(self._side.node_parameters().names, node))
                 found += [f"{node}:{each}" for each in names]

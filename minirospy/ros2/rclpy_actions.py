@@ -110,9 +110,9 @@ class GoalOfRos2:
             try:
                 response = done.result()
                 self._on_end()
-                result = self._calls.serialize(getattr(response, "result"))  # noqa: B009 - not known here
+                result = self._calls.serialize(getattr(response, "result"))  # noqa: B009 - the class is only known at run time
                 found = (int(getattr(response, "status")), result)  # noqa: B009
-            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+            except Exception as error:  # noqa: BLE001 - rclpy may raise any error
                 _fail(ended, error)
                 return
             with contextlib.suppress(InvalidStateError):
@@ -183,7 +183,7 @@ class ActionClient:
                     self._client, _uuid_message(uuid.uuid4().bytes), None
                 )
                 handle.cancel_goal_async().add_done_callback(answered)
-            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+            except Exception as error:  # noqa: BLE001 - rclpy may raise any error
                 _fail(reached, error)
 
         self._calls.executor.create_task(send)
@@ -225,7 +225,7 @@ class ActionClient:
         try:
             message = self._calls.deserialize(goal, self._class.Goal)
             self._client.send_goal_async(message, goal_uuid=_uuid_message(id)).add_done_callback(answered)
-        except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+        except Exception as error:  # noqa: BLE001 - rclpy may raise any error
             self._callbacks.pop(id, None)
             _fail(accepted, error)
 
@@ -350,7 +350,7 @@ class ActionServer:
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # rclpy may finish the response in a task that runs after this code.
+            # Set the event in another task, because rclpy may send the last response in a task that runs after this one.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:

@@ -191,7 +191,10 @@ class Calls:
         return Server(self, name, class_, answer)
 
     def servers(self, service: str) -> frozenset[bytes] | None:
-        """Return the IDs of a service's servers, or None if no response can be lost. May be called from any thread."""
+        """Return the IDs of a service's servers, or None with rmw_zenoh, which loses no response.
+
+        May be called from any thread.
+        """
         if not self._loses_responses:
             return None
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
@@ -263,7 +266,7 @@ class Client:
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the IDs of the servers, or None if no response can be lost. May be called from any thread."""
+        """Return the IDs of the servers, or None with rmw_zenoh, which loses no response. May be called from any thread."""
         return self._calls.servers(self._name)
 
     def probe(self) -> ParameterProbe | None:
@@ -290,14 +293,14 @@ class Client:
             return
         try:
             pending = self._client.call_async(self._calls.deserialize(data, self._class.Request))
-        except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+        except Exception as error:  # noqa: BLE001 - rclpy may raise any error
             _fail(answered, BridgeError(f"ROS 2 does not send the request: {_line(error)}"))
             return
 
         def arrived(done: RclpyFuture) -> None:
             try:
                 data = self._calls.serialize(done.result())
-            except Exception as error:  # noqa: BLE001 - whatever rclpy raises
+            except Exception as error:  # noqa: BLE001 - rclpy may raise any error
                 _fail(answered, BridgeError(f"the response of ROS 2 cannot be read: {_line(error)}"))
                 return
             with contextlib.suppress(InvalidStateError):

@@ -79,7 +79,7 @@ class Reach:
                 return
 
     async def _has_reached(self, servers: frozenset[bytes]) -> bool:
-        """Wait until the servers respond to a probe; return immediately if they cannot be probed.
+        """Wait until the servers respond to a probe, or for a second if they cannot be probed; then return True.
 
         Return False if a server disappears first.
         """

@@ -16,7 +16,7 @@ _PACKAGES_OF_EVERY_NODE = {"rcl_interfaces", "type_description_interfaces"}
 
 @dataclass(frozen=True)
 class ServiceLink:
-    """A service with a server on one side and clients on the other. Requests are sent in ``direction``."""
+    """A service with a server on one side, to be offered on the other. Requests are sent in ``direction``."""
 
     service: str
     direction: Direction

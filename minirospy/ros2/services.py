@@ -149,7 +149,7 @@ class ServiceBridge:
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return the services that should be bridged, each with the reason if that is impossible. ``ros1``: ROS 1's services."""
+        """Return the services to bridge, each with the reason if that is impossible. ``ros1`` maps ROS 1 services to nodes."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
@@ -327,7 +327,7 @@ class _InRos2:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:
             answered.set_exception(BridgeError(str(error)))
-        except Exception as error:  # noqa: BLE001 - the other side waits for the answer, whatever happened here
+        except Exception as error:  # noqa: BLE001 - the client needs a response, even after an error
             answered.set_exception(BridgeError(f"{type(error).__name__}: {error}"))
         else:
             answered.set_result(result)

@@ -170,13 +170,13 @@ class RclpySide:
         )
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer if the type is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if the type is not installed, as for an incompatible type."""
         return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a reliable publisher, which is compatible with all subscribers.
+        """Return a reliable publisher, which best-effort subscribers accept, too.
 
-        Raise TypesDiffer if the type is not installed.
+        Raise TypesDiffer if the type is not installed, as for an incompatible type.
         """
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
         publisher = self._node.create_publisher(self.message_class(type_), topic, profile)
@@ -194,7 +194,7 @@ class RclpySide:
     ) -> Ros2Handle:
         """Subscribe to a topic; call ``deliver`` for each serialized message, in the executor's thread.
 
-        Raise TypesDiffer if the type is not installed.
+        Raise TypesDiffer if the type is not installed, as for an incompatible type.
         """
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
         return TopicSubscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
@@ -225,7 +225,7 @@ class RclpySide:
         return offered
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""
+        """Return the fields of a service's request and response. Raise TypesDiffer like :meth:`fields`."""
         class_ = self.service_class(type_)
         return (
             dict(class_.Request.get_fields_and_field_types()),
@@ -233,17 +233,17 @@ class RclpySide:
         )
 
     def client(self, service: str, type_: str) -> Ros2Client:
-        """Return a client for a service. Raise TypesDiffer if the type is not installed."""
+        """Return a client for a service. Raise TypesDiffer like :meth:`fields`."""
         return self._calls.client(service, self.service_class(type_))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service. Raise TypesDiffer if the type is not installed."""
+        """Offer a service. Raise TypesDiffer like :meth:`fields`."""
         server = self._calls.server(service, self.service_class(type_), answer)
         self._served.append(service)
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if the action type is not installed."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer like :meth:`fields`."""
         class_ = self.action_class(type_)
         goal, result, feedback = (
             dict(each.get_fields_and_field_types()) for each in (class_.Goal, class_.Result, class_.Feedback)
@@ -251,11 +251,11 @@ class RclpySide:
         return goal, result, feedback
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Return a client for an action. Raise TypesDiffer if the type is not installed."""
+        """Return a client for an action. Raise TypesDiffer like :meth:`fields`."""
         return ActionClient(self._calls, action, self.action_class(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action. Raise TypesDiffer if the type is not installed."""
+        """Offer an action. Raise TypesDiffer like :meth:`fields`."""
         service = send_goal_service(action)
         server = ActionServer(self._calls, action, self.action_class(type_), accept)
         self._served.append(service)
@@ -287,7 +287,7 @@ class RclpySide:
                 return
             except NotAnsweredError:
                 continue
-            except Exception:  # noqa: BLE001 - whatever rclpy raises
+            except Exception:  # noqa: BLE001 - rclpy may raise any error
                 # Only this callback has failed, so continue with the other callbacks.
                 _log.exception("a message of ROS 2 could not be passed on")
 

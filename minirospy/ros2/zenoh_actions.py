@@ -172,12 +172,12 @@ class ZenohActionClient:
         """
 
     def probe(self) -> None:
-        """Return None, because the servers need no probe."""
+        """Return None, because no response can be lost, so no probe is needed."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
         """Send a goal; return a future for the accepted goal, or for None if it is rejected.
 
-        The future fails with BridgeError.
+        The future may fail with BridgeError.
         """
         id = uuid.uuid4().bytes
         self._callbacks[id] = feedback
@@ -300,7 +300,7 @@ class ZenohActionServer:
         def guarded() -> None:
             try:
                 work()
-            except Exception:  # noqa: BLE001 - the others go on
+            except Exception:  # noqa: BLE001 - one task's error must not stop the others
                 _log.exception("action [%s] of ROS 1", self._name)
 
         # RuntimeError: after close(), the thread accepts no more work.

@@ -66,7 +66,7 @@ class ZenohClient:
         """
 
     def probe(self) -> None:
-        """Return None, because the servers need no probe."""
+        """Return None, because no response can be lost, so no probe is needed."""
 
     def call(self, request: bytes) -> Future[bytes]:
         """Send a request as CDR; return a future for the response as CDR. The future may fail with BridgeError."""

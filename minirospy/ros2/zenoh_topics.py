@@ -73,7 +73,7 @@ def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) ->
             return
         try:
             deliver(sample.payload.to_bytes())
-        except Exception:  # noqa: BLE001 - Zenoh would print it, or end its thread
+        except Exception:  # noqa: BLE001 - otherwise Zenoh would print the error, or end its thread
             _log.exception("a message of ROS 2 could not be passed on")
 
     handler = node.handler(arrived)

@@ -65,11 +65,11 @@ class StopGuard:
             for stop in due:
                 try:
                     stop()
-                except Exception:  # noqa: BLE001 - whatever it is, the others are stopped
+                except Exception:  # noqa: BLE001 - one function's error must not prevent the other calls
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until any deadlines have passed; return their functions, or [] if there are no deadlines."""
+        """Wait until a deadline passes; remove and return the functions that are due. Return [] if there are no deadlines."""
         with self._lock:
             while self.deadlines:
                 now = self._clock()

@@ -320,7 +320,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of the messages in other workspaces; it changes if one of those workspaces is rebuilt."""
+        """Return a fingerprint of the messages in other workspaces; it changes if one of their files does."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -425,7 +425,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages in ``names``, and all packages whose messages theirs use, directly or indirectly."""
+        """Return the packages in ``names`` and, recursively, the packages whose messages their messages contain."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:

@@ -84,7 +84,7 @@ def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[
     backwards: list[str] = []
     for needed, name in pairwise(nodes):
         backwards.append(needed)
-        # Add the packages between these two, which are connected only by run dependencies.
+        # Add the packages between the two: ``name`` may require ``needed`` only through their run dependencies.
         between = routes[name][needed]
         while between != name:
             backwards.append(between)

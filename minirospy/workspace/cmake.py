@@ -132,7 +132,7 @@ def _commands(text: str, where: str) -> Iterator[Statement]:
 
 
 def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
-    """Return whether the bracket that opens here is closed. If not, record that in ``unclosed``.
+    """Return whether the opening ``bracket`` is closed later. If not, record its level in ``unclosed``.
 
     Without the record, each of thousands of opening brackets would cause a search to the end of the file.
     """

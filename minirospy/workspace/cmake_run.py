@@ -506,7 +506,7 @@ class _Condition:
             "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
             "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
             "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
-            # Targets exist only for generated code. Commands and policies are always CMake's own, so they exist.
+            # Of the targets, only those for generated code exist. Commands and policies in a test are CMake's own, so they exist.
             "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
             "COMMAND": lambda name: True,
             "POLICY": lambda name: True,

@@ -138,7 +138,7 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield (dependency, depth) for each dependency, after the package that depends on it. Depths start at 0.
+        """Yield (depth, dependency) for each dependency, after the package that depends on it. Depths start at 0.
 
         A dependency of several packages is yielded several times. Raise the same exceptions as :meth:`all`.
         """

@@ -165,7 +165,7 @@ IMPORTED = frozenset(
         *QT_LIBRARIES,
     }
 )
-"""Modules in these packages that Python programs import. For each, `overlay/` has a module that raises ImportError."""
+"""Modules that Python programs import from packages that minirospy lacks. In `overlay/`, each raises ImportError."""
 
 SUBMODULES = {
     "roslaunch.child": "roslaunch.parent.ROSLaunchParent launches files, on other machines by ssh, too",

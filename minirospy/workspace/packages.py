@@ -130,7 +130,7 @@ class Packages:
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return the commands for a program in a package, given its name or path: several folders may contain such a program.
+        """Return the commands for a program, given its name or path. The package may have several files with this name.
 
         Raise the same exceptions as :meth:`find_executable`.
         """
@@ -157,7 +157,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Find a launch file in a package, given its name or its path in the package.
+        """Find a file in a package, such as a launch file, given its name or its path in the package.
 
         Raise NotFoundError if there is none.
         """
@@ -173,7 +173,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if a hidden package with the same name as ``found`` has the file, otherwise ""."""
+        """Return a hint if another folder with this package, hidden by ``found``, has the file ``name``, otherwise ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -369,7 +369,7 @@ _PROGRAM = re.compile(r"\badd_executable\s*\(\s*([^\s)]+)")
 
 
 def is_compiled_program(folder: Path, name: str) -> bool:
-    """Return whether CMakeLists.txt in ``folder`` defines a C++ program of this name; catkin_make skips such programs."""
+    """Return whether CMakeLists.txt in ``folder`` declares a C++ program ``name``; minirospy's catkin_make builds no C++."""
     try:
         text = (folder / "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
     except OSError:

@@ -234,7 +234,7 @@ class _Collector:
 
     @property
     def commands(self) -> Collection[str]:
-        """Return the names of the commands that have an effect."""
+        """Return the names of the commands that :meth:`read` evaluates."""
         return self._readers.keys()
 
     def read(self, command: Command) -> None:
@@ -257,7 +257,7 @@ class _Collector:
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
-        """Warn about definitions that are not in any macro, and about a missing generate_messages()."""
+        """Warn about definitions that no macro names, malformed .srv files, and a missing generate_messages()."""
         for macro, kind in _FOLDERS.items():
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
@@ -274,7 +274,7 @@ class _Collector:
                 "generate_messages() is missing: messages, services and actions are added, but not generated"
             )
             self.warn(first.file, first.line, text)
-            # As in catkin, continue without the definitions.
+            # As in catkin, generate no classes, and continue.
             self._definitions.clear()
 
     def plan(self) -> Plan:
@@ -384,7 +384,7 @@ class _Collector:
             self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
-        """Check that package.xml declares each package in CATKIN_DEPENDS as a build and a run dependency."""
+        """Check that package.xml has run dependencies for CATKIN_DEPENDS, and build dependencies for those in find_package()."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
 

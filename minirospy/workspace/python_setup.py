@@ -150,7 +150,7 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
-    """Replace modules that a setup.py imports, so that ``setup`` records its arguments. Change to the file's folder.
+    """Replace modules that a setup.py imports, so that ``setup`` records its arguments. Work in ``folder``.
 
     As in a script, modules in the file's folder can be imported; they are unloaded afterwards.
     """

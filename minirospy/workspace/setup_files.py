@@ -166,7 +166,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return code that removes previously sourced workspaces from the environment, and adds this workspace's parents."""
+    """Return code that, without --extend, replaces the previously sourced workspaces by this workspace's parents."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.

@@ -28,7 +28,7 @@ class StandIns(NamedTuple):
     modules: dict[str, Path]
 
     def names(self) -> str:
-        """Return the names for display, or "" if there are none. Omit packages that only contain a replaced module."""
+        """Return the names for display, or "" if there are none. Omit the enclosing packages, which are not replaced."""
         inner = [name for name, path in self.modules.items() if path.name != "__init__.py"]
         return ", ".join([*self.programs, *inner])
 
@@ -55,7 +55,7 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
 
 
 def _modules(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the modules that replace extension modules, each after the packages that contain it (except the outermost one)."""
+    """Yield the modules that replace extension modules, each after its enclosing packages (without the top-level package)."""
     top = _OVERLAY / plan.name
     for path in sorted(top.rglob("*.py")):
         if path.stem in plan.compiled and path.parent.name != "__pycache__":

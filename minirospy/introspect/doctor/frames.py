@@ -45,7 +45,7 @@ class Observation:
 
 
 def check_frames(environment: Environment, state: SystemState) -> Iterator[Finding]:
-    """If /tf is published, listen to it for _SECONDS; yield the problems found in its frames.
+    """If /tf or /tf_static is published, listen for _SECONDS; yield the findings about the frames.
 
     Raise MasterUnreachableError if no master responds.
     """
@@ -90,7 +90,7 @@ def _add(seen: dict[str, Observation], body: bytes, sender: str, now: int, *, is
 
 
 def frame_findings(seen: Sequence[Observation], *, is_simulated: bool = False) -> Iterator[Finding]:
-    """Yield the problems found in the frames, or one ok finding if there are no problems."""
+    """Yield the problems found in the frames, one ok finding if there are none, or a warning if there are no frames."""
     if not seen:
         yield warning(
             "frames",

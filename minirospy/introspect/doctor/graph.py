@@ -350,7 +350,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """Return advice if the publisher's machine has a different definition of the type, or "" if the definitions are equal."""
+    """Return advice if the publisher has a different definition of the type, or "" if it has the same, or none is known."""
     from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""

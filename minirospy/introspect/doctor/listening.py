@@ -108,7 +108,7 @@ def check_listeners(
 
     for service, result in zip(services, in_parallel(ask, services, _ANSWER_SECONDS), strict=True):
         if isinstance(result, RpcRefused):
-            continue  # this node's doctor does not listen
+            continue  # no such service: that doctor runs without --listen
         if isinstance(result, Exception):
             here = trouble_of(result)
             host = host_port(graph.node_uri(service.removesuffix(_SERVICE)) or "")[0]

@@ -224,7 +224,7 @@ def check_shared_memory(environment: Environment) -> Iterator[Finding]:
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
     """Yield findings about ROS_PACKAGE_PATH: duplicate or unreadable packages, and missing dependencies.
 
-    ``here``: the current workspace.
+    ``here``: a folder in the current workspace, by default the working directory.
     """
     from minirospy.workspace.packages import Packages, built_in_roots
 

@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """Context manager that registers a node; the node publishes a latched message.
+    """Context manager that starts a node. After :meth:`register`, the node publishes a latched message.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """
@@ -81,7 +81,7 @@ class DoctorNode:
         self._loop.close()
 
     def register(self) -> None:
-        """Register the node's topics: its own message, and /rosout, which every node publishes.
+        """Register the node's topics: ``letter``, which has a test message, and /rosout, which every node publishes.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """

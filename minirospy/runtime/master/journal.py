@@ -50,9 +50,9 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state recovered from a killed master's journal. ``age``: seconds since the journal was last written.
+    """The state recovered from a killed master's journal. ``age``: seconds since the journal was last written or touched.
 
-    ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
+    ``copy`` is the path of the copy of a damaged journal, or None if there is no copy.
     """
 
     recovered: Recovered
@@ -232,7 +232,7 @@ class Journal:
                     return
             size += self._write_since(self._second)
 
-            # Sync in a thread: a sync can be slow, and other writes to the file wait for it.
+            # Sync in a thread, so that a slow sync does not block the loop. A write to this file would wait for the sync.
             syncing = _Sync(self._second)
             syncing.start()
             while syncing.is_alive():
@@ -248,14 +248,14 @@ class Journal:
             _log.warning("the journal %s could not be rewritten, it keeps growing: %s", self.path, error)
             self._compact_at = 2 * self._size
             if self._file is None:
-                # On Windows the old file has already been closed at this point.
+                # On Windows, _put_in_place() closes the old file before it fails, so no file is open.
                 self._fail(error)
         finally:
             if number == self._rewrites:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write to the new file the records appended since the rewrite started; return the number of bytes written.
+        """Write to the new file the records appended since the start or the last call; return the number of bytes written.
 
         Raise OSError if the disk fails.
         """
@@ -267,7 +267,7 @@ class Journal:
     def _put_in_place(self, file: int) -> int:
         """Rename the new, synced file to the journal's name. Return its open descriptor. Raise OSError if renaming fails."""
         if sys.platform == "win32":
-            # Windows can neither replace an open file nor rename one.
+            # Close both files first: Windows can neither replace an open file nor rename one.
             self._close_file()
             os.close(file)
             private_files.replace_file(self._new_path, self.path)
@@ -302,7 +302,7 @@ class Journal:
                 _log.warning("the journal %s is written again", self.path)
 
     def touch(self) -> None:
-        """Record that this master is alive; :meth:`read` uses the time of this record to compute the journal's age."""
+        """Set the file's modification time to now, because this master is alive; :meth:`read` computes the age from it."""
         if self._lock is None:
             return
         with contextlib.suppress(OSError):

@@ -71,7 +71,7 @@ class LogFile(LogFileHandler):
         """Add a record. Thread-safe."""
         try:
             self._add(self.format(record) + "\n")
-        except Exception:  # noqa: BLE001 - as every handler of logging
+        except Exception:  # noqa: BLE001 - like the handlers in the standard library
             self.handleError(record)
         if record.levelno >= logging.WARNING or len(self._lines) > 1000:
             self._write_out()

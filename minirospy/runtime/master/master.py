@@ -305,7 +305,7 @@ class Master(MasterApi):
             # Another master has locked the journal.
             busy = error
         except OSError:
-            # The journal may still be readable. :meth:`Journal.start` determines later whether it is writable.
+            # Continue without the lock, because the journal may still be readable. Journal.start() tries again to lock it.
             pass
 
         if busy:

@@ -120,7 +120,7 @@ class Notifier:
         self._is_writing = False
 
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notifications to a node about a topic (or PARAMETERS) whose current state a pending response will tell it.
+        """Delay notifications to a node about ``topic`` (or PARAMETERS), because a pending response contains its current state.
 
         Otherwise a rospy node might receive the update before the response, and apply the older response last.
         """

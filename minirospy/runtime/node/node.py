@@ -160,7 +160,7 @@ class Node:
             return
         self._closed = True
         self._unregistering = asyncio.ensure_future(self.registrations.close(announces=announces))
-        # Let the first call to the master be sent before doing anything else.
+        # Let the task above send its first call to the master before this closes any connection.
         await asyncio.sleep(0)
 
         for timer in [*self._left.values(), *self._requesting.values()]:
@@ -172,8 +172,8 @@ class Node:
             return_exceptions=True,
         )
 
-        # Close the Unix socket before the port.
-        # Otherwise the next server on that port could not bind the socket's name.
+        # Close the Unix socket before the port: the socket's name is derived from the port, so the next server on this port
+        # could not bind it.
         await close_all([self.unix_listener.close, self.listener.close])
         tables = (self.publications, self.subscriptions, self.services)
         close_each([part.close for table in tables for part in table.values()])
@@ -219,7 +219,7 @@ class Node:
         tcp_nodelay: bool = False,
         on_loop: bool = False,
     ) -> Subscription:
-        """Return a :class:`Subscription` for this node, for :meth:`subscribe`."""
+        """Create a :class:`Subscription` for this node, to pass to :meth:`subscribe`."""
         return Subscription(
             topic,
             type_,
@@ -259,7 +259,7 @@ class Node:
     def make_service(
         self, name: str, type_: InterfaceType, handler: Handler, *, request_type: str, response_type: str
     ) -> ServiceServer:
-        """Return a :class:`ServiceServer` for this node, for :meth:`serve`."""
+        """Create a :class:`ServiceServer` for this node, to pass to :meth:`serve`."""
         return ServiceServer(
             name,
             type_,
@@ -277,7 +277,7 @@ class Node:
         await self.registrations.update(("Service", server.name))
 
     async def unserve(self, server: ServiceServer) -> None:
-        """Stop offering a service; cancel the calls in progress."""
+        """Stop offering a service. Calls in progress still get their responses."""
         if self.services.get(server.name) is server:
             del self.services[server.name]
             server.close()
@@ -294,7 +294,7 @@ class Node:
         if subscription:
             subscription.publishers_changed(uris)
             if topic in self._left and topic not in self._requesting:
-                # The list may be for an earlier subscription, because rosmaster queues its updates.
+                # Request the list again: this one may be for an earlier subscription, because rosmaster queues its updates.
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 

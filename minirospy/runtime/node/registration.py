@@ -71,7 +71,7 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Register the entries of ``tables``: per kind ("Publisher"), a dict from name to publication, subscription or service.
+        """Create the object. ``tables`` maps a kind ("Publisher") to a dict from name to publication, subscription or service.
 
         Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """
@@ -89,14 +89,14 @@ class Registrations:
         self._environment = environment
         self._tables = tables
         self.rpc = rpc
-        # Runs functions in order. If no thread can be started, they stay queued, and watching the master continues.
+        # Runs when_registered_again in order. If no thread can be started, the functions stay queued, and the watch continues.
         self._again = InOrder(workers)
         self.watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
         """The objects registered with the master, keyed by kind and name; None marks a call that failed or is in progress."""
         self.taken: set[_Key] = set()
-        """Services that another node has registered since, so the master's entry is that node's."""
+        """Services that another node has registered after this node, so the master's entry is that node's."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
@@ -120,7 +120,7 @@ class Registrations:
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
-        """Cancel the calls that are waiting for a response."""
+        """Cancel the registrations in progress, and the watch."""
         tasks = [*self._registering, *([self.watching] if self.watching else [])]
         for task in tasks:
             task.cancel()
@@ -295,7 +295,7 @@ class Registrations:
                 for function in self.when_registered_again:
                     self._again.start(function)
             elif has_forgotten:
-                # Log this only once per master: after this, the node counts as never registered with this master.
+                # Logged only once per master: with nothing left in _known, the node counts as never registered with it.
                 _log.warning("the master does not know this node, and refuses to")
 
     async def register_all(self, *, again: bool = False) -> None:

@@ -169,7 +169,7 @@ class ServiceServer:
     def _respond(self, request: memoryview, fields: Header) -> bytes:
         try:
             return serialize_response(self._handler(request, fields))
-        except BaseException as error:  # noqa: BLE001 - the edge to user code, which may call sys.exit(): the client waits
+        except BaseException as error:  # noqa: BLE001 - the handler may raise anything; the client needs a response
             return self._failure(error)
 
     def _failure(self, error: BaseException) -> bytes:
@@ -180,7 +180,7 @@ class ServiceServer:
         _log.error("service %s: error processing request", self.name, exc_info=error)
         try:
             text = str(error)
-        except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
+        except Exception:  # noqa: BLE001 - str() of the handler's exception may raise, too
             text = type(error).__name__
         if not isinstance(error, Exception):
             # str(error) may be empty or just a number, so prepend the exception's type.
@@ -248,7 +248,7 @@ class LoopServiceServer(ServiceServer):
     async def _respond_on_loop(self, sock: socket.socket, request: bytes, fields: Header) -> bytes:
         try:
             return serialize_response(await self._async_handler(request, fields))
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - the handler may raise anything; the client needs a response
             # A task that raises SystemExit would end the asyncio loop, and with it everything that the node does.
             return self._failure(error)
         except asyncio.CancelledError:

@@ -187,7 +187,7 @@ class SlaveApi:
         return [SUCCESS, "", 0]
 
     def request_topic(self, caller_id: str, topic: str, protocols: object) -> Answer:
-        """Return the topic's address for the first protocol that both nodes support."""
+        """Return the topic's address: of the Unix socket if the subscriber can connect to it, otherwise for TCPROS."""
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
         host, port = self._node.environment.host, self._node.tcpros_port

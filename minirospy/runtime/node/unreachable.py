@@ -63,7 +63,7 @@ class Unreachable:
 
 
 def advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return advice that names the host with the wrong address and the variable that sets it."""
+    """Return advice for an unreachable publisher: the likely cause, and what to set or run on which machine."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     if isinstance(error, RpcTimeout):

@@ -308,7 +308,7 @@ class Call:
             self._answered(messages[0], is_all=len(messages) == 1 and reader.is_idle)
 
     def broken(self, error: Exception) -> None:
-        """Close this connection and try another."""
+        """Close this connection, and retry on a new one if that may help; otherwise fail the call."""
         self._close()
         if self._is_kept and isinstance(error, ConnectionError | EOFError):
             # The peer has closed this idle connection, so retry on a new one.

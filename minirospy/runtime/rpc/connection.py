@@ -314,7 +314,7 @@ class Connection:
                 self._start(self._serialize_in_steps(call.method, value, keep_alive))
                 return
             body = serialize_value(value)
-        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+        except Exception as error:  # noqa: BLE001 - an internal error must not end the server
             body = _fault(call.method, error)
         self._send(body, keep_alive)
 
@@ -345,7 +345,7 @@ class Connection:
         self._hold()
         try:
             value = self._server.dispatch(call.method, call.args)
-        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+        except Exception as error:  # noqa: BLE001 - an internal error must not end the server
             self._finish(_fault(call.method, error), keep_alive)
             return
 
@@ -375,7 +375,7 @@ class Connection:
                 pieces = value.pieces
             else:
                 pieces = yield from serialize_value_in_steps(value, MAX_BODY)
-        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+        except Exception as error:  # noqa: BLE001 - an internal error must not end the server
             pieces = (_fault(method, error),)
 
         del value
@@ -387,7 +387,7 @@ class Connection:
     async def _answer_later(self, value: Awaitable[object], keep_alive: bool) -> None:
         try:
             body = serialize_value(await value)
-        except Exception as error:  # noqa: BLE001 - a fault of ours must not end the server
+        except Exception as error:  # noqa: BLE001 - an internal error must not end the server
             body = _fault("a method", error)
         self._task = None
         self._finish(body, keep_alive)

@@ -63,7 +63,7 @@ def unwrap(method: str, answer: object) -> Any:
 
 
 def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
-    """Return the error for a failed call to the master: either it does not respond, or this process has run out of sockets."""
+    """Return the error for an unreachable master, with the cause if it is known."""
     cause = error.__cause__
     if isinstance(error, RpcTimeout):
         return MasterUnreachableError(error.uri, cause=f"{error.why}; {SUSPENDED}")

@@ -26,7 +26,7 @@ class Outbox:
         return self.size > 0
 
     def write(self, pieces: Sequence[bytes]) -> int:
-        """Send as much as the socket accepts, and queue the rest; return the number of bytes sent.
+        """Send as much as the socket accepts, and queue the rest; return the number of bytes queued.
 
         Raise OSError if the connection has failed.
         """

@@ -55,7 +55,7 @@ accepting: the number of connections, and the seconds per iteration.
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
-_ACCEPTS_BETWEEN = 64  # number of connections to accept before reading from them
+_ACCEPTS_BETWEEN = 64  # maximum number of connections to accept between reads
 
 # Number of connections to read before accepting new ones, about 1 ms of work; thousands may be readable together
 _READS_AT_ONCE = 16
@@ -225,8 +225,8 @@ class RpcServer:
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate between new and other connections, so that many of one kind do not delay the other kind.
-            # The other connections are idle ones that disconnect, and busy ones.
+            # Alternate between new connections and those that have already made a request, so that many of one kind do not
+            # delay the other kind.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:
@@ -276,7 +276,7 @@ class RpcServer:
         connection = Connection(self, peer, loop)
         self.connections[connection] = None
         if reads:
-            # The first request has usually arrived by now.
+            # Read immediately, because the first request has usually arrived by now.
             connection.read()
 
     def log_refusal(self, sock: socket.socket, why: str) -> None:
@@ -289,7 +289,7 @@ class RpcServer:
         self._limited_log.warning("a request from %s was refused: %s", name, why)
 
     def limit_held(self, connection: Connection) -> bool:
-        """Reject the largest requests if their total exceeds the limit; return whether ``connection`` is still open."""
+        """Refuse the largest requests if the total exceeds the limit; return whether ``connection`` was not refused."""
         while self.held > MAX_HELD:
             largest = max(self.holders, key=self.holders.__getitem__)
             if self.holders[largest] <= LARGE_REQUEST:

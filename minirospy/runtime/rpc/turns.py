@@ -99,7 +99,7 @@ class Turns:
                     return True
         except StopIteration:
             pass
-        except Exception:  # noqa: BLE001 - a fault of one piece of work must not end the others
+        except Exception:  # noqa: BLE001 - one generator's error must not end the others
             _log.exception("fault in a long piece of work")
         finally:
             self._running = None
