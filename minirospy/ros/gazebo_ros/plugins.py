@@ -89,7 +89,7 @@ LIBRARIES = {
 class PluginBase:
     """Base class of all plugins.
 
-    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's. due_ns: the time of the
+    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's name. due_ns: the time of the
     simulation before which :meth:`update` has nothing to do.
     """
 
@@ -209,7 +209,7 @@ class PluginBase:
         """Offer a service in the plugin's namespace. As in ROS, log an error if this node already offers that service."""
         try:
             service: rospy.Service[Any] = rospy.Service(self.resolve(name), kind, handler)
-        except rospy.ServiceException:  # the same robot was already spawned in this namespace
+        except rospy.ServiceException:  # for example, the same robot was already spawned in this namespace
             rospy.logerr(
                 "Tried to advertise a service that is already advertised in this node [%s]",
                 self.resolve(name),
@@ -235,14 +235,14 @@ class ModelPlugin(PluginBase):
         return _title(self.plugin, f"model '{self.model.name}'")
 
     def joint(self, name: str) -> SimJoint:
-        """Return a movable joint. Raise PluginError if the model has none with this name."""
+        """Return the joint ``name``. Raise PluginError if the model does not have it."""
         joint = self.model.joints.get(name)
         if joint is None:
             raise PluginError(f"model '{self.model.name}' has no joint '{name}'")
         return joint
 
     def link(self, name: str) -> tuple[SimLink, Pose]:
-        """Return a link, and the pose in it of the link ``name``, which a fixed joint may have merged into the returned link.
+        """Return (link ``name``, identity pose) or, if it was merged into another link, (that link, the pose of ``name`` in it).
 
         Raise PluginError if the link does not exist.
         """
