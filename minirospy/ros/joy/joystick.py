@@ -125,7 +125,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # A trigger reports 0 until it is moved, although its value at rest is 1.
+        # Ignore initial values by default: as in ROS, a trigger is 0 until it is moved, although its value at rest is 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = MAX_VALUE * self._options.deadzone

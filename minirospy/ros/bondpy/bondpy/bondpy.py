@@ -307,7 +307,7 @@ class Bond:
                 self._run_timeout(event)
             return
         with self.lock:
-            # A message may have restarted the timeout after the deadline expired.
+            # Check the deadline again: a message may have restarted the timeout since it expired.
             deadline = self._deadlines.get(event)
             if deadline is not None and deadline <= time.monotonic():
                 del self._deadlines[event]

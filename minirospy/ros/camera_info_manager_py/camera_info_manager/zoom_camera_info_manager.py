@@ -34,7 +34,7 @@ __all__ = ["ApproximateZoomCameraInfoManager", "InterpolatingZoomCameraInfoManag
 
 
 class ZoomCameraInfoManager(CameraInfoManager):
-    """The base class for cameras with zoom. Keeps the zoom level within limits.
+    """The base class for cameras with zoom. Rejects zoom levels outside the limits.
 
     As a context manager, it stops the service on exit.
     """

@@ -122,11 +122,11 @@ class Cache(SimpleFilter):
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
     def getElemAfterTime(self, stamp: Time) -> object | None:
-        """Return the earliest message at or after ``stamp``, or None."""
+        """Return the first message stored with a timestamp at or after ``stamp``, or None."""
         return next((msg for time, msg in self._stored() if time >= stamp), None)
 
     def getElemBeforeTime(self, stamp: Time) -> object | None:
-        """Return the latest message at or before ``stamp``, or None."""
+        """Return the last message stored with a timestamp at or before ``stamp``, or None."""
         return next((msg for time, msg in reversed(self._stored()) if time <= stamp), None)
 
     def getLatestTime(self) -> Time | None:
@@ -144,7 +144,7 @@ class Cache(SimpleFilter):
         return stored[0][0] if stored else None
 
     def getLast(self) -> object | None:
-        """Return the earliest-stored message at or after ``getLatestTime()``, or None."""
+        """Return ``getElemAfterTime(getLatestTime())``, or None if no message is stored."""
         latest = self.getLatestTime()
         return None if latest is None else self.getElemAfterTime(latest)
 
