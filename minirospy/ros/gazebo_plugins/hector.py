@@ -87,7 +87,7 @@ class _HectorPlugin(PeriodicPlugin):
         self._last_ns = self.simulation.time_ns
 
     def sense(self) -> None:
-        """Measure if the update period has elapsed."""
+        """Measure, once per update period."""
         now_ns = self.simulation.time_ns
         self.measure((now_ns - self._last_ns) / 1e9)
         self._last_ns = now_ns

@@ -1,7 +1,7 @@
 """Publishes the world as rviz markers: /gazebo/world_markers, in the frame ``world``. The dashboard's window uses window.py.
 
-All visuals of all models are published (latched) whenever a model is added or removed. Moving models are published again while
-there are subscribers.
+All visuals of all models are published (latched) whenever a model is added or removed. While there are subscribers,
+all are published again when a link moves.
 """
 
 from __future__ import annotations

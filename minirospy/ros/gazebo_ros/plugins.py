@@ -114,7 +114,7 @@ class PluginBase:
         """Restore the state after ``load``. Called by reset_simulation after it sets the time to 0."""
 
     def close(self) -> None:
-        """Close the publishers and subscribers from :meth:`publish_to` and :meth:`subscribe_to`."""
+        """Close the plugin's publishers, subscribers and services."""
         for function in self._closing:
             function()
         self._closing.clear()
@@ -126,7 +126,7 @@ class PluginBase:
 
     @property
     def namespace(self) -> str:
-        """Return ``<robotNamespace>`` (or the default), resolved in the node's namespace, without a trailing slash."""
+        """Return ``<robotNamespace>`` or the default as a global name; "" stands for the root namespace."""
         text = self.text("robotNamespace", self.default_namespace)
         return "" if text in ("", "/") else "/" + text.strip("/")
 
@@ -156,7 +156,7 @@ class PluginBase:
     def number(self, tag: str, default: float) -> float:
         """Return a parameter's number. Raise PluginError if the text is not a number, or the number is outside the tag's range.
 
-        As in Gazebo, a negative rate means each step; a warning names it.
+        As in Gazebo, a negative rate means each step; log a warning about it.
         """
         value = number_of(self.element, tag, default)
         if value < 0 and tag in _RATES:

@@ -97,7 +97,7 @@ class _Server(Protocol):
 
 
 class HandleTrackerDeleter:
-    """Marks a goal as ended when its last handle is deleted."""
+    """A callable that marks a goal as ended."""
 
     def __init__(self, action_server: _Server, status_tracker: StatusTracker) -> None:
         self.action_server = action_server
