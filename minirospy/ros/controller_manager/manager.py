@@ -58,8 +58,8 @@ class ControllerManager:
     """Loads, starts and stops the controllers of one robot, as requested through the services that it offers.
 
     The node calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``, as
-    :func:`controller_manager.run` does. Each service returns after the loop's next update. ``namespace``: for the services and
-    controllers; by default the node's namespace.
+    :func:`controller_manager.run` does. A service that changes controllers returns after the loop's next update.
+    ``namespace``: for the services and controllers; by default the node's namespace.
     """
 
     def __init__(self, hardware: RobotHardware, namespace: str = "") -> None:

@@ -252,7 +252,7 @@ class AnalyzerGroup:
     """A group of analyzers with a header. Parameters: path, and analyzers, with one namespace per analyzer."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Create the analyzers and report errors; ``is_complete`` is False if an analyzer cannot be created."""
+        """Create the analyzers and report errors; ``is_complete`` is False if one fails to initialize, or there are none."""
         path = params.get("path")
         self.name = path if isinstance(path, str) else ""
         full = f"{base_path}/{self.name}" if self.name and base_path not in ("", "/") else base_path

@@ -15,7 +15,7 @@ EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
 """Event types in Linux's struct js_event. Devices on other systems use the same values."""
 
 MAX_VALUE = 32767.0
-_FIRST_SECONDS = 1.0  # seconds from opening the device to the first repetition, as in ROS's joy_node
+_FIRST_SECONDS = 1.0  # seconds to add to the first repetition interval after opening the device, as in ROS
 
 
 class Event(NamedTuple):

@@ -202,7 +202,7 @@ class TimeSynchronizer(SimpleFilter):
                     self.signalMessage(*[queue.pop(each) for queue in self.queues])
 
     def _reset_if_time_jumped(self, my_queue: Queue, my_queue_index: int | None) -> bool:
-        """Clear an input's queue if simulated time has jumped back. Return True if another input has a later timestamp."""
+        """Clear an input's queue if simulated time has jumped back. Return True if another input's last message came later."""
         if not self.enable_reset or is_wallclock():
             return False
         now = rospy.Time.now()
