@@ -13,7 +13,7 @@ __all__: list[str] = []
 
 
 def __getattr__(name: str) -> NoReturn:
-    """Raise ImportError for a module listed in the tables (``pkg_sub`` means ``pkg.sub``), AttributeError for any other name."""
+    """Raise ImportError for a module in `workspace/elsewhere.py` (``pkg_sub`` means ``pkg.sub``), else AttributeError."""
     if name in IMPORTED:
         raise ImportError(f"No module named '{name}': {advice(name)}", name=name)
     submodule = name.replace("_", ".", 1)

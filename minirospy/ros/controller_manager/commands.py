@@ -141,7 +141,7 @@ def _where(names: Iterable[str], running: dict[str, bool], is_running: bool) -> 
 
 
 def _running_of_loaded() -> dict[str, bool]:
-    """Return whether each loaded controller is running."""
+    """Map each loaded controller's name to whether the controller is running."""
     rospy.wait_for_service("controller_manager/list_controllers", timeout=_SERVICE_SECONDS)
     found = {}
     for each in rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)().controller:

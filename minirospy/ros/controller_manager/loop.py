@@ -224,7 +224,7 @@ class ControlLoop:
         delays, durations = spread(late), spread(busy)
         name, namespace = f"{rospy.get_name()[1:]}: control loop", self.manager.namespace
         if namespace != "/" + rospy.get_namespace().strip("/"):
-            name += f" {namespace}"  # a node may control several robots
+            name += f" {namespace}"  # distinguishes the loops if a node controls several robots
         status = DiagnosticStatus(name=name, message="OK", hardware_id="none")
         if overruns:
             status.level = DiagnosticStatus.WARN

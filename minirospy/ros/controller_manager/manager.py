@@ -58,8 +58,8 @@ class ControllerManager:
     """Loads, starts and stops the controllers of one robot, as requested through the services that it offers.
 
     The node calls :meth:`update` in each cycle of its loop, between ``hardware.read`` and ``hardware.write``, as
-    :func:`controller_manager.run` does. Each service returns after the loop's next update. ``namespace``: for the services and
-    controllers; by default the node's namespace.
+    :func:`controller_manager.run` does. A service that changes controllers returns after the loop's next update.
+    ``namespace``: for the services and controllers; by default the node's namespace.
     """
 
     def __init__(self, hardware: RobotHardware, namespace: str = "") -> None:
@@ -69,7 +69,7 @@ class ControllerManager:
         self.table = ControllerTable(hardware, log)
         self._plugins: dict[str, Plugin] | None = None
         self._lock = threading.RLock()  # held during each service call
-        self._waiting: list[threading.Event] = []  # events to set in the next update
+        self._waiting: list[threading.Event] = []  # events to set at the end of the next update
         self._has_updated = False
         self._is_closed = False
 
@@ -198,7 +198,7 @@ class ControllerManager:
             service.shutdown()
 
     def _wait_for_update(self) -> bool:
-        """Wait until the loop uses the new table; return False if the node is shutting down."""
+        """Wait until a started loop has used the changed controller table; return False if closed or if the node shuts down."""
         if self._has_updated and not self._is_closed:
             updated = SignalSafeEvent()
             self._waiting.append(updated)

@@ -56,7 +56,7 @@ def new_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program; return 0, even if there is no controller manager."""
+    """Run the program; return 1 if a call of a service fails, but 0 if there is no controller manager."""
     arguments = new_parser().parse_args(rospy.myargv()[1:] if argv is None else argv)
     rospy.init_node("spawner", anonymous=True)
     if arguments.shutdown_timeout is not None:

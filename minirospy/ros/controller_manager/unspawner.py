@@ -41,7 +41,7 @@ def main() -> int:
     def stop_again(_: object) -> None:
         try:
             stop()
-        except rospy.ServiceException as error:  # the manager may come back later
+        except rospy.ServiceException as error:  # keep running: the manager may come back later
             rospy.logwarn("%s", error)
 
     def start() -> None:

@@ -139,7 +139,7 @@ class Aggregator:
             self._warned.add(names)
 
     def _add(self, request: AddDiagnosticsRequest) -> AddDiagnosticsResponse:
-        """Create analyzers from the parameters in another namespace.
+        """Create analyzers from the parameters in the requested namespace.
 
         Remove them when the bond with the requesting node breaks.
         """

@@ -117,7 +117,7 @@ class _Items:
         was_stale = self._last_level == STALE and now - self._last_change > self._timeout
         if header.level != self._last_level:
             self._last_level, self._last_change = header.level, now
-        # Also omit the header if the group has no items and its level has been STALE for longer than the timeout.
+        # Omit the header once all items are discarded and its level has been STALE for longer than the timeout.
         if self._discard_stale and not items and was_stale:
             return []
         return [header, *(item.status(self.path, item.name in old) for item in items)]
@@ -135,7 +135,7 @@ class _Items:
 
 
 class GenericAnalyzer(_Items):
-    """Accepts statuses selected by name.
+    """Accepts the statuses whose names match its parameters.
 
     Parameters: path, find_and_remove_prefix, startswith, name, contains, expected, regex, ...
     """
@@ -150,7 +150,7 @@ class GenericAnalyzer(_Items):
             return _words(params.get(key, []), log)
 
         prefixes = words("find_and_remove_prefix")
-        # As in ROS, use the prefixes from both parameters.
+        # As in ROS, find_and_remove_prefix stands for both startswith and remove_prefix, and adds to them.
         self._starts = prefixes + words("startswith")
         self._removed = [_shown(word) for word in prefixes + words("remove_prefix")]
         self._names = words("name")
@@ -215,7 +215,7 @@ class DiscardAnalyzer(GenericAnalyzer):
 
 
 class IgnoreAnalyzer:
-    """An analyzer that matches no statuses and reports nothing. Given as an analyzer's type, it disables that analyzer."""
+    """Matches no statuses and reports nothing. To disable an analyzer in the parameters, set its type to this class."""
 
     path = name = ""
 
@@ -252,7 +252,7 @@ class AnalyzerGroup:
     """A group of analyzers with a header. Parameters: path, and analyzers, with one namespace per analyzer."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Create the analyzers and report errors; ``is_complete`` is False if an analyzer cannot be created."""
+        """Create the analyzers and report errors; ``is_complete`` is False if one fails to initialize, or there are none."""
         path = params.get("path")
         self.name = path if isinstance(path, str) else ""
         full = f"{base_path}/{self.name}" if self.name and base_path not in ("", "/") else base_path

@@ -55,7 +55,7 @@ class MobileBase(Controller):
         self._is_running = False
 
     def measure(self, odometry: Odometry, time: int) -> bool:
-        """Update the odometry from the wheels' motion; return False, without changes, if a wheel position is NaN."""
+        """Update the odometry from the motion of the wheels; return False, without changes, if a wheel position is NaN."""
         raise NotImplementedError
 
     def drive(self, linear: float, angular: float) -> None:
@@ -97,7 +97,7 @@ class MobileBase(Controller):
         self._angular_limits = SpeedLimiter.read(parameters.below("angular/z"))
 
     def open_topics(self, context: ControllerContext) -> None:
-        """Open ``odom``, ``/tf`` and ``cmd_vel``. Raise ControllerError if a covariance parameter is missing."""
+        """Publish ``odom`` and ``/tf``, subscribe to ``cmd_vel``. Raise ControllerError if a covariance parameter is missing."""
         self._pose_covariance = _covariance(context.parameters, "pose_covariance_diagonal")
         self._twist_covariance = _covariance(context.parameters, "twist_covariance_diagonal")
         self._odom = self.open_publisher(f"{context.namespace}/odom", OdometryMessage)
@@ -108,7 +108,7 @@ class MobileBase(Controller):
         self.opened.callback(self._subscriber.unregister)
 
     def open_publisher(self, topic: str, message_class: type[_M]) -> RealtimePublisher[_M]:
-        """Open a topic and register it for ``close``."""
+        """Create a publisher; closing the controller closes it."""
         return self.opened.enter_context(closing(RealtimePublisher(topic, message_class, queue_size=100)))
 
     def starting(self, time: Time) -> None:
@@ -130,7 +130,7 @@ class MobileBase(Controller):
         """Update and publish the odometry, then command the wheels."""
         now = nanoseconds(time)
         if now < self._now:
-            self._command = _STOP  # the clock jumped back, so this command would never time out
+            self._command = _STOP  # the clock jumped back, so the command would time out too late
         self._now = now
         is_measured = True
         if self._open_loop:

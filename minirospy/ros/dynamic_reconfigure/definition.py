@@ -15,7 +15,7 @@ __all__ = ["Definition", "close_server"]
 
 
 class Definition(ParameterGenerator):
-    """A configuration without a .cfg file: call ``add`` as in such a file. The properties are a generated module's variables."""
+    """Defines parameters without a .cfg file: call ``add`` as in such a file. A server reads it like a generated module."""
 
     def __init__(self) -> None:
         """Define a configuration without parameters. Unlike a .cfg file, it needs no folders."""

@@ -43,7 +43,7 @@ class CommandTopic:
     """
 
     def __init__(self, context: ControllerContext, joints: int, *, is_group: bool) -> None:
-        """Subscribe to Float64MultiArray for a group of joints, otherwise to Float64."""
+        """Subscribe to Float64MultiArray for a group of joints, to Float64 for a single joint."""
         self.values: Sequence[float] = (0.0,) * joints
         self._name = f"{context.namespace}/command"
         self._subscriber = rospy.Subscriber(
@@ -54,7 +54,7 @@ class CommandTopic:
         )
 
     def close(self) -> None:
-        """Close the topic."""
+        """Unsubscribe from the topic."""
         self._subscriber.unregister()
 
     def _receive(self, message: Float64) -> None:

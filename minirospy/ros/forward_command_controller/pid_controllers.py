@@ -38,7 +38,7 @@ class _PidController(Controller):
         return interface
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joints, read the gains and open the topics."""
+        """Claim the joints, read the gains, and create the publisher and subscriber."""
         self._field = COMMAND_FIELDS[self._interface]
 
     def _open_command(self, context: ControllerContext, joints: int, *, is_group: bool = False) -> None:
@@ -67,7 +67,7 @@ class PidJointPositionController(_PidController):
     """Moves the joint in the parameter ``joint`` to positions from the topic ``command``, initially its current position."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joint, read the gains in ``pid`` and the joint's limits, and open the topics."""
+        """Claim the joint, read the gains in ``pid`` and the joint limits, and create the publisher and subscriber."""
         super().init(hardware, context)
         joint = claim_joint(hardware, context, self._interface)
         pid = Pid.open(context.parameters.below("pid"), self.opened)
@@ -102,7 +102,7 @@ class PidJointVelocityController(_PidController):
     """Moves the joint in the parameter ``joint`` at velocities from the topic ``command``, initially 0."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joint, read the gains in ``pid`` and open the topics."""
+        """Claim the joint, read the gains in ``pid``, and create the publisher and subscriber."""
         super().init(hardware, context)
         self._joint = claim_joint(hardware, context, self._interface)
         self._pid = Pid.open(context.parameters.below("pid"), self.opened)
@@ -129,7 +129,7 @@ class PidJointGroupPositionController(_PidController):
     """Moves the joints in the parameter ``joints`` to positions from the topic ``command``. The gains are in ``JOINT/pid``."""
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joints, read their gains and limits, and open the topic."""
+        """Claim the joints, read their gains and limits, and subscribe to the topic."""
         super().init(hardware, context)
         joints = claim_group(hardware, context, self._interface)
         robot = _read_robot(context)
@@ -151,7 +151,7 @@ class PidJointGroupPositionController(_PidController):
             loop.pid.reset()
 
     def update(self, time: Time, period: Duration) -> None:
-        """Set the joints' commands."""
+        """Set the joint commands."""
         dt = period.to_sec()
         for loop, target in zip(self._loops, self._command.values, strict=True):
             error = loop.error(loop.clamp(target))

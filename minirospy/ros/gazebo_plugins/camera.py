@@ -65,7 +65,7 @@ class CameraPlugin(SensorPlugin):
         self._offer_rate()
 
     def add_lens(self, optics: Optics, suffix: str = "", baseline: float | None = None) -> Lens:
-        """Add a camera with topics below its name and a suffix. Raise PluginError if its size is invalid."""
+        """Add a camera with topics in CAMERA_NAME/``suffix``. Raise PluginError if its size or field of view is invalid."""
         sizes = (optics.width, optics.height)
         if not (min(sizes) >= 1 and max(sizes) <= MAX_PIXELS and 0 < optics.horizontal_fov < math.pi):
             raise PluginError(
@@ -151,7 +151,7 @@ class Lens:
         )
         self.info.header.frame_id = plugin.frame_id
         self._check_focal_length()
-        # The rendering thread must not use the simulation's random generator.
+        # A separate random generator for the rendering thread: the simulation's is for the simulation's thread.
         self._random = np.random.default_rng(int(plugin.simulation.random.integers(1 << 32)))
         self.photographer = Photographer(plugin.simulation, optics.width, optics.height)
         self.images = self.publish_to("imageTopicName", plugin.image_topic, Image, latch=True)
@@ -162,7 +162,7 @@ class Lens:
     def publish_to(
         self, tag: str, topic: str, kind: type[rospy.Message], *, latch: bool = False
     ) -> rospy.Publisher[Any]:
-        """Return a publisher below the camera's name. A parameter may override the topic's name."""
+        """Return a publisher in the camera's namespace. The parameter ``tag`` overrides the topic's name."""
         name = self.plugin.text(tag, topic)
         full = name if name.startswith("/") or not self.folder else f"{self.folder}/{name}"
         return self.plugin.output_to(full, kind, latch=latch)
@@ -224,7 +224,7 @@ class Camera(CameraPlugin):
     """libgazebo_ros_camera.so: a single camera."""
 
     def load(self) -> None:
-        """Start the topics."""
+        """Create the camera, its publishers and its service."""
         super().load()
         self.add_lens(read_optics(self.sensor.element.first("camera")))
 
@@ -233,7 +233,7 @@ class MultiCamera(CameraPlugin):
     """libgazebo_ros_multicamera.so: cameras with ``left`` or ``right`` in their names; their pictures have the same timestamp."""
 
     def load(self) -> None:
-        """Start the topics."""
+        """Create the cameras, their publishers and their services."""
         super().load()
         for element in self.sensor.element.all("camera"):
             optics = read_optics(element)

@@ -35,14 +35,14 @@ class DepthCamera(CameraPlugin):
     is_organized = False  # whether the point cloud has as many rows as the picture
 
     def load(self) -> None:
-        """Start the topics."""
+        """Create the camera and its publishers."""
         super().load()
         lens = self._lens = self.add_lens(read_optics(self.sensor.element.first("camera")))
         self._points = lens.publish_to("pointCloudTopicName", "points", PointCloud2)
         self._depths = lens.publish_to("depthImageTopicName", "depth/image_raw", Image)
         tag = "depthImageCameraInfoTopicName"
         if self.element.first(tag) is None:
-            tag = "depthImageInfoTopicName"  # many models use this tag, copied from another plugin
+            tag = "depthImageInfoTopicName"  # a tag of another plugin, which many models use here
         self._infos = lens.publish_to(tag, "depth/camera_info", CameraInfo)
         self._nearest, self._farthest = self.number("pointCloudCutoff", 0.4), self.read_farthest()
         self._is_16_bit = self.flag("useDepth16UC1Format", False)
@@ -57,7 +57,7 @@ class DepthCamera(CameraPlugin):
         return np.inf
 
     def sense(self) -> None:
-        """Publish the topics with subscribers; ``updateRate`` applies only to camera_info."""
+        """Publish on the topics that have subscribers; ``updateRate`` applies only to camera_info."""
         now, lens = self.now, self._lens
         if self.is_due():
             lens.publish_info(now, lens.infos)
@@ -100,7 +100,7 @@ class DepthCamera(CameraPlugin):
         rows = np.zeros((height, width, POINT_STEP), np.uint8)
         values = rows.view("<f4")
         values[:, :, 0], values[:, :, 1], values[:, :, 2] = z * right, z * down, z
-        # Real Gazebo copies the picture's first channel to blue, so R8G8B8 swaps red and blue.
+        # As in Gazebo, copy the picture's first channel to blue, although that swaps red and blue in R8G8B8.
         pixels = np.frombuffer(image.data, np.uint8)
         if len(pixels) in (height * width, 3 * height * width):
             rows[:, :, 16:19] = pixels.reshape(height, width, -1)

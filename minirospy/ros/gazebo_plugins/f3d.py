@@ -11,7 +11,7 @@ __all__ = ["F3D"]
 
 
 class F3D(PeriodicPlugin):
-    """libgazebo_ros_f3d.so. Parameters: bodyName, topicName, frameName. Vectors are in the world frame and exclude contacts."""
+    """libgazebo_ros_f3d.so. Parameters: bodyName, topicName, frameName. World frame, without contact forces."""
 
     def load(self) -> None:
         """Find the link."""

@@ -52,7 +52,7 @@ class ErrorModel:
 
     @property
     def bias(self) -> Values:
-        """Return the current offset and drift."""
+        """Return the sum of the offset and the current drift."""
         return self.current + self.offset
 
     def reset(self) -> None:
@@ -87,7 +87,7 @@ class _HectorPlugin(PeriodicPlugin):
         self._last_ns = self.simulation.time_ns
 
     def sense(self) -> None:
-        """Measure if the update period has elapsed."""
+        """Measure, once per update period."""
         now_ns = self.simulation.time_ns
         self.measure((now_ns - self._last_ns) / 1e9)
         self._last_ns = now_ns
@@ -151,10 +151,10 @@ class HectorGps(_HectorPlugin):
 
 
 class HectorImu(_HectorPlugin):
-    """An IMU. Parameters: topicName, biasTopicName, serviceName, frameId, rpyOffset; errors: accel, rate, yaw."""
+    """An IMU. Parameters: topicName, biasTopicName, serviceName, frameId, rpyOffset; errors with prefixes accel, rate, yaw."""
 
     def load(self) -> None:
-        """Start the topics."""
+        """Read the parameters, create the publishers and offer the service."""
         super().load()
         topic = self.text("topicName", "imu")
         self._frame = self.frame("frameId", self.text("bodyName", self.body.name))

@@ -10,7 +10,7 @@ __all__ = ["MimicJoint"]
 
 
 class MimicJoint(ModelPlugin):
-    """Makes one joint follow another. Parameters: joint, mimicJoint, multiplier, offset, maxEffort (of the motor; no PID)."""
+    """Makes one joint follow another. Parameters: joint, mimicJoint, multiplier, offset, maxEffort (ignored without hasPID)."""
 
     def load(self) -> None:
         """Find the joints."""

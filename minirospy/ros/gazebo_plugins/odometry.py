@@ -28,7 +28,7 @@ class DrivePlugin(PeriodicPlugin):
     variances: tuple[float, ...] = (1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3)
 
     def load_drive(self, *, has_odometry: bool = True, has_transforms: bool = True) -> None:
-        """Start the topics, after the subclass has read its parameters."""
+        """Create the publishers and subscriber, after the subclass has read its parameters."""
         self._frames = (self.frame("odometryFrame", "odom"), self.frame("robotBaseFrame", "base_footprint"))
         self._odometry: rospy.Publisher[Any] | None = None
         if has_odometry:

@@ -29,7 +29,7 @@ MAX_CLOSING_SECONDS = 5.0  # timeout in seconds for unfinished pictures when clo
 
 
 class _DrawingThread:
-    """Runs jobs in a thread that owns the OpenGL contexts. The thread ends when its last user leaves."""
+    """Runs jobs in a thread that owns the OpenGL contexts. The thread ends when the last camera calls :meth:`leave`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -39,7 +39,7 @@ class _DrawingThread:
         self._is_warned = False
 
     def join(self) -> None:
-        """Add a user; the first one starts the thread."""
+        """Register a camera; the first one starts the thread."""
         with self._lock:
             self._users += 1
             if self._thread is None:
@@ -47,7 +47,7 @@ class _DrawingThread:
                 self._thread.start()
 
     def leave(self) -> None:
-        """Remove a user. If it was the last one, wait until the thread has ended."""
+        """Unregister a camera. After the last one, wait until the thread has ended."""
         with self._lock:
             self._users -= 1
             thread, is_last = self._thread, not self._users

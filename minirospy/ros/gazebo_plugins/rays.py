@@ -48,7 +48,7 @@ class RayPlugin(SensorPlugin):
     """Base class for plugins of ray sensors with one topic. Parameters: topicName, frameName."""
 
     def load_rays(self, topic: str, kind: type[rospy.Message]) -> None:
-        """Read the sensor's rays and open the topic, by default ``topic``."""
+        """Read the sensor's rays and create the publisher, by default for ``topic``."""
         self.shown_rays = self.rays = read_rays(self.sensor)
         self.frame_id = self.frame("frameName", "/world")
         self.publisher = self.output_to(self.text("topicName", topic), kind)

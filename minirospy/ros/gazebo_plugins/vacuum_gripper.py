@@ -14,7 +14,7 @@ from minirospy.ros.gazebo_ros.plugins import ModelPlugin
 
 __all__ = ["VacuumGripper"]
 
-REACH = 0.05  # maximum distance in m between the links' origins
+REACH = 0.05  # m; links whose origin is within this distance of the gripper's are pulled
 SNAP = 0.01  # m; links within this distance move to the gripper's origin
 MAX_FORCE = 20.0  # N
 

@@ -63,7 +63,7 @@ def read_world_file(name: str, resources: ResourcePaths) -> World:
 
 
 def world_warnings(world: World) -> list[str]:
-    """Return the warnings about a world and its models. A warning that models share appears once, with their number."""
+    """Return the warnings about a world and its models. A warning about several models appears once, with their number."""
     places: dict[str, list[str]] = {}
     for model in world.models:
         for line in model.warnings:

@@ -180,7 +180,7 @@ class SimulationLoop:
                 future.set_exception(error)
 
     def _must_wait(self) -> bool:
-        """Wait while paused or until the next steps are due. Return whether to check for jobs again."""
+        """Wait while paused, or until the next steps are due. Return False if they are due, True if jobs may have arrived."""
         with self._lock:
             if self._jobs or self._is_closed:
                 return True

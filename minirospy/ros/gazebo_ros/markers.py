@@ -1,7 +1,7 @@
 """Publishes the world as rviz markers: /gazebo/world_markers, in the frame ``world``. The dashboard's window uses window.py.
 
-All visuals of all models are published (latched) whenever a model is added or removed. Moving models are published again while
-there are subscribers.
+All visuals of all models are published (latched) whenever a model is added or removed. While there are subscribers,
+all are published again when a link moves.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class WorldMarkers:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._publisher = rospy.Publisher(TOPIC, MarkerArray, queue_size=2, latch=True)
-        self._published: NDArray[np.float64] = np.zeros((0, 7))  # the poses of all links
+        self._published: NDArray[np.float64] = np.zeros((0, 7))  # all link poses when last published
         self._known: dict[
             SimModel, tuple[NDArray[np.float64], list[Marker]]
         ] = {}  # each model's link poses and markers
@@ -78,7 +78,7 @@ class WorldMarkers:
         return [marker for _, markers in self._known.values() for marker in markers]
 
     def publish_moved(self) -> None:
-        """Publish the links that have moved, at a low rate and only for subscribers."""
+        """If there are subscribers and a link has moved, publish all markers, at a low rate."""
         now = self._simulation.time_ns
         if 0 <= self._next_ns - now <= 1e9 / RATE_HZ or not self._publisher.get_num_connections():
             return
@@ -116,7 +116,7 @@ def model_markers(model: SimModel) -> list[Marker]:
 @functools.cache
 def _uri(path: str) -> str:
     """Return a file's URI: package:// if the file is in a package, because the dashboard can read such URIs."""
-    file = Path(os.path.abspath(path))  # GAZEBO_MODEL_PATH may contain relative folders
+    file = Path(os.path.abspath(path))  # relative if GAZEBO_MODEL_PATH contains relative folders
     for folder in file.parents:
         if name := package_name(folder):
             return f"package://{name}/{file.relative_to(folder).as_posix()}"

@@ -57,7 +57,7 @@ class PhysicsServices:
         offer(loop, "clear_body_wrenches", srv.BodyRequest, self._clear_body_wrenches)
         offer(loop, "reset_simulation", Empty, lambda _: server.reset(with_time=True))
         offer(loop, "reset_world", Empty, lambda _: server.reset(with_time=False))
-        # Advances a paused simulation; Gazebo offers this only in its window.
+        # Not a service in Gazebo, where only the window can advance a paused simulation.
         offer(loop, "step_physics", Empty, lambda _: loop.step(1))
         offer_directly("pause_physics", Empty, lambda _: loop.set_paused(True))
         offer_directly("unpause_physics", Empty, lambda _: loop.set_paused(False))

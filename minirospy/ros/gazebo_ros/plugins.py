@@ -89,7 +89,7 @@ LIBRARIES = {
 class PluginBase:
     """Base class of all plugins.
 
-    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's. due_ns: the time of the
+    loop: runs the simulation. element: the ``<plugin>`` with its parameters. name: the plugin's name. due_ns: the time of the
     simulation before which :meth:`update` has nothing to do.
     """
 
@@ -114,7 +114,7 @@ class PluginBase:
         """Restore the state after ``load``. Called by reset_simulation after it sets the time to 0."""
 
     def close(self) -> None:
-        """Close the publishers and subscribers from :meth:`publish_to` and :meth:`subscribe_to`."""
+        """Close the plugin's publishers, subscribers and services."""
         for function in self._closing:
             function()
         self._closing.clear()
@@ -126,7 +126,7 @@ class PluginBase:
 
     @property
     def namespace(self) -> str:
-        """Return ``<robotNamespace>`` (or the default), resolved in the node's namespace, without a trailing slash."""
+        """Return ``<robotNamespace>`` or the default as a global name; "" stands for the root namespace."""
         text = self.text("robotNamespace", self.default_namespace)
         return "" if text in ("", "/") else "/" + text.strip("/")
 
@@ -156,7 +156,7 @@ class PluginBase:
     def number(self, tag: str, default: float) -> float:
         """Return a parameter's number. Raise PluginError if the text is not a number, or the number is outside the tag's range.
 
-        As in Gazebo, a negative rate means each step; a warning names it.
+        As in Gazebo, a negative rate means each step; log a warning about it.
         """
         value = number_of(self.element, tag, default)
         if value < 0 and tag in _RATES:
@@ -209,7 +209,7 @@ class PluginBase:
         """Offer a service in the plugin's namespace. As in ROS, log an error if this node already offers that service."""
         try:
             service: rospy.Service[Any] = rospy.Service(self.resolve(name), kind, handler)
-        except rospy.ServiceException:  # the same robot was already spawned in this namespace
+        except rospy.ServiceException:  # for example, the same robot was already spawned in this namespace
             rospy.logerr(
                 "Tried to advertise a service that is already advertised in this node [%s]",
                 self.resolve(name),
@@ -235,14 +235,14 @@ class ModelPlugin(PluginBase):
         return _title(self.plugin, f"model '{self.model.name}'")
 
     def joint(self, name: str) -> SimJoint:
-        """Return a movable joint. Raise PluginError if the model has none with this name."""
+        """Return the joint ``name``. Raise PluginError if the model does not have it."""
         joint = self.model.joints.get(name)
         if joint is None:
             raise PluginError(f"model '{self.model.name}' has no joint '{name}'")
         return joint
 
     def link(self, name: str) -> tuple[SimLink, Pose]:
-        """Return a link, and the pose in it of the link ``name``, which a fixed joint may have merged into the returned link.
+        """Return (link ``name``, identity pose) or, if it was merged into another link, (that link, the pose of ``name`` in it).
 
         Raise PluginError if the link does not exist.
         """

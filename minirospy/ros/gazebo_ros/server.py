@@ -43,7 +43,7 @@ class Server:
         self._clock = clock
         self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=10)
         self._published_ns = -1
-        self._told = len(loop.simulation.warnings)  # gzserver itself logs the initial warnings
+        self._told = len(loop.simulation.warnings)  # warnings already logged; gzserver logs the initial ones
         self._states: _StatePublishers | None = None
         self._markers: WorldMarkers | None = None
         self._window: Window | None = None
@@ -97,7 +97,7 @@ class Server:
         """Reset the models; if ``with_time``, also reset the time and the plugins. Call this in the loop's thread."""
         self.loop.reset(with_time=with_time)
         if self._window is not None:
-            self._window.changed()  # static models may have been moved
+            self._window.changed()  # the reset may have moved static models
         if with_time:
             self.plugins.reset()
 

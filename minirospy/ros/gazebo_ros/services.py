@@ -1,7 +1,7 @@
 """Offer services whose work is done in the simulation's thread, between two steps.
 
-A handler returns the response, or only its status message if it has done what was asked for. It raises :class:`Refused` if it
-has not: then the response has ``success`` false and the error's text.
+A handler returns the response or, if it has fulfilled the request, only the status message. Otherwise, it raises
+:class:`Refused`, and the response has ``success`` false and the text of the error.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def offer_directly(name: str, kind: Any, handler: Handler) -> None:
 
 
 def apply(loop: SimulationLoop, handler: Handler, request: object) -> None:
-    """Run a message's handler in the simulation's thread; log a SimulationError."""
+    """Run a message's handler in the simulation's thread. If it raises SimulationError, log the error."""
     try:
         loop.call(lambda: handler(request))
     except (LoopClosed, Refused):

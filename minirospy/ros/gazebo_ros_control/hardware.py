@@ -52,7 +52,7 @@ class SimulatedHardware(RobotHardware):
                 drive.max_effort = abs(limits[drive.joint.name].effort)
 
     def read(self, _time: Time, _period: Duration) -> None:
-        """Update the joints' states."""
+        """Update the joint states."""
         for drive in self._drives:
             drive.read()
 
@@ -95,7 +95,10 @@ class _Drive:
         joint.effort = self._simulated.effort
 
     def write(self, seconds: float, is_stopped: bool) -> None:
-        """Write the command unless it is not finite: controllers may write such a command after the limits were enforced."""
+        """Write the command. In place of one that is not finite, write 0 or, for a position, the last finite command.
+
+        Controllers may set such a command after the limits were enforced.
+        """
         joint, simulated = self.joint, self._simulated
         kind = joint.active or self._first
         if kind is Interface.EFFORT:

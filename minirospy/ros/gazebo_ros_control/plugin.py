@@ -108,7 +108,7 @@ class GazeboRosControl(ModelPlugin):
         rospy.loginfo("Loaded gazebo_ros_control.")
 
     def _usable(self, transmissions: list[Transmission]) -> list[Transmission]:
-        """Return one transmission per joint in the model."""
+        """Return the first transmission of each joint. Raise PluginError if the model has no such joint, or it cannot move."""
         found: dict[str, Transmission] = {}
         for each in transmissions:
             joint = self.model.joints.get(each.joint)

@@ -103,7 +103,7 @@ def uncompressed(message: CompressedImage) -> Image:
 
 
 def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
-    """Encode a depth image as PNG: 16 bits losslessly, 32-bit floats as inverse depths.
+    """Encode a depth image as PNG: 16-bit depths as they are, floats as inverse depths. Depths beyond the maximum become 0.
 
     Raise CodecError if the image has another encoding.
     """

@@ -187,7 +187,7 @@ def _class_of(kind: str) -> type[Image] | type[CompressedImage]:
 
 
 def _bytes_of(cls: type[Image] | type[CompressedImage]) -> type[AnyMsg]:
-    """Return a message class with the type of ``cls``, whose messages hold only the serialized bytes."""
+    """Return a message class with the type and md5sum of ``cls``; its messages contain only the serialized bytes."""
     fields = {"_type": cls._type, "_md5sum": cls._md5sum, "_full_text": cls._full_text, "__slots__": []}
     return type("PassedImage", (AnyMsg,), fields)
 

@@ -15,7 +15,7 @@ EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
 """Event types in Linux's struct js_event. Devices on other systems use the same values."""
 
 MAX_VALUE = 32767.0
-_FIRST_SECONDS = 1.0  # seconds from opening the device to the first repetition, as in ROS's joy_node
+_FIRST_SECONDS = 1.0  # seconds to add to the first repetition interval after opening the device, as in ROS
 
 
 class Event(NamedTuple):
@@ -125,7 +125,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # A trigger reports 0 until it is moved, although its value at rest is 1.
+        # Ignore initial values by default: as in ROS, a trigger is 0 until it is moved, although its value at rest is 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = MAX_VALUE * self._options.deadzone

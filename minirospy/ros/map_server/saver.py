@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The file name without suffix, the occupancy from which a cell counts as occupied, and the one up to which it is free."""
+    """The file name without suffix, the minimum occupancy of an occupied cell and the maximum occupancy of a free cell."""
 
     name: str = "map"
     occupied: int = 65

@@ -28,7 +28,7 @@ class AckermannSteeringController(MobileBase):
     interfaces = (Interface.POSITION, Interface.VELOCITY)
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the joints and open the topics."""
+        """Read the parameters, claim the joints and create the publishers and subscriber."""
         parameters = context.parameters
         rear = parameters.text("rear_wheel", "rear_wheel_joint")
         front = parameters.text("front_steer", "front_steer_joint")

@@ -151,7 +151,7 @@ class ActionClient:
         )
 
     def _status_link_ended(self) -> None:
-        """After SERVER_SECONDS, check whether the server is gone. Called on the loop."""
+        """Check whether the server is gone, SERVER_SECONDS after a status connection has ended. Called on the loop."""
         if goals := self.manager.unfinished():
             self._check_later(goals)
 
@@ -162,7 +162,7 @@ class ActionClient:
         timer.start()
 
     def _check_server(self, goals: list[CommStateMachine], last: GoalStatusArray | None) -> None:
-        """Mark ``goals`` as LOST, except those listed in a status message newer than ``last``."""
+        """Mark ``goals`` as LOST if no server is connected, else those missing from a status list newer than ``last``."""
         impl = self.status_sub.impl  # read the attribute once: stop() in another thread may set it to None
         if rospy.is_down() or impl is None:
             return

@@ -33,7 +33,7 @@ _WHERE_FROM = {
 
 
 class StatusTracker:
-    """Tracks a goal's status, even if the goal was cancelled before it arrived."""
+    """Tracks the status of a goal or, if ``goal`` is None, of a goal that was cancelled before it arrived."""
 
     def __init__(
         self, goal_id: GoalID | None = None, status: int | None = None, goal: ActionGoal | None = None
@@ -43,7 +43,7 @@ class StatusTracker:
         self.id_generator = GoalIDGenerator()
         self.ended_at = 0  # time at which the goal ended, in ns of ROS time; 0 until then
         self._bytes: bytes | None = None
-        self._serialized: tuple[object, ...] = ()  # the field values serialized in `_bytes`
+        self._serialized: tuple[object, ...] = ()  # the field values from which `_bytes` was made
         self.status = GoalStatus()
         if goal is None:
             self.status.goal_id = goal_id or GoalID()
@@ -97,7 +97,7 @@ class _Server(Protocol):
 
 
 class HandleTrackerDeleter:
-    """Marks a goal as ended when its last handle is deleted."""
+    """A callable that marks a goal as ended."""
 
     def __init__(self, action_server: _Server, status_tracker: StatusTracker) -> None:
         self.action_server = action_server

@@ -56,7 +56,7 @@ class ClientGoalHandle:
             return
         with machine.mutex:
             machine.send_cancel_fn(GoalID(id=machine.action_goal.goal_id.id))
-            # A goal that has ended gets no acknowledgement.
+            # The server does not acknowledge a cancel request for a goal that has ended, so do not wait for that.
             if machine.state != _DONE:
                 machine.transition_to(CommState.WAITING_FOR_CANCEL_ACK)
 

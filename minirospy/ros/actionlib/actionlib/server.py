@@ -144,7 +144,7 @@ class ActionServer:
                     end.unregister()
 
     def initialize(self) -> None:
-        """Register with the action's topics and read the parameters."""
+        """Read the parameters and create the publishers and subscribers."""
         name = rospy.remap_name(self.ns)
         self.pub_queue_size: int = rospy.get_param("actionlib_server_pub_queue_size", 50)
         if self.pub_queue_size < 0:
@@ -238,7 +238,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and self._find(goal_id.id) is None:
-                # The goal is recalled immediately if it arrives after this request.
+                # Store the request, so that the goal is recalled immediately if it arrives later.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._add(tracker)
                 tracker.end()
@@ -294,7 +294,7 @@ class ActionServer:
 
     def _find(self, id: str) -> StatusTracker | None:
         """Return the goal in the list with this ID, or None."""
-        # List comparison first compares the items' identity, which is fast.
+        # Comparing the lists is fast, because Python first compares the items' identity.
         if self._indexed != self.status_list:
             self._indexed = list(self.status_list)
             self._by_id = {tracker.status.goal_id.id: tracker for tracker in reversed(self._indexed)}

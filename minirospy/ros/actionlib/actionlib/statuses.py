@@ -117,7 +117,7 @@ class StatusList(GoalStatusArray):
         return bounds
 
     def _fail(self, data: bytes) -> None:
-        # The generated class raises DeserializationError for this data, with the usual error text.
+        # Let the generated class raise DeserializationError for this data, with the usual error text.
         GoalStatusArray().deserialize(data)
 
 

@@ -177,11 +177,11 @@ class Bond:
             self.on_broken = on_broken
 
     def wait_until_formed(self, timeout: Seconds | None = None) -> bool:
-        """Wait until the bond has formed; return False after ``timeout`` (None: no timeout)."""
+        """Wait until the bond has formed or is broken; return False after ``timeout`` (None or 0: no timeout)."""
         return self._wait(lambda: self._state is not State.WAITING, timeout)
 
     def wait_until_broken(self, timeout: Seconds | None = None) -> bool:
-        """Wait until the bond breaks, even if it never forms; return False after ``timeout`` (None: no timeout)."""
+        """Wait until the bond breaks, even if it never forms; return False after ``timeout`` (None or 0: no timeout)."""
         return self._wait(lambda: self._state is State.DEAD, timeout)
 
     def is_broken(self) -> bool:
@@ -307,7 +307,7 @@ class Bond:
                 self._run_timeout(event)
             return
         with self.lock:
-            # A message may have restarted the timeout after the deadline expired.
+            # Check the deadline again: a message may have restarted the timeout since it expired.
             deadline = self._deadlines.get(event)
             if deadline is not None and deadline <= time.monotonic():
                 del self._deadlines[event]

@@ -27,7 +27,7 @@ _WRITERS = {".yaml": yaml_of, ".yml": yaml_of, ".ini": ini_of}
 def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
     """Return the camera's name and parameters from a .yaml, .yml or .ini file.
 
-    If the file is missing or invalid, log the reason and return None.
+    If the file is missing or invalid, log the reason and return None. Also return None for any other extension.
     """
     parse = _PARSERS.get(Path(file_name).suffix)
     if parse is None:

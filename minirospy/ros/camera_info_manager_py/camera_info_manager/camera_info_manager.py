@@ -56,7 +56,7 @@ class CameraInfoError(Exception):
 
 
 class CameraInfoMissingError(CameraInfoError):
-    """Raised if the calibration has not been loaded yet."""
+    """Raised if the calibration has not been loaded, or its package is missing."""
 
 
 class CameraInfoManager:
@@ -123,7 +123,7 @@ class CameraInfoManager:
         return True
 
     def setURL(self, url: str) -> bool:
-        """Set the calibration's URL and reload the calibration; return False if the URL is invalid."""
+        """Set the calibration's URL; return False if it is invalid. Load the calibration again afterwards."""
         if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
             return False
         if self.url != url:

@@ -34,7 +34,7 @@ __all__ = ["ApproximateZoomCameraInfoManager", "InterpolatingZoomCameraInfoManag
 
 
 class ZoomCameraInfoManager(CameraInfoManager):
-    """The base class for cameras with zoom. Keeps the zoom level within limits.
+    """The base class for cameras with zoom. Rejects zoom levels outside the limits.
 
     As a context manager, it stops the service on exit.
     """
@@ -154,7 +154,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
     def loadCameraInfo(self) -> None:
         """Load all calibrations.
 
-        Raise CameraInfoMissingError if their package is missing, CameraInfoError if fewer than two can be loaded.
+        Raise CameraInfoMissingError if their package is missing, CameraInfoError if there are fewer than two zoom levels.
         """
         super().loadCameraInfo()
         self._camera_infos = {level: self._load(level) for level in self._zoom_levels}

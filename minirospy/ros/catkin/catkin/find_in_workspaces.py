@@ -27,10 +27,10 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """Return the existing ``search_dirs`` folders of the package ``project`` or, if ``path`` is given, these paths in them.
+    """Return the existing folders of the package ``project`` or, if ``path`` is given, the existing paths FOLDER/``path``.
 
-    ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. The function
-    appends all searched paths to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.
+    ``search_dirs`` selects the folders: etc, include, libexec and share; if ``project`` is None, also bin and lib. The
+    function appends all searched paths to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.
     """
     chosen = _checked(search_dirs, project)
     found: list[str] = []
@@ -61,7 +61,7 @@ def _by_workspace(
 ) -> Iterator[list[Path]]:
     """Yield the list of folders to search in each workspace.
 
-    If no workspace contains the package, finally yield the package's own folder.
+    Last, if ``chosen`` contains share, yield the package's folder in ROS_PACKAGE_PATH or minirospy.
     """
     for workspace in workspaces:
         folders = []

@@ -99,7 +99,8 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
     """Return the folder in which to run a test. Create the folder if it is the package's build folder.
 
-    As in catkin, ``nosetests --where=FOLDER`` runs in the given folder; other programs run in the build folder.
+    As in catkin, ``nosetests --where=FOLDER`` runs in the given folder. A folder of pytest files is run in itself, a single
+    pytest file in the build folder, and any other test in the package's folder.
     """
     if test.folder:
         return Path(test.folder)

@@ -66,7 +66,7 @@ class Pid(pid.Pid):
             self._state.close()
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # first call, with defaults for the gains that are not set as parameters
+        is_first = level == ~0  # the first call has defaults for gains that are not set as parameters
         if is_first:
             config.update(_config(self.gains))
             return config

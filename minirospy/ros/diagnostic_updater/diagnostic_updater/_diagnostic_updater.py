@@ -152,7 +152,7 @@ class Updater(DiagnosticTaskVector):
         self.hwid = hwid
 
     def update(self) -> None:
-        """Run the tasks if the period has elapsed; call this method often. A backward clock jump starts a new period."""
+        """Run the tasks if the period has elapsed, or the clock has jumped back; call this method often."""
         self._check_diagnostic_period()
         if _has_passed(self.last_time, self.period):
             self.force_update()

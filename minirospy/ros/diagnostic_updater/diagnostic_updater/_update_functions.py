@@ -110,7 +110,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports and counts timestamps that are zero, too old or too far in the future."""
+    """Reports timestamps that are zero, too old or too far in the future, and counts the runs that found any."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)

@@ -64,7 +64,7 @@ class DiffDriveController(MobileBase):
     _wheel_states: _WheelStates | None = None
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the wheels and open the topics."""
+        """Read the parameters, claim the wheels and create the publishers and subscriber."""
         parameters = context.parameters
         left, right = _wheel_names(parameters, "left_wheel"), _wheel_names(parameters, "right_wheel")
         if len(left) != len(right):
@@ -106,7 +106,7 @@ class DiffDriveController(MobileBase):
         self.opened.callback(close_server, server)
 
     def create_odometry(self, window: int) -> Odometry:
-        """Return the odometry for two sides of wheels."""
+        """Return the odometry for a base with left and right wheels."""
         return DiffDriveOdometry(window)
 
     def measure(self, odometry: Odometry, time: int) -> bool:
@@ -128,7 +128,7 @@ class DiffDriveController(MobileBase):
         return True
 
     def drive(self, linear: float, angular: float) -> None:
-        """Set the wheels' velocity commands."""
+        """Set the velocity commands of the wheels."""
         for joints, velocity in zip((self._left, self._right), self._speeds(linear, angular), strict=True):
             for joint in joints:
                 joint.velocity_command = velocity
@@ -183,7 +183,7 @@ class DiffDriveController(MobileBase):
         return _Wheels(*(value * factor for value, factor in zip(self._described, factors, strict=True)))
 
     def _reconfigure(self, config: Config, level: int) -> Config:
-        is_first = level == ~0  # whether the server calls this for the first time, with its default values
+        is_first = level == ~0  # the server's first call, which passes default values
         if is_first:
             config.update(self._config)
             return config

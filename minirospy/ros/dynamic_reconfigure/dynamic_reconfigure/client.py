@@ -126,7 +126,7 @@ class Client:
         return decode_config(answer, self.get_group_descriptions())
 
     def update_groups(self, changes: Values) -> Config | None:
-        """Return the server's tree of groups with changed states. ``changes`` maps the changed groups' names to their states."""
+        """Return the server's tree of groups with changed states, without sending it. ``changes`` maps group names to states."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
         while groups:

@@ -135,7 +135,7 @@ def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group's own data, without its subgroups and parameters. In a description, a group has no state; use True."""
+    """Return a group's own data, without its subgroups and parameters. The state is True for a group in a description."""
     return Config(
         id=group.id,
         parent=group.parent,
@@ -172,7 +172,7 @@ def decode_description(msg: ConfigDescription) -> Config:
 
 
 def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None = None) -> Config:
-    """Return a message's groups as a tree or, for a ``group`` other than the root, only its subgroups, as a dict."""
+    """Return a message's groups as a tree. For a ``group`` other than the root, return only a dict of its subgroups."""
     if group is None or group.id == 0:
         return _tree(m.groups, group_dict)
     return _children(m.groups, group.id, group_dict, set())
@@ -248,7 +248,7 @@ def _all_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, GroupTree]]:
-    """Yield each group in a configuration with the description's group of the same name."""
+    """Yield pairs: a group in a configuration, and the group of the same name in the description."""
     yield group, description
     described = {each["name"]: each for each in _groups_in(description)}
     for name, each in group["groups"].items():

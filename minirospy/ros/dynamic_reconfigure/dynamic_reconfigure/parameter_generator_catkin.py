@@ -212,7 +212,7 @@ class ParameterGenerator:
         return _PYTHON_TYPES[drtype]
 
     def check_type(self, param: Entry, field: _ValueKey) -> None:
-        """Convert a parameter's value to its type. Raise TypeError if the value cannot be converted."""
+        """Raise TypeError if a value does not have the parameter's type. Convert an int to a float for a double."""
         value, wanted = param[field], self.pytype(param["type"])
         if type(value) is not wanted and (wanted is not float or type(value) is not int):
             raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
@@ -228,10 +228,7 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value to its type, or replace None with ``default``.
-
-        Raise TypeError if the value cannot be converted.
-        """
+        """Replace None with ``default``; check any other value with :meth:`check_type`."""
         if param[field] is None:
             param[field] = default
         else:

@@ -93,7 +93,7 @@ class Server:
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values and return the callback's configuration. Exceptions from the callback propagate."""
+        """Change values; return the configuration that the callback returns. Exceptions from the callback propagate."""
         with self.mutex:
             config = copy.deepcopy(self.config)
             config.update(changes)

@@ -25,7 +25,7 @@ class ForceTorqueSensorController(Controller):
         self._topics: list[tuple[ForceTorqueSensor, RealtimePublisher[WrenchStamped]]] = []
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Open a topic for each sensor. Raise ControllerError if ``publish_rate`` is not set."""
+        """Create a publisher for each sensor. Raise ControllerError if ``publish_rate`` is not set."""
         self._rate = PublishRate.read(context.parameters)
         for name in hardware.names(Interface.FORCE_TORQUE):
             topic = f"{context.root.rstrip('/')}/{name}"

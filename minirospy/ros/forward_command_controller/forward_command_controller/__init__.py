@@ -18,7 +18,7 @@ __all__ = ["ForwardCommandController", "ForwardJointGroupCommandController"]
 
 
 class ForwardCommandController(Controller):
-    """Forwards numbers from the topic ``command`` to a joint. The initial command is the joint's current position, or 0.
+    """Forwards numbers from the topic ``command`` to a joint. Position commands start at the current position, others at 0.
 
     A subclass sets ``interfaces`` to the interface that it commands.
     """
@@ -28,7 +28,7 @@ class ForwardCommandController(Controller):
     _joints: list[Joint]
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Claim the joints and open the topic."""
+        """Claim the joints and subscribe to the topic."""
         (interface,) = self.interfaces
         self._field = COMMAND_FIELDS[interface]
         if self.is_group:
@@ -39,7 +39,7 @@ class ForwardCommandController(Controller):
         self._command = self.opened.enter_context(closing(command))
 
     def starting(self, time: Time) -> None:
-        """Hold the current position, or command 0."""
+        """Command the current positions or, if the interface is not for positions, 0."""
         if self.interfaces == (Interface.POSITION,):
             self._command.values = [
                 each.position if math.isfinite(each.position) else each.position_command
@@ -49,7 +49,7 @@ class ForwardCommandController(Controller):
             self._command.values = [0.0] * len(self._joints)
 
     def update(self, time: Time, period: Duration) -> None:
-        """Set the joints' commands."""
+        """Set the joint commands."""
         field = self._field
         for joint, value in zip(self._joints, self._command.values, strict=True):
             setattr(joint, field, value)

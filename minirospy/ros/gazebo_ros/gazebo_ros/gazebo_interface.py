@@ -46,7 +46,7 @@ def set_model_configuration_client(
     joint_positions: Sequence[float],
     gazebo_namespace: str,
 ) -> bool | None:
-    """After one second, set joint positions; return the response's ``success``, or None if the call failed."""
+    """Wait for the service and a second more, then set joint positions; return ``success``, or None if the call failed."""
     service = f"{gazebo_namespace}/set_model_configuration"
     rospy.loginfo(f"Waiting for service {service}")
     rospy.wait_for_service(service)

@@ -38,8 +38,8 @@ __all__ = [
 ]
 
 FIXED_KINDS = ("fixed",)
-MAX_LIMIT = 1e15  # SDF uses 1e16 for no limit
-MIN_RANGE = 1e-5  # MuJoCo rejects ranges of length zero
+MAX_LIMIT = 1e15  # larger limits count as none: SDF uses 1e16 for no limit
+MIN_RANGE = 1e-5  # m or rad; half the minimum range of a joint, because MuJoCo rejects a range of length zero
 MAX_LIGHTS = 8  # maximum number of lights in OpenGL
 MAX_SUBSTEP = SOLREF[0] / 2  # s; with longer substeps, MuJoCo softens contacts, and wheels slip
 VISUAL = "\tvisual"  # suffix that separates the names of visuals from those of collisions
@@ -99,7 +99,7 @@ class Builder:
                 self._add_mimics(built, model, name)
         except Exception as error:
             self.delete(built)
-            self.shapes.warnings.clear()  # otherwise the next model added would report these, too
+            self.shapes.warnings.clear()  # otherwise the next model added would also report them
             if isinstance(error, SimulationError):
                 raise SimulationError(f"model '{name}': {error}") from error.__cause__
             if isinstance(error, (ValueError, TypeError, OSError)):

@@ -179,7 +179,7 @@ class Engine:
         """Align contact tangents with the friction directions and set both coefficients; return whether any contact changed.
 
         As in ODE, the smaller ``mu`` and the smaller ``mu2`` of the two geoms count. If both have a direction, that of the geom
-        with the smaller ``mu`` does. A direction along the normal is none: then the contact keeps one coefficient.
+        with the smaller ``mu`` counts. A direction along the normal is ignored: the contact keeps one coefficient.
         """
         contact = self.data.contact
         first, second = contact.geom.T
@@ -295,7 +295,7 @@ class Engine:
         self._bias[dofs] = np.clip(lacking / (left * self.substep), -limit, limit) * self._rate
 
     def _limit_damped(self) -> None:
-        """Set the damping of joints with motors, and the force that the damping leaves to each motor.
+        """Set the damping of damped joints with motors, and the maximum force of each of these motors.
 
         MuJoCo integrates damping implicitly: on a light wheel, this slows a motor for many steps, and the reaction pushes the
         robot back. As long as a motor is stronger than the damping, the damping is therefore included in the motor's force

@@ -78,7 +78,7 @@ class SimLink:
         self.model = model
         self.record = record
         self.name = record.name
-        self.id = 0  # MuJoCo's body id, changed by each compilation
+        self.id = 0  # MuJoCo's body id; each compilation may change it
         self.wrenches: list[TimedWrench] = []
         self.has_damping = (record.linear_damping > 0 or record.angular_damping > 0) and not model.is_static
 
@@ -203,9 +203,9 @@ class SimJoint:
         self.record = record
         self.axis = axis
         self.name = record.name
-        self.scoped = scoped  # name in MuJoCo, or an empty string
+        self.scoped = scoped  # name in MuJoCo; empty for a fixed joint and for one outside the body tree
         self.second: SimJoint | None = None  # the second axis of a universal joint
-        self.dof = -1  # index of MuJoCo's degree of freedom, changed by each compilation
+        self.dof = -1  # index of the joint's degree of freedom in MuJoCo; each compilation may change it
         self._address = -1
         self._force = 0.0
         self._timed: list[TimedForce] = []
@@ -325,7 +325,7 @@ class SimJoint:
         engine.motor_limit[dof] = self._max_force
         engine.motor_damping[dof] = damping if self._max_force else 0.0
         engine.model.dof_damping[dof] = 0.0 if self._max_force else damping
-        # Without a motor, this constraint is the joint's friction, with target velocity 0.
+        # Without a motor, the same constraint models the joint's friction, so its target velocity is 0.
         engine.target_velocity[dof] = self._velocity if self._max_force else 0.0
         engine.follows_position[dof] = self._target is not None and self._max_force > 0
         if self._target is not None:

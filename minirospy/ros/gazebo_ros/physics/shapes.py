@@ -60,10 +60,10 @@ SOLREF = (0.005, 1.0)  # time constant (s), damping ratio: stiff contacts, stabl
 # Contacts are soft at first, and stiff from a depth of 0.6 mm. If they were stiff from the start,
 # a robot on four supports would rattle: supports would lift off in turn, and wheels would lose their grip.
 SOLIMP = (0.5, 0.99, 0.0006, 0.5, 2.0)
-# A turning wheel is also pulled sideways. With the contact above, it would lift off in most steps,
+# A turning wheel is also pulled sideways. With SOLIMP, it would lift off in most steps,
 # and a robot with four such wheels would turn too slowly, so this contact is softer at first.
 SOLIMP_WHEEL = (0.2, 0.99, 0.0006, 0.5, 2.0)
-# A larger coefficient, such as 1e5, does not hold better, and would stop a wheel with two contact points from turning.
+# Larger friction coefficients, such as 1e5, do not hold better, and would stop a wheel with two contact points from turning.
 MAX_FRICTION = 2.0
 PART = "\t"  # separates a collision's name from its geom's number
 MIN_SIZE = 1e-6  # m; MuJoCo rejects sizes of zero
@@ -83,7 +83,7 @@ class Grain(NamedTuple):
 
 
 def grain(collision: Collision) -> Grain | None:
-    """Return a collision's friction directions, or None if ``fdir1`` is missing or both coefficients are equal."""
+    """Return a collision's direction-dependent friction, or None if ``fdir1`` is missing or both coefficients are equal."""
     surface = collision.surface
     direction = unit(rotate(collision.pose.orientation, surface.fdir1))
     mu, mu2 = _coefficients(surface)
@@ -93,10 +93,10 @@ def grain(collision: Collision) -> Grain | None:
 def friction(surface: Surface) -> tuple[float, int]:
     """Return a geom's friction coefficient and its priority.
 
-    The smoother of two surfaces counts, as in ODE: of two geoms MuJoCo uses the one with the higher priority. MuJoCo's geoms
-    have one coefficient for both directions. The smaller one of ``mu`` and ``mu2`` is used: with a larger one, wheels that must
-    slip sideways, as those of a robot with four of them, do not turn it. If one is zero, as of a wheel that rolls sideways, the
-    mean is used: the wheel must drive.
+    As in ODE, the smoother of two surfaces counts: MuJoCo uses the coefficient of the geom with the higher priority. A geom in
+    MuJoCo has one coefficient for both directions, so use the smaller of ``mu`` and ``mu2``: with the larger one, a robot with
+    four wheels, which slip sideways in a turn, would not turn. If one of them is zero, as for a wheel that rolls sideways, use
+    the mean, because the wheel must drive.
     """
     mu, mu2 = _coefficients(surface)
     value = min(mu, mu2) or (mu + mu2) / 2
@@ -118,14 +118,14 @@ class _Piece:
     asset: str = ""
     group: int = GROUP_COLLISION
     color: Color | None = None
-    texture: str = ""  # path of a picture
+    texture: str = ""  # path of an image file
     has_texcoords: bool = False
 
 
 class Shapes:
     """Adds geoms to an MjSpec's bodies; geoms share meshes.
 
-    grains: by the names of geoms that have or had one; a later geom of the same name replaces it.
+    ``grains`` maps geom names to their grains. It keeps those of deleted geoms until a geom of the same name is added.
     """
 
     def __init__(self, spec: Any) -> None:
@@ -270,7 +270,7 @@ class Shapes:
         return self._assets[key]
 
     def _section(self, mesh: Mesh) -> _Piece:
-        """Add a mesh section, the part with one material."""
+        """Add a section of a mesh, the part with one material; return its geom."""
         (material,) = mesh.materials[:1]
         asset = self._add_mesh(mesh.vertices, mesh.triangles, mesh.texcoords)
         has_texcoords = mesh.texcoords is not None

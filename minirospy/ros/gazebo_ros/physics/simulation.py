@@ -50,7 +50,7 @@ class Simulation:
         self._geom_names: list[str] = []
         self._model_of_dof: list[str] = []
         self._model_of_position: list[str] = []
-        self._farthest: NDArray[np.float64] = np.zeros(0)  # maximum position per joint; infinite for angles
+        self._farthest: NDArray[np.float64] = np.zeros(0)  # limits of qpos; only free bodies have one
         self._add_all(world.models)
 
     # ---- time and steps
@@ -383,7 +383,7 @@ class Simulation:
         """Add each model's visuals if MuJoCo accepts them; otherwise add a line to ``warnings``."""
         for model in self._models.values():
             last = self._builder.shapes.last
-            self._builder.add_visuals(model.built, model.record, model.name)  # already in warnings
+            self._builder.add_visuals(model.built, model.record, model.name)  # already in `warnings`
             try:
                 self.engine.recompile()
             except ValueError as error:
@@ -403,7 +403,7 @@ class Simulation:
         return np.concatenate((data.xpos, data.xquat[:, (1, 2, 3, 0)]), axis=1)
 
     def contact_points(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return all contacts' points and unit normals in the world, both (n, 3)."""
+        """Return the contact points and unit normals in world coordinates, both (n, 3)."""
         self.engine.refresh()
         contact = self.engine.data.contact
         touching = contact.dist <= 0

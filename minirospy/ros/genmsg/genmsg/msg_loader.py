@@ -134,7 +134,7 @@ class MsgContext:
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return all message types that a message uses, directly or indirectly. Each type precedes those that it uses.
+        """Return all message types that a message uses, directly or indirectly, in depth-first order.
 
         Raise KeyError if :func:`load_depends` has not been called.
         """
@@ -287,7 +287,7 @@ def parsed_service(text: str, full_name: str) -> ServiceSpec:
     package, name = package_resource_name(full_name)
     request, *responses = _BETWEEN.split(text)
     if len(responses) != 1:
-        # genmsg also accepts a definition with no separator line, or several.
+        # As in genmsg, accept a definition with no separator line, or several.
         text = "\n".join([request, "---", *responses])
     try:
         return parse_service(text, package, name)

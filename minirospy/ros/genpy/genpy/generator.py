@@ -88,7 +88,7 @@ def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
 
 
 def make_python_safe(spec: MsgSpec) -> MsgSpec:
-    """Rename a message's fields and constants that are Python keywords; return the changed message."""
+    """Rename a message's fields and constants that are Python keywords or ``self``; return the changed message."""
     constants = [
         Constant(each.type, _remap_reserved(each.name), each.val, each.val_text) for each in spec.constants
     ]

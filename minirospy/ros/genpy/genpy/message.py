@@ -52,7 +52,7 @@ struct_I = struct.Struct("<I")
 
 
 class RosMsgUnicodeErrors:
-    """Codec error handler. Replaces bytes that are not valid UTF-8, and logs a warning once per message type."""
+    """Codec error handler. Replaces bytes that are not valid UTF-8, and logs an error once per message type."""
 
     def __init__(self) -> None:
         self.msg_type: str | None = None

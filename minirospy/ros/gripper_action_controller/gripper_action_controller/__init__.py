@@ -41,7 +41,7 @@ class GripperActionController(Controller):
         self._effort = 0.0  # last commanded effort
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the joint and open the action."""
+        """Read the parameters, claim the joint and create the action server."""
         parameters = context.parameters
         monitor_rate = parameters.finite("action_monitor_rate", 20.0)
         if monitor_rate <= 0.0:
@@ -82,7 +82,7 @@ class GripperActionController(Controller):
         """Hold the current position."""
         self._hold()
         self._action.start()
-        self.is_running = True  # set last, so that the action is ready for each accepted goal
+        self.is_running = True  # set last: goals are accepted from here on, and need a started action server
 
     def update(self, time: Time, period: Duration) -> None:
         """Send this cycle's command and, when due, the goal's result."""
@@ -123,7 +123,7 @@ class GripperActionController(Controller):
 
 
 class PositionGripperActionController(GripperActionController):
-    """position_controllers/GripperActionController: commands the goal's position and only reports the effort."""
+    """position_controllers/GripperActionController: commands the goal's position and reports its max_effort."""
 
     interfaces = (Interface.POSITION,)
 

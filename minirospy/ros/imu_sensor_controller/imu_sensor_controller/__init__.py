@@ -31,7 +31,7 @@ class ImuSensorController(Controller):
         self._topics: list[tuple[ImuSensor, RealtimePublisher[Imu]]] = []
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Open a topic for each sensor. Raise ControllerError if ``publish_rate`` is not set."""
+        """Create a publisher for each sensor. Raise ControllerError if ``publish_rate`` is not set."""
         self._rate = PublishRate.read(context.parameters)
         for name in hardware.names(Interface.IMU):
             publisher = RealtimePublisher(f"{context.root.rstrip('/')}/{name}", Imu, queue_size=4)

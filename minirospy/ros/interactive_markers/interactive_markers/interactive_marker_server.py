@@ -219,7 +219,7 @@ class InteractiveMarkerServer:
             context.last_feedback, context.last_client_id = now, feedback.client_id
 
             if feedback.event_type == feedback.POSE_UPDATE:
-                # If the header has no timestamp, keep the marker's frame.
+                # If the marker's header has no timestamp, keep that header.
                 header = context.int_marker.header
                 self.doSetPose(
                     self.pending_updates.get(feedback.marker_name),

@@ -37,7 +37,7 @@ class JointStateController(Controller):
     _has_started = False
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Find the joints and open the topic. Raise ControllerError if ``publish_rate`` is not set."""
+        """Find the joints and create the publisher. Raise ControllerError if ``publish_rate`` is not set."""
         names = context.parameters.names("joints")
         if names is None:
             names = list(hardware.names(Interface.JOINT_STATE))
@@ -59,7 +59,7 @@ class JointStateController(Controller):
             self._has_started = True
 
     def update(self, time: Time, period: Duration) -> None:
-        """Publish the joints' states."""
+        """Publish the joint states."""
         if not self._rate.is_due(time):
             return
         joints, (positions, velocities, efforts) = self._joints, self._extra

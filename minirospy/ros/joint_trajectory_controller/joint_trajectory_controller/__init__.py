@@ -70,7 +70,7 @@ class JointTrajectoryController(Controller):
     follower: TrajectoryFollower
 
     def init(self, hardware: Resources, context: ControllerContext) -> None:
-        """Read the parameters, claim the joints and open the topics, the action and the service."""
+        """Read the parameters, claim the joints, and create the topics, the action server and the service."""
         parameters = context.parameters
         state_rate = parameters.finite("state_publish_rate", 50.0)
         monitor_rate = parameters.finite("action_monitor_rate", 20.0)
@@ -153,7 +153,7 @@ class JointTrajectoryController(Controller):
         self.stopping(time)
 
     def send(self, dt: float) -> None:
-        """Set the joints' commands from the follower's desired states and errors. ``dt`` is in seconds since the last cycle."""
+        """Set the joint commands from the follower's desired states and errors. ``dt`` is in seconds since the last cycle."""
         raise NotImplementedError
 
     def reset(self) -> None:

@@ -122,11 +122,11 @@ class Cache(SimpleFilter):
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
     def getElemAfterTime(self, stamp: Time) -> object | None:
-        """Return the earliest message at or after ``stamp``, or None."""
+        """Return the first message stored with a timestamp at or after ``stamp``, or None."""
         return next((msg for time, msg in self._stored() if time >= stamp), None)
 
     def getElemBeforeTime(self, stamp: Time) -> object | None:
-        """Return the latest message at or before ``stamp``, or None."""
+        """Return the last message stored with a timestamp at or before ``stamp``, or None."""
         return next((msg for time, msg in reversed(self._stored()) if time <= stamp), None)
 
     def getLatestTime(self) -> Time | None:
@@ -144,7 +144,7 @@ class Cache(SimpleFilter):
         return stored[0][0] if stored else None
 
     def getLast(self) -> object | None:
-        """Return the earliest-stored message at or after ``getLatestTime()``, or None."""
+        """Return ``getElemAfterTime(getLatestTime())``, or None if no message is stored."""
         latest = self.getLatestTime()
         return None if latest is None else self.getElemAfterTime(latest)
 
@@ -202,7 +202,7 @@ class TimeSynchronizer(SimpleFilter):
                     self.signalMessage(*[queue.pop(each) for queue in self.queues])
 
     def _reset_if_time_jumped(self, my_queue: Queue, my_queue_index: int | None) -> bool:
-        """Clear an input's queue if simulated time has jumped back. Return True if another input has a later timestamp."""
+        """Clear an input's queue if simulated time has jumped back. Return True if another input's last message came later."""
         if not self.enable_reset or is_wallclock():
             return False
         now = rospy.Time.now()

@@ -153,7 +153,7 @@ class Rotation:
         if cosine > 1 - tolerance:
             return 0.0, Vector(0, 0, 1)
         if cosine < -1 + tolerance:
-            # A rotation by 180 degrees has two possible axes; like KDL, return the one that points up.
+            # A rotation by 180 degrees has two possible axes; like KDL, return the one with z >= 0.
             x, y, z = (math.sqrt(max(0.0, (m[each] + 1.0) / 2)) for each in (0, 4, 8))
             x = -x if m[2] < 0 else x
             y = -y if m[7] < 0 else y

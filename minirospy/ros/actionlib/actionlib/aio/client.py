@@ -94,7 +94,7 @@ class ClientGoal(Generic[_R, _F]):
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
         elif self._is_known and self.state not in TERMINAL:
-            # A server that no longer lists the goal must have been restarted.
+            # The server listed the goal before and no longer does, so it must have restarted.
             self._end(GoalState.LOST, "the server does not know the goal any more", None)
 
     def _end(self, state: GoalState, text: str, result: _R | None) -> None:
@@ -237,7 +237,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         return True
 
     def _status_link_ended(self) -> None:
-        """After SERVER_SECONDS, check whether the server is gone."""
+        """Check whether the server is gone, SERVER_SECONDS after a status connection has ended."""
         if goals := [goal for goal in self._goals.values() if goal._is_sent]:
             self._check_later(goals)
 
@@ -245,7 +245,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         asyncio.get_running_loop().call_later(SERVER_SECONDS, self._check_server, goals, self._statuses)
 
     def _check_server(self, goals: list[ClientGoal[_R, _F]], last: StatusList | None) -> None:
-        """Mark ``goals`` as LOST, except those listed in a status message newer than ``last``."""
+        """Mark ``goals`` as LOST if no server is connected, else those missing from a status list newer than ``last``."""
         if self._is_closed or self._node.is_shutdown:
             return
         statuses, is_connected = self._statuses, self._status.num_connections > 0

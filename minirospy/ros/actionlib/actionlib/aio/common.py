@@ -77,7 +77,7 @@ class ActionEnd(Handle):
         self._is_closed = False
 
     def _topic(self, name: str) -> str:
-        # Each topic can be remapped separately.
+        # Resolve each topic's full name, because topics can be remapped separately.
         return self._node.resolve(f"{self.name}/{name}")
 
     def _start(self, work: Coroutine[object, None, None]) -> asyncio.Task[None]:
