@@ -24,7 +24,7 @@ CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_V
 
 _START_SECONDS = 60.0
 _POLL_SECONDS = 0.005  # seconds between checks whether the started master responds
-_SLOW_POLL_SECONDS = 0.02  # the same, after the first second: the master starts on a slow computer
+_SLOW_POLL_SECONDS = 0.02  # the same, after the first second: on a slow computer, poll less often
 
 
 class LaunchMaster:

@@ -351,7 +351,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Unregister exited nodes from the master, unless this launch started the master, which then exits, too."""
+        """Unregister exited nodes from the master. Not needed if this launch started the master, which also exits."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)
