@@ -168,7 +168,7 @@ class Access:
 
     def _knows_origin(self, origin: str | None, host: str) -> bool:
         if origin is None:
-            return True  # no browser has sent this request
+            return True  # no web page has sent this request
         lowered = origin.lower()
         parts = urlsplit(lowered)
         if parts.scheme in ("http", "https") and (
