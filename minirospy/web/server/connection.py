@@ -134,7 +134,7 @@ class Connection:
         # queued work for the client, except responses to its messages
         self._jobs = Jobs(limits.queue, self.share)
         self.liveness = Liveness(limits.silent_seconds, now)
-        self.turn = site.turns.join(self._work)  # the client's share of the loop
+        self.turn = site.turns.join(self._work)  # the client's share of the loop's time
         self.turn.weight = _NEW_WEIGHT
         self._endpoint: Endpoint | None = None  # set by the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
