@@ -154,7 +154,7 @@ class Connection:
 
     @property
     def is_open(self) -> bool:
-        """Return whether more data may be sent."""
+        """Return whether more data may be queued for sending."""
         return self._phase is _Phase.OPEN
 
     @property
@@ -504,7 +504,7 @@ class Connection:
         self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:
-        """Release memory: drop messages if possible; otherwise, close the connection."""
+        """Release memory: drop queued messages. If there are none, or if unfinished input takes more, close the connection."""
         if self.unfinished > self.queue.size + self.queue.answers + self._jobs.size and not self._held:
             self._refuse_unfinished()
             return
