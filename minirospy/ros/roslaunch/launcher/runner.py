@@ -186,7 +186,7 @@ class Launcher:
         return here, elsewhere
 
     def _check(self, here: list[NodeSpec], elsewhere: list[NodeSpec]) -> None:
-        """Raise LaunchError if a node cannot be run."""
+        """Raise LaunchError if nodes on other machines are forbidden or, with ``strict``, if a node cannot be run here."""
         if elsewhere and self._environment.local:
             node = elsewhere[0]
             why = f"node [{node.name}] is for machine [{node.machine}]"

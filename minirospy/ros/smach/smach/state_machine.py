@@ -171,7 +171,7 @@ class StateMachine(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute states until one leads to an outcome of the machine. Return that outcome, or None at a shutdown."""
+        """Execute states until one leads to an outcome of the machine; return it, or None at a shutdown or if inconsistent."""
         with self._state_transitioning_lock:
             try:
                 self.check_consistency()
