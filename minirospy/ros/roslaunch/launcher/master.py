@@ -128,9 +128,9 @@ class LaunchMaster:
                 self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
 
     def set_parameters(self, spec: LaunchSpec) -> None:
-        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
+        """Delete the namespaces of clear_params, run the <rosparam> commands, then set the parameters.
 
-        Raise MinirospyError if a value cannot be set or a file cannot be written.
+        Raise MinirospyError if a value cannot be set.
         """
         for namespace in spec.clear:
             with contextlib.suppress(RpcError):

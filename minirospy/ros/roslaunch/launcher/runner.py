@@ -147,9 +147,9 @@ class Launcher:
         self._starter.close()
 
     def set_parameters(self) -> None:
-        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
+        """Delete the namespaces of clear_params, run the <rosparam> commands, then set the parameters.
 
-        Raise MinirospyError if a value cannot be set or a file cannot be written.
+        Raise MinirospyError if a value cannot be set.
         """
         self._master.set_parameters(self._spec)
 
