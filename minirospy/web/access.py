@@ -67,7 +67,7 @@ class Refusal(NamedTuple):
 
 
 class Credentials(NamedTuple):
-    """The parts of a request that identify its sender: the Host, Origin and Authorization headers, sub-protocols and path."""
+    """The parts of a request that identify its sender: the Host, Origin and Authorization headers, sub-protocols and target."""
 
     host: str
     origin: str | None

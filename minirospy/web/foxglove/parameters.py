@@ -85,7 +85,7 @@ class Parameters:
         return len(self._wanted.get(listener) or ())
 
     def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Stop notifying ``listener`` of changes of these parameters, or of all parameters if ``names`` is empty."""
+        """Stop notifying ``listener`` of changes of these parameters, or of any if it subscribes to all or ``names`` is empty."""
         before = self._wanted.get(listener, set())
         rest = set() if not names or before is None else before - set(names)
         if rest:
