@@ -432,7 +432,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def subscribed_own(self, topic: str) -> None:
-        """Record that this node has subscribed to a topic: until the subscription is connected, hold back messages to it."""
+        """Record that this node has subscribed to a topic. Its own messages there wait until the subscription is connected."""
         shared = self.publishers.get(topic)
         if shared:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))

@@ -203,7 +203,7 @@ def local_machine() -> Machine:
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one. Raise RLException if its address cannot be resolved."""
+    """Return whether a machine is this one and names no user. Raise RLException if its address cannot be resolved."""
     try:
         socket.getaddrinfo(machine.address or ".", None)
     except (OSError, UnicodeError) as error:

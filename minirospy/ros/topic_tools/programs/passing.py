@@ -52,7 +52,7 @@ class Output:
 
     @property
     def is_advertised(self) -> bool:
-        """Return whether the topic is advertised, which requires the type of a first message."""
+        """Return whether the topic is advertised, which happens with the first message."""
         return self._publisher is not None
 
     @property
