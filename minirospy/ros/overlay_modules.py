@@ -167,8 +167,8 @@ def _origin(asked: Origin) -> Origin:
         return asked
     module = _by_source().get(f"{inner.module}.{inner.name}")
     if module is not None:
-        # If the overlay also has a module of this name, use that one.
-        # `rosgraph.names` must be the module that `import rosgraph.names` returns.
+        # The name is a module that the overlay contains, too: use the overlay's module, so that the attribute
+        # `rosgraph.names` is the module that `import rosgraph.names` returns.
         parent, _, name = module[0].rpartition(".")
         is_kept = asked.name == name or asked.module == inner.module
         return Origin(parent or name, name if parent else "") if is_kept else inner

@@ -67,7 +67,7 @@ class Refusal(NamedTuple):
 
 
 class Credentials(NamedTuple):
-    """The parts of a request that identify its sender: the Host, Origin and Authorization headers, sub-protocols and path."""
+    """The parts of a request that identify its sender: the Host, Origin and Authorization headers, sub-protocols and target."""
 
     host: str
     origin: str | None
@@ -168,7 +168,7 @@ class Access:
 
     def _knows_origin(self, origin: str | None, host: str) -> bool:
         if origin is None:
-            return True  # no browser has sent this request
+            return True  # no web page has sent this request
         lowered = origin.lower()
         parts = urlsplit(lowered)
         if parts.scheme in ("http", "https") and (

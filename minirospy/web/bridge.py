@@ -138,7 +138,7 @@ class Bridge:
             self._beside.append(client_topics)
         self._extras = extras or Extras()
         self._account = Account(self.options.limits.memory)
-        self._refusals = RateLimitedLogger(node.log)  # logs clients that another option would admit
+        self._refusals = RateLimitedLogger(node.log)  # logs refused clients that another option would admit
         self.listeners: dict[str, Listener] = {}
         self._started = time.monotonic()
         self._reporting: asyncio.Task[None] | None = None

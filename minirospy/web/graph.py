@@ -106,7 +106,7 @@ class SharedTopic:
                 self.topic, self._deliver, on_change=self._has_connected.set
             )
             self._graph.subscribed_own(self.topic)
-        # During an unsubscription, connections are still open, but do not deliver the latched messages again.
+        # Connected publishers do not send their latched messages again, so deliver the stored ones.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -432,7 +432,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def subscribed_own(self, topic: str) -> None:
-        """Hold back this node's messages on a topic until this node's own, new subscription to the topic is connected."""
+        """Record that this node has subscribed to a topic. Its own messages there wait until the subscription is connected."""
         shared = self.publishers.get(topic)
         if shared:
             shared.joining = self.spawn(self._join_own(topic, shared.joining))

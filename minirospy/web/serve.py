@@ -191,7 +191,7 @@ async def _run(
             raise
     finally:
         if bridge is not None:
-            await bridge.close()  # needed if the node was not started
+            await bridge.close()  # needed if the node failed to start
         ticking.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)

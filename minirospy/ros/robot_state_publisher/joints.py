@@ -108,7 +108,7 @@ class JointStates:
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
         """Return the adjustable joint that a joint mimics, with factor and offset. Raise JointError if joints form a cycle."""
         if name not in dependent:
-            # This joint was omitted with a warning because it has no limits. No joint has the name "".
+            # The joint was omitted because it has no limits: make it mimic the name "", which no joint has.
             return Dependent("")
 
         rule = dependent[name]

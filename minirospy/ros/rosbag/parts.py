@@ -32,7 +32,7 @@ def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
 
 
 def _module(name: str) -> ModuleType | None:
-    """Return a migration module, or None if it has been deleted."""
+    """Return a module of the package ``migration``, or None if that package has been deleted."""
     try:
         return importlib.import_module(f"{_MIGRATION}.{name}")
     except ModuleNotFoundError as error:

@@ -32,9 +32,8 @@ __all__ = [
     "represent_ordered_mapping",
 ]
 
-MAX_DEFAULT_NON_FLOW_ITEMS = (
-    4  # maximum entries of a block-style dictionary or list; flat ones with more are printed in braces
-)
+# If a message has more fields, or a list more elements, use the flow style that the caller chose.
+MAX_DEFAULT_NON_FLOW_ITEMS = 4
 _USAGE_ERROR = getattr(os, "EX_USAGE", 1)
 _NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte", "char"}
 _DEFAULTS: dict[str, object] = {

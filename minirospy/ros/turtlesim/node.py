@@ -100,7 +100,7 @@ class Simulator:
 
     def start(self) -> None:
         """Advertise the services and add the first turtle."""
-        with self._changing:  # so that a concurrent call of /spawn adds the second turtle
+        with self._changing:  # a concurrent call of /spawn must not add the first turtle
             self._services = [
                 rospy.Service("clear", Empty, self._clear),
                 rospy.Service("reset", Empty, self._reset),

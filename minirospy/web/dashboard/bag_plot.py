@@ -17,20 +17,20 @@ from minirospy.web.dashboard.json_session import Fields, number, text_of
 __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
 _MAX_COLUMNS = 5_000  # maximum number of columns: with MAX_SERIES series, 2,000,000 points
-_MAX_SERIES = 100  # maximum number of paths per request
-_MARGIN_SECONDS = 10.0  # seconds to read before a range, for an earlier point of the subtrahend
+_MAX_SERIES = 100  # maximum number of series per request
+_MARGIN_SECONDS = 10.0  # seconds before a range in which to look for a point of the subtrahend
 _WIDER = 4  # factor by which this margin grows until it contains a point of the subtrahend
 
 
 class Operand(NamedTuple):
-    """A path in a bag; ``bag`` is the bag's name on the page."""
+    """A field in a bag: its path, such as ``/odom/twist/twist/linear/x``, and the bag's name on the page."""
 
     bag: str
     path: str
 
 
 class BagPath(NamedTuple):
-    """A series that the page identifies by ``key``: a path in a bag, or the difference of two paths."""
+    """A series that the page identifies by ``key``: a field in a bag or, with ``minus``, the difference of two fields."""
 
     key: str
     operand: Operand
@@ -92,7 +92,7 @@ def series_of(folder: BagFolder, request: SeriesRequest, on_share: Callable[[flo
     budget = Budget()
     by_bag: dict[str, list[BagPath]] = {}
     for each in request.paths:
-        # Read all paths of a bag in one pass, except differences: one takes two readers, which may be at different positions.
+        # Read all fields of a bag in one pass. Read each difference separately: it needs a second reader.
         place = each.operand.bag if each.minus is None else f"{each.key}\0"
         by_bag.setdefault(place, []).append(each)
     for done, group in enumerate(by_bag.values()):
@@ -142,7 +142,7 @@ def _read(
             subtrahend = bag_series.field_path(
                 minus.path, {each.topic for each in other.connections.values()}
             )
-            # Read the subtrahend beyond both ends of the range, as needed for the difference.
+            # Read the subtrahend beyond both ends of the range: the difference interpolates it at each point's time.
             before = None if start is None else _start_before(other, subtrahend, start, on_time)
             around = bag_series.points(other, [subtrahend], before, None, on_time)
             difference = bag_series.differences((point for _, point in found), (point for _, point in around))

@@ -23,7 +23,7 @@ from minirospy.ros.roslaunch.launcher.process import Process, Timeouts, end_proc
 __all__ = ["Examiner", "last_log_lines", "running_boards"]
 
 _KEPT_SECONDS = 5.0  # seconds for which findings are reused, so that several pages share them
-_TIMEOUTS = Timeouts(interrupt=3.0, terminate=1.0)  # SIGINT gives the doctor time to unregister its node
+_TIMEOUTS = Timeouts(interrupt=3.0, terminate=1.0)  # seconds; after SIGINT, the doctor unregisters its node
 _TAIL_BYTES = 64 * 1024  # number of bytes shown from the end of rosout.log: about 500 lines
 
 
@@ -67,7 +67,7 @@ class Examiner:
             try:
                 if self._is_closed:
                     end_processes([process], _TIMEOUTS, lambda _: None)
-                assert isinstance(process.popen, subprocess.Popen)  # only roslaunch's processes are forks
+                assert isinstance(process.popen, subprocess.Popen)  # only roslaunch creates ForkedProcesses
                 output, _ = process.popen.communicate()
             finally:
                 self._process = None

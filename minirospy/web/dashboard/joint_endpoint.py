@@ -91,7 +91,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return super().open(client)
 
     def left(self, session: JointSession) -> None:
-        """See :meth:`JsonEndpoint.left`. Stops publishing when the last client has left."""
+        """See :meth:`JsonEndpoint.left`. Stops publishing after the last client, unless ``always_publishes`` is set."""
         if not self.sessions:
             self._graph().unwatch(self._graph_changed)
             self.publish(is_on=False)

@@ -219,7 +219,7 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # Log the messages of other errors only locally, because they may contain details that clients must not see.
+                    # Send only the type of an unexpected error: its message may contain details that clients must not see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
                     )

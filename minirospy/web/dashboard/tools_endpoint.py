@@ -71,7 +71,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         self.examiner = Examiner(master_uri)
 
     async def close(self) -> None:
-        """Cancel the running requests. Idempotent."""
+        """End all sessions, and cancel their requests and the graph reports. Idempotent."""
         await super().close()
         await asyncio.get_running_loop().run_in_executor(None, self.examiner.close)
         reporting, self._reporting = self._reporting, None

@@ -85,7 +85,7 @@ class Parameters:
         return len(self._wanted.get(listener) or ())
 
     def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Stop notifying ``listener`` of changes of these parameters, or of all parameters if ``names`` is empty."""
+        """Stop notifying ``listener`` of changes of these parameters, or of any if it subscribes to all or ``names`` is empty."""
         before = self._wanted.get(listener, set())
         rest = set() if not names or before is None else before - set(names)
         if rest:
@@ -126,7 +126,7 @@ class Parameters:
             self._graph.spawn(self._report(tuple(again), emptied))
 
     async def _report(self, names: tuple[str, ...], emptied: str) -> None:
-        """Send current values to the subscribers. Clients that subscribe to all parameters get only the parameter ``emptied``."""
+        """Read parameters; send them to their subscribers. Clients that subscribe to all parameters get only ``emptied``."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
             mine = [each for each in found if each.name in (wanted or (emptied,))]
@@ -135,7 +135,7 @@ class Parameters:
 
 
 def _is_affected(wanted: str, name: str, value: object) -> bool:
-    """Return whether a change of ``name`` may change the parameter ``wanted`` to a value that ``value`` does not contain."""
+    """Return whether ``wanted`` must be read again, because setting ``name`` to ``value`` may have changed it."""
     if name.startswith(wanted.rstrip("/") + "/"):
         return True
     if not isinstance(value, dict):

@@ -127,14 +127,14 @@ class PlaybackState(NamedTuple):
 
 @dataclass(frozen=True)
 class Subscribe:
-    """Subscribe to channels. ``subscriptions`` contains pairs (subscription id, channel id)."""
+    """A client's request to subscribe to channels. ``subscriptions`` contains pairs (subscription id, channel id)."""
 
     subscriptions: tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
 class Unsubscribe:
-    """Cancel the subscriptions with these ids."""
+    """A client's request to cancel the subscriptions with these ids."""
 
     ids: tuple[int, ...]
 
@@ -150,14 +150,14 @@ class ClientChannel(NamedTuple):
 
 @dataclass(frozen=True)
 class ClientAdvertise:
-    """Advertise topics that the client will publish."""
+    """A client's request to advertise topics, which it will publish."""
 
     channels: tuple[ClientChannel, ...]
 
 
 @dataclass(frozen=True)
 class ClientUnadvertise:
-    """Unadvertise topics that the client has published."""
+    """A client's request to unadvertise the topics with these ids."""
 
     ids: tuple[int, ...]
 
@@ -172,7 +172,7 @@ class ClientMessage:
 
 @dataclass(frozen=True)
 class GetParameters:
-    """Request the values of parameters, or of all parameters if ``names`` is empty."""
+    """A client's request for the values of parameters, or of all parameters if ``names`` is empty."""
 
     names: tuple[str, ...]
     id: str | None
@@ -180,7 +180,7 @@ class GetParameters:
 
 @dataclass(frozen=True)
 class SetParameters:
-    """Set parameters, and delete those with ``is_set`` False."""
+    """A client's request to set parameters, and to delete those with ``is_set`` False."""
 
     parameters: tuple[Parameter, ...]
     id: str | None
@@ -188,31 +188,31 @@ class SetParameters:
 
 @dataclass(frozen=True)
 class SubscribeParameterUpdates:
-    """Subscribe to changes of parameters, or of all parameters if ``names`` is empty."""
+    """A client's request to subscribe to changes of parameters, or of all parameters if ``names`` is empty."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class UnsubscribeParameterUpdates:
-    """Unsubscribe from changes of parameters, or of all parameters if ``names`` is empty."""
+    """A client's request to unsubscribe from changes of parameters, or of all parameters if ``names`` is empty."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class SubscribeConnectionGraph:
-    """Subscribe to the graph and its changes."""
+    """A client's request to subscribe to the graph and its changes."""
 
 
 @dataclass(frozen=True)
 class UnsubscribeConnectionGraph:
-    """Unsubscribe from the graph."""
+    """A client's request to unsubscribe from the graph."""
 
 
 @dataclass(frozen=True)
 class FetchAsset:
-    """Request a file by its URI."""
+    """A client's request for a file, given by its URI."""
 
     uri: str
     request_id: int
@@ -220,7 +220,7 @@ class FetchAsset:
 
 @dataclass(frozen=True)
 class ServiceRequest:
-    """Call a service."""
+    """A client's request to call a service."""
 
     service_id: int
     call_id: int
@@ -230,7 +230,7 @@ class ServiceRequest:
 
 @dataclass(frozen=True)
 class PlaybackControl:
-    """Control a player. ``seek`` is the new position in nanoseconds, or None to keep the current one."""
+    """A client's request to control a player. ``seek`` is the new position in nanoseconds, or None to keep the current one."""
 
     command: PlaybackCommand
     speed: float

@@ -102,7 +102,7 @@ class ClientActions:
 
         work = self._send(event, running, is_large=self._session.is_large)
         self._session.spawn(work).add_done_callback(ended)
-        # Report the memory last: beyond the limit, this disconnects the client and cancels the goal's task.
+        # Call count() last: if the client uses too much memory, count() disconnects it and cancels the goal's task.
         self._session.count()
 
     def cancel_goal(self, event: protocol.CancelActionGoal) -> None:
@@ -186,7 +186,7 @@ class ClientActions:
         return self._actions[key]
 
     def _check_type(self, name: str, class_: Any) -> None:
-        """Raise BridgeError if the type of the action's server differs.
+        """Raise BridgeError if the action's server uses another type than ``class_``.
 
         Check the type of the result topic: only the server publishes results, while an earlier client may have set the goal
         topic's type.

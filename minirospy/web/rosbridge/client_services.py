@@ -58,7 +58,7 @@ class ClientServices:
             self._session.count()
 
         self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
-        # Report the memory last: beyond the limit, this disconnects the client and cancels the call.
+        # Call count() last: if the client uses too much memory, count() disconnects it and cancels the call.
         self._session.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:

@@ -108,7 +108,7 @@ class ServiceEvent(Event):
 
 @dataclass(frozen=True)
 class Advertise(TopicEvent):
-    """Advertise a topic."""
+    """A request to advertise a topic."""
 
     type: str
     latch: bool
@@ -116,12 +116,12 @@ class Advertise(TopicEvent):
 
 
 class Unadvertise(TopicEvent):
-    """Unadvertise a topic."""
+    """A request to unadvertise a topic."""
 
 
 @dataclass(frozen=True)
 class Publish(TopicEvent):
-    """Publish a message."""
+    """A message to publish."""
 
     message: object
     latch: bool
@@ -129,7 +129,7 @@ class Publish(TopicEvent):
 
 @dataclass(frozen=True)
 class Subscribe(TopicEvent):
-    """Subscribe to a topic; ``throttle_rate`` is in milliseconds."""
+    """A request to subscribe to a topic; ``throttle_rate`` is in milliseconds."""
 
     type: str | None
     throttle_rate: int
@@ -139,12 +139,12 @@ class Subscribe(TopicEvent):
 
 
 class Unsubscribe(TopicEvent):
-    """Unsubscribe from a topic."""
+    """A request to unsubscribe from a topic."""
 
 
 @dataclass(frozen=True)
 class CallService(ServiceEvent):
-    """Call a service. ``arguments`` contains the request's fields, or a list of their values; any other value means none."""
+    """A service call. ``arguments`` contains the request's fields, or a list of their values; any other value means none."""
 
     arguments: object
     fragment_size: int | None
@@ -153,7 +153,7 @@ class CallService(ServiceEvent):
 
 @dataclass(frozen=True)
 class ServiceResponse(ServiceEvent):
-    """Respond to a call. If ``result`` is False, ``values`` is an error message."""
+    """A client's response to a call. If ``result`` is False, ``values`` is an error message."""
 
     values: object
     result: bool
@@ -161,18 +161,18 @@ class ServiceResponse(ServiceEvent):
 
 @dataclass(frozen=True)
 class AdvertiseService(ServiceEvent):
-    """Offer a service."""
+    """A request to offer a service, whose calls the client answers."""
 
     type: str
 
 
 class UnadvertiseService(ServiceEvent):
-    """Stop offering a service."""
+    """A request to stop offering a service."""
 
 
 @dataclass(frozen=True)
 class SendActionGoal(Event):
-    """Send a goal to an action server. ``arguments`` contains the goal's fields, or a list of their values."""
+    """A goal for an action server. ``arguments`` contains the goal's fields, or a list of their values."""
 
     action: str
     type: str
@@ -184,7 +184,7 @@ class SendActionGoal(Event):
 
 @dataclass(frozen=True)
 class CancelActionGoal(Event):
-    """Cancel the goal that the client has sent with this id."""
+    """A request to cancel the goal that the client has sent with this id."""
 
     action: str
 
@@ -203,7 +203,7 @@ class SetLevel(Event):
 
 @dataclass(frozen=True)
 class Auth(Event):
-    """Authenticate, as in http://wiki.ros.org/rosauth; times are in seconds."""
+    """A client's authentication, as in http://wiki.ros.org/rosauth; times are in seconds."""
 
     mac: str
     client: str

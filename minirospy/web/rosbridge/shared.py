@@ -59,7 +59,7 @@ class _LargeWork:
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
         """Run ``work`` in the thread; return its result."""
-        # Wait here instead of in the executor's queue: if the client leaves meanwhile, the message of the work is freed at once.
+        # Wait here, not in the executor's queue, so that the work's message is freed at once if the client leaves.
         async with self._is_busy:
             if self._is_closed:
                 raise asyncio.CancelledError

@@ -51,7 +51,7 @@ class ClientTopic:
         self._update()
         self._shared.graph.subscribe(self._topic, self._arrived)
         if not is_first:
-            # The extra subscription was only needed to receive the latched messages again.
+            # Subscribing again has delivered the latched messages; keep only the first subscription.
             self._shared.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:

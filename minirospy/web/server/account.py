@@ -44,7 +44,7 @@ class Share:
 
     @property
     def weight(self) -> int:
-        """Return the number of bytes that the client uses, including bytes that other clients use, too."""
+        """Return the number of bytes that the client uses, including large pieces shared with other clients."""
         return self.size + self.large
 
     def set(self, size: int) -> None:

@@ -28,7 +28,7 @@ SILENT_SECONDS = 5.0
 MAX_SILENT = 16
 # seconds without traffic after which a client counts as idle; the dashboard's pages always have traffic sooner
 IDLE_SECONDS = 30.0
-FEW = 8  # an address has few connections if it has less than one in this many of all connections
+FEW = 8  # an address has few connections if it has less than 1/FEW of all connections
 
 
 class Rank(IntEnum):

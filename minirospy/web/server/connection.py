@@ -134,7 +134,7 @@ class Connection:
         # queued work for the client, except responses to its messages
         self._jobs = Jobs(limits.queue, self.share)
         self.liveness = Liveness(limits.silent_seconds, now)
-        self.turn = site.turns.join(self._work)  # the client's share of the loop
+        self.turn = site.turns.join(self._work)  # the client's share of the loop's time
         self.turn.weight = _NEW_WEIGHT
         self._endpoint: Endpoint | None = None  # set by the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
@@ -154,7 +154,7 @@ class Connection:
 
     @property
     def is_open(self) -> bool:
-        """Return whether more data may be sent."""
+        """Return whether more data may be queued for sending."""
         return self._phase is _Phase.OPEN
 
     @property
@@ -504,7 +504,7 @@ class Connection:
         self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:
-        """Release memory: drop messages if possible; otherwise, close the connection."""
+        """Release memory: drop queued messages. If there are none, or if unfinished input takes more, close the connection."""
         if self.unfinished > self.queue.size + self.queue.answers + self._jobs.size and not self._held:
             self._refuse_unfinished()
             return

@@ -123,7 +123,7 @@ class Listener:
             loop.add_reader(sock, self._accept, sock)
 
     async def close(self) -> None:
-        """Close all connections. Idempotent."""
+        """Stop listening, and close all connections. Idempotent."""
         loop = asyncio.get_running_loop()
         for sock in self._socks:
             loop.remove_reader(sock)
@@ -228,7 +228,7 @@ class Listener:
     def _refusal_of(self, peer: tuple[str, int], here: tuple[str, int]) -> bytes | None:
         """Return the response that refuses a client, or None if it may connect now.
 
-        This user's clients may always connect.
+        This user's clients may connect at any rate, and displace other clients if there are too many connections.
         """
         limits = self.limits
         is_full = len(self.connections) >= limits.connections + limits.reserve

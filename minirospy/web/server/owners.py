@@ -22,7 +22,7 @@ _SOCK_DIAG_BY_FAMILY = 20
 _NLM_F_REQUEST = 1
 _ANY = 0xFFFFFFFF
 _LISTEN = 10
-"""State of a listening socket, which the kernel returns if there is no matching connection."""
+"""State of a listening socket: if no connection matches, the kernel returns a listening socket instead."""
 _MESSAGE = struct.Struct("=IHHII")
 _REQUEST = struct.Struct("=BBBBI")
 _PORTS = struct.Struct("!HH")
@@ -112,5 +112,5 @@ def _listed(text: str) -> _End:
 
 
 def _unmapped(address: _Address) -> _Address:
-    """Return the IPv4 address of an IPv4-mapped IPv6 address, which an IPv6 socket has for an IPv4 connection."""
+    """Return the IPv4 address in an IPv4-mapped IPv6 address, which an IPv6 socket reports for an IPv4 peer."""
     return (address.ipv4_mapped or address) if isinstance(address, ipaddress.IPv6Address) else address

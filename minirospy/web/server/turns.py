@@ -32,16 +32,16 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients
 # seconds of work for a client before the next client's turn: with 250 clients, each waits 25 ms
 SLICE_SECONDS = 0.0001
-# number of jobs for which a client counts as new; their expected time is at least that of other new clients' jobs
+# A client counts as new for this many jobs, which are expected to take at least as long as other new clients' jobs.
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # factor by which a client's expected time per job decays after a shorter job
-IMMEDIATE_SHARE = 0.5  # the share of the loop's time that a client's work may take before it is queued
+IMMEDIATE_SHARE = 0.5  # fraction of the loop's time that all work may take before further work is queued
 # Maximum length of an interactive client's burst of work, in slices (1 ms in total).
 # A request takes 0.1 to 0.5 ms to handle; 64 kB of empty frames take 100 ms.
 # A new client starts with one slice, and gets one more after each short burst.
 # Therefore, if 250 new clients flood the server, the other clients are served after one slice for each new client.
 INTERACTIVE_SLICES = 10
-# maximum debt of bulk clients, which lets interactive clients use 200 ms before bulk clients get another slice
+# Maximum debt of bulk clients, in TURN_SECONDS: interactive clients can use 200 ms before bulk clients get a slice.
 MAX_DEBT_TURNS = 10
 # minimum fraction of the time for bulk clients while interactive clients use the rest
 BULK_SHARE = 0.2
@@ -84,7 +84,10 @@ class Share:
 
 
 class _Entry(NamedTuple):
-    """A queued job. The fields define the order: tag at the expected end, tie-breaker, number, tag at the start."""
+    """A queued client, ordered by its tag at the expected end of its next job, then by its used time and its arrival.
+
+    ``start`` is the tag at the job's start.
+    """
 
     end: float
     used: float
@@ -94,7 +97,7 @@ class _Entry(NamedTuple):
 
 
 class _FairQueue:
-    """The queued jobs of either the interactive or the bulk clients."""
+    """A fair queue of clients. There is one for interactive clients and one for bulk clients."""
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
@@ -103,7 +106,7 @@ class _FairQueue:
         self.highest = 0.0  # highest tag of a client that has been served
 
     def update(self) -> None:
-        """If the queue is empty, set ``served`` to the highest tag, so that all clients that become active now are equal."""
+        """If the queue is empty, set ``served`` to the highest tag, so that clients that become active now start equal."""
         if not self.entries:
             self.served = self.highest
 

@@ -180,6 +180,6 @@ def _select(
     return select(names)  # type: ignore[return-value]
 
 
-# The library logs frames, and headers with tokens, at level DEBUG.
-# These must never be logged, so use a separate logger that drops everything below CRITICAL.
+# At level DEBUG, the library would log clients' messages and tokens: give it a logger that discards everything below
+# CRITICAL.
 _QUIET = logging.Logger(__name__, logging.CRITICAL)

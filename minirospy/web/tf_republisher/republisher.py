@@ -36,7 +36,7 @@ _A_TURN = 50
 
 
 class _Closing(Protocol):
-    """A part of the republisher that must be closed with it."""
+    """A part of the republisher, to be closed when the republisher is closed."""
 
     async def close(self) -> None: ...
 

@@ -158,7 +158,7 @@ def _scaled(image: Pixels) -> Pixels:
 
 
 def work_of(type_: str, body: bytes | memoryview) -> int:
-    """Return the number of pixels to process for a serialized message, if it can be determined in advance."""
+    """Estimate the number of pixels in a serialized image: MAX_PIXELS if its size is not found, 0 if it is invalid."""
     if type_ != COMPRESSED:
         return len(body) // 3
     try:

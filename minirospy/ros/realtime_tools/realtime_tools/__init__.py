@@ -179,7 +179,8 @@ class _Active:
     handle: ServerGoalHandle
     goal: MonitoredGoal
     due: int | None = None  # ROS time in ns of the next report; None before the first cycle
-    report_once: threading.Lock = field(default_factory=threading.Lock)  # acquired by the reporting thread
+    # acquired once, by the thread that reports the outcome
+    report_once: threading.Lock = field(default_factory=threading.Lock)
 
 
 def _call(function: Callable[[], None]) -> None:

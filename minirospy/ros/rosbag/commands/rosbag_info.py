@@ -150,7 +150,7 @@ def _filter(words: list[str], print: str | None) -> int:
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
 
-    # Check the name before displaying progress.
+    # Reject an invalid target name before displaying progress.
     bags.check_bag_name(target)
     keep = bags.Expression(text)
     show = bags.Expression(print) if print else None

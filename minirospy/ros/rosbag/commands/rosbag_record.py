@@ -136,7 +136,7 @@ def _parser() -> Parser:
 
 
 def _record_verb(given: RecordArguments) -> int:
-    # Only the verb rejects the combination: `rosrun rosbag record` accepts it and ignores the prefix.
+    # `rosbag record` rejects a prefix together with a name. `rosrun rosbag record` accepts both and ignores the prefix.
     if given.output_prefix and given.output_name:
         text = "Can't set both prefix and name."
         raise Misuse(text, text)

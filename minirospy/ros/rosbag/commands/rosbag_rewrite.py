@@ -187,7 +187,7 @@ def _write(path: str, source: str, target: str, write: Callable[[str, str], None
     try:
         write(source, target)
     except BagError as error:
-        # The target already contains the messages that precede the damage.
+        # Keep the target: it contains the messages that precede the damage.
         print()
         report(f"ERROR operating on {source}: {error}")
     except OSError as error:

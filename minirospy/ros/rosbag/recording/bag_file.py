@@ -183,6 +183,6 @@ def _open_writer(file: QueuedFile, options: RecordOptions, executor: Executor | 
         compression=options.compression,
         chunk_threshold=options.chunk_size,
         executor=executor,
-        # the recorder itself limits the number of queued bytes
+        # no limit here, because the recorder itself limits the number of queued bytes
         max_waiting=_UNLIMITED,
     )

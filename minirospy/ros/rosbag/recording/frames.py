@@ -10,7 +10,7 @@ __all__ = ["ReceivedFrame", "frame_class", "parts_of"]
 
 
 class ReceivedFrame(AnyMsg):
-    """A received message of any type.
+    """A received message of any type, not deserialized.
 
     ``frame`` contains its bytes, valid only during the callback unless ``frame`` is ``bytes``.
     """

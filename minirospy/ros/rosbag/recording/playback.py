@@ -195,7 +195,7 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Change is_fresh together with the time: a client that steps reads both to count the messages to publish.
+            # poll() has advanced the time, so clear is_fresh, too: clients read both to count the messages of a step.
             self.is_fresh = False
         return wait
 
@@ -210,7 +210,7 @@ class Playback:
     # --- state
 
     def state(self, wall: int) -> PlayerState:
-        """Return the state for a client."""
+        """Return the player's state at the wall time ``wall``."""
         schedule = self._schedule
         if schedule is None:
             return PlayerState(self._span[0], self.options.rate, self._starts_paused, False)

@@ -152,7 +152,7 @@ class Player:
         self._wait.wake()
 
     def _wait_before(self, latched: list[tuple[int, StoredMessage]]) -> None:
-        """Wait for the delay and subscribers given in the options; publish each latched topic's last message before the start."""
+        """Wait for the delay in the options, publish the latched messages from before the start, then wait for subscribers."""
         options = self._options
         self._say(f"Waiting {options.delay / 1e9:g} seconds after advertising topics...", end="")
         self._sleep(options.delay)

@@ -44,7 +44,7 @@ class State(enum.Enum):
 
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
-    DELAYED = "DELAYED"  # wait for the rate control topic
+    DELAYED = "DELAYED"  # waiting for the rate control topic
 
 
 class Status(NamedTuple):

@@ -56,7 +56,7 @@ class _ConnectionInfo:
 
     @classmethod
     def of(cls, connection: Connection) -> _ConnectionInfo:
-        """Convert a connection from minirospy's reader."""
+        """Create a _ConnectionInfo from a connection of minirospy's reader."""
         return cls(connection.id, connection.topic, connection.header)
 
     def __str__(self) -> str:
@@ -74,7 +74,7 @@ class _ChunkInfo:
 
     @classmethod
     def of(cls, chunk: ChunkInfo) -> _ChunkInfo:
-        """Convert a chunk from minirospy's reader."""
+        """Create a _ChunkInfo from a chunk of minirospy's reader."""
         make = make_time()
         info = cls(chunk.position, make(chunk.start_time), make(chunk.end_time))
         info.connection_counts = chunk.counts
@@ -104,7 +104,7 @@ class _ChunkHeader:
 
     @classmethod
     def of(cls, stored: StoredChunk) -> _ChunkHeader:
-        """Convert a chunk header from minirospy's reader."""
+        """Create a _ChunkHeader from a chunk of minirospy's reader."""
         return cls(
             stored.chunk.compression, stored.chunk.compressed_size, stored.chunk.size, stored.data_position
         )
@@ -190,7 +190,7 @@ class _Index(Sequence[_IndexEntry]):
         return self.entry(self.source[at % len(self)])
 
     def entry(self, entry: Entry) -> _IndexEntry:
-        """Convert an index entry from minirospy's reader."""
+        """Create an _IndexEntry from an index entry of minirospy's reader."""
         return _IndexEntry(self._make_time(entry.time), entry.chunk, entry.offset)
 
 

@@ -59,7 +59,7 @@ class _BagReader200(_BagReader):
     def _read_connection_index_records(self) -> None:
         """Read the index. A subclass may first replace the bag's ``_chunks`` with an iterable that counts them."""
         for _ in self.bag._chunks:
-            # The first iteration reads the whole index in one pass over the file.
+            # The first iteration reads the whole index; the others only let a subclass's iterable count the chunks.
             if not self.bag._connection_indexes_read:
                 self.bag._connection_indexes_read = self.bag._connection_indexes is not None
 

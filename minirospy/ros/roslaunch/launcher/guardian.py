@@ -99,6 +99,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Leave the processes alone: their ids may have been reused.
+        # The system has killed the processes: send no signals, because other processes may have their ids now.
         (lambda *_: None) if leaves_them else end_groups,
     )

@@ -129,7 +129,7 @@ def load_sources(
             reader.report(error)
 
     for name in used:
-        # A used arg counts as known even if no <arg> declares it.
+        # Treat a used arg as declared, so that roslaunch does not warn if the command line sets it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
 
     if is_checked:
@@ -219,7 +219,7 @@ class _File:
         self._warn_of_attributes(tag)
         try:
             if tag.name == "arg" and not self._depth:
-                # The arg counts as known even if its `if` attribute excludes the tag.
+                # Treat the arg as declared even if the tag's `if` is false: see load_sources().
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:

@@ -24,7 +24,7 @@ CORE_PARAMETERS: Mapping[str, str] = {"/rosdistro": DISTRO, "/rosversion": ROS_V
 
 _START_SECONDS = 60.0
 _POLL_SECONDS = 0.005  # seconds between checks whether the started master responds
-_SLOW_POLL_SECONDS = 0.02  # the same, after the first second: the master starts on a slow computer
+_SLOW_POLL_SECONDS = 0.02  # the same, after the first second: on a slow computer, poll less often
 
 
 class LaunchMaster:
@@ -128,9 +128,9 @@ class LaunchMaster:
                 self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
 
     def set_parameters(self, spec: LaunchSpec) -> None:
-        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
+        """Delete the namespaces of clear_params, run the <rosparam> commands, then set the parameters.
 
-        Raise MinirospyError if a value cannot be set or a file cannot be written.
+        Raise MinirospyError if a value cannot be set.
         """
         for namespace in spec.clear:
             with contextlib.suppress(RpcError):

@@ -77,8 +77,8 @@ class NodeStarter:
         """Return the environment variables for a node's process."""
         environ = node_environment(node, self._environment)
         if not self._uses_screen(node) or not sys.stdout.isatty():
-            # Show a node's output immediately. On a terminal, Python flushes each line in any case,
-            # and writes whole lines, so that lines from different nodes do not mix.
+            # Make Python write to files and pipes immediately. On a terminal, Python already writes each line at once,
+            # and as a whole, so that lines from different nodes do not mix.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         return environ
 

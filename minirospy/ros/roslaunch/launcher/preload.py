@@ -78,7 +78,7 @@ class _Kind:
 class ForkedProcess:
     """A child of this process, forked by a preloaded process. Has the interface of subprocess.Popen. Thread-safe."""
 
-    # The standard streams are files, not pipes to this process.
+    # None, as in a Popen without pipes: the child's standard streams are files.
     stdin: IO[bytes] | None = None
     stdout: IO[bytes] | None = None
     stderr: IO[bytes] | None = None

@@ -325,7 +325,7 @@ def main(fd: int) -> Order | None:
     for name in PRELOADED:
         import_module(name)
     if len(os.listdir("/proc/self/task")) > 1 or "minirospy.client" not in sys.modules:
-        # a module has started a thread, or this is real rospy
+        # A module has started a thread, which would make forking unsafe, or the imported rospy is the real one.
         return None
     read_response()
     gc.collect()

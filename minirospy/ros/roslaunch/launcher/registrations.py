@@ -36,7 +36,7 @@ class DeadNodes:
     def add(self, node: str) -> None:
         """Schedule a node (global name) to be unregistered."""
         if self._thread is None:
-            # In the thread an import could fail unnoticed, for example after an update of minirospy.
+            # Import these here: in the thread, an import that fails, for example after an update, would go unnoticed.
             import concurrent.futures.thread  # noqa: F401
 
             import minirospy.introspect.nodes  # noqa: F401

@@ -147,9 +147,9 @@ class Launcher:
         self._starter.close()
 
     def set_parameters(self) -> None:
-        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
+        """Delete the namespaces of clear_params, run the <rosparam> commands, then set the parameters.
 
-        Raise MinirospyError if a value cannot be set or a file cannot be written.
+        Raise MinirospyError if a value cannot be set.
         """
         self._master.set_parameters(self._spec)
 
@@ -186,7 +186,7 @@ class Launcher:
         return here, elsewhere
 
     def _check(self, here: list[NodeSpec], elsewhere: list[NodeSpec]) -> None:
-        """Raise LaunchError if a node cannot be run."""
+        """Raise LaunchError if nodes on other machines are forbidden or, with ``strict``, if a node cannot be run here."""
         if elsewhere and self._environment.local:
             node = elsewhere[0]
             why = f"node [{node.name}] is for machine [{node.machine}]"
@@ -351,7 +351,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Unregister exited nodes from the master, unless this launch started the master, which then exits, too."""
+        """Unregister exited nodes from the master. Not needed if this launch started the master, which also exits."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)

@@ -203,7 +203,7 @@ def local_machine() -> Machine:
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one. Raise RLException if its address cannot be resolved."""
+    """Return whether a machine is this one and names no user. Raise RLException if its address cannot be resolved."""
     try:
         socket.getaddrinfo(machine.address or ".", None)
     except (OSError, UnicodeError) as error:
@@ -289,7 +289,7 @@ class Node:
 
     @classmethod
     def of(cls, spec: NodeSpec) -> Node:
-        """Convert a node from a launch file."""
+        """Create a Node from a launch file's node."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
             spec.respawn_delay, [[*pair] for pair in spec.remaps], [*spec.env], spec.output or None, spec.cwd or None,
@@ -409,7 +409,7 @@ class Test(Node):
 
     @classmethod
     def of_test(cls, spec: TestSpec) -> Test:
-        """Convert a test from a launch file."""
+        """Create a Test from a launch file's test."""
         node = spec.node
         return cls(
             spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args,

@@ -207,7 +207,7 @@ class LaunchedProcess(Process):
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Add the process to another launcher, which watches the process after its start."""
+        """Let ``launcher`` start and watch the process, in place of the launcher given to the constructor."""
         self._launcher = launcher
 
 

@@ -35,13 +35,14 @@ def load_manifest(package_name: str, bootstrap_version: str = "0.7") -> None:
     for folder in folders:
         source = str(folder / "src")
         modules = [found.parent.name for found in Path(source).glob("*/__init__.py")]
-        # Append the folder only if a module is missing: a sourced devel folder also contains the messages.
+        # Append the folder only if one of its modules is not importable: a sourced devel folder already provides the
+        # modules, together with the generated messages, which this folder lacks.
         if source not in sys.path and not all(map(_is_importable, modules)):
             sys.path.append(source)
 
 
 def _folder_of_script(package: str) -> Path | None:
-    """Return the folder of the package that contains the running script, or None if that is another package."""
+    """Return the folder of ``package`` if the package contains the running script, otherwise None."""
     script: Sequence[str] = sys.argv[:1]
     if not script or not script[0]:
         return None

@@ -336,7 +336,7 @@ def _constant(type_: str, declared: str, line: str) -> Constant:
 
 
 def _convert_val(type_: str, val: str) -> object:
-    """Convert a constant's value. Raise MsgSpecException or ValueError if it does not match the type."""
+    """Return a constant's value, converted from text. Raise MsgSpecException or ValueError if it does not match the type."""
     if type_ in ("float32", "float64"):
         return float(val)
     if type_ == "string":

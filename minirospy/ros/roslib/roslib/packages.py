@@ -93,7 +93,7 @@ def get_pkg_subdir(
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """Return the path of a file in a package's folder, which need not exist.
+    """Return the path of a file in a package's folder; the file need not exist.
 
     Raise InvalidROSPkgException if the package does not exist.
     """

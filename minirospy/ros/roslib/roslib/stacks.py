@@ -72,7 +72,7 @@ def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
 
 
 def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return a metapackage's version, or None for a stack, which has no version.
+    """Return a metapackage's version, or None for a rosbuild stack.
 
     Raise ResourceNotFound if neither exists.
     """

@@ -363,7 +363,7 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Warn if nodes cannot reach ROS_IP, which usually means that it belongs to another network."""
+    """Warn if nodes cannot reach ROS_IP or ROS_HOSTNAME, usually an address in another network."""
     why = wrong_address(environment)
     if why:
         warn(f"{why} (`minirospy doctor` shows more)")

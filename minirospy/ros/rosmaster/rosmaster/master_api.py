@@ -97,7 +97,7 @@ class _Api(MasterApi):
         self.notices.put(action)
 
     def defer(self, uri: str, topic: str) -> None:
-        """Do nothing: a notification always contains the state at the time of sending."""
+        """Do nothing: a delay is not needed, because a notification contains the state at the time of sending."""
 
     def stop(self) -> None:
         """Stop sending notifications."""

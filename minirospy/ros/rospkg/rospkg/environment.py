@@ -67,7 +67,7 @@ def get_ros_package_path(env: Environ | None = None) -> str | None:
 
 
 def get_ros_paths(env: Environ | None = None) -> list[str]:
-    """Return the folders in ROS_PACKAGE_PATH, then those of minirospy's own packages."""
+    """Return the folders in ROS_ROOT and ROS_PACKAGE_PATH, then those of minirospy's own packages."""
     named = _compute_package_paths(get_ros_root(env), get_ros_package_path(env))
     return list(dict.fromkeys([*named, *map(str, built_in_roots())]))
 

@@ -207,7 +207,7 @@ class RosStack(ManifestManager):
         return self.get_depends(stack, implicit=False)
 
     def get_stack_version(self, stack: str) -> str | None:
-        """Return a metapackage's version, or None for a stack, which has no version.
+        """Return a metapackage's version, or None for a rosbuild stack.
 
         Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
         """

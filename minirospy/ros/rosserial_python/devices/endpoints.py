@@ -114,11 +114,11 @@ class _Service:
         self.response: type[Message] = self.service_class._response_class
 
     def check_request(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device uses a different request type."""
+        """Raise EndpointError if the device's request type differs from the installed one."""
         _compare(self.request._md5sum, info.md5sum)
 
     def check_response(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device uses a different response type."""
+        """Raise EndpointError if the device's response type differs from the installed one."""
         _compare(self.response._md5sum, info.md5sum)
 
 

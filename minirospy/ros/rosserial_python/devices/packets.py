@@ -65,7 +65,7 @@ class Decoder:
 
     @property
     def missing(self) -> int:
-        """Return how many bytes the current packet still needs, or 0 between packets."""
+        """Return how many more bytes the next step needs, or 0 between packets."""
         return self._needed() - len(self._bytes) if self._bytes else 0
 
     @property
@@ -101,7 +101,7 @@ class Decoder:
                 yield found
 
     def _needed(self) -> int:
-        """Return how many bytes the next step needs."""
+        """Return how many bytes of the packet must have arrived for the next step: version, length, or all the rest."""
         if len(self._bytes) < 2 or self._bytes[1] != _VERSION:
             return 2
         if len(self._bytes) < 5 or not self._has_right_length():

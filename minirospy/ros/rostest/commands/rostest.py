@@ -188,7 +188,7 @@ def _rosunit(
 
 
 def _told(own: Result, results: Result, runner: str, output: Path | None) -> int:
-    """If ``output`` is given, write the results there and print them; return the exit status."""
+    """If ``output`` is given, write the runner's own results there and print all results; return the exit status."""
     if output is not None:
         own.write(output)
         failed = [case.name for case in own.test_case_results if case.failures]

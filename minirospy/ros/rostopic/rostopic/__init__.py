@@ -356,7 +356,7 @@ def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
 
 
 def _sleep(duration: float) -> None:
-    """Wait for ``duration`` seconds on ROS's clock. Raise ROSInterruptException if the node shuts down."""
+    """Wait for ``duration`` seconds of wall time, even if the node's time is simulated."""
     import rospy
 
     rospy.rostime.wallsleep(duration)

@@ -101,7 +101,7 @@ def begin_results(file: Path) -> None:
 def xml_results_file(
     test_pkg: str, test_name: str, is_rostest: bool = False, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` in the test results folder."""
+    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` or ``rostest-NAME.xml`` in the results folder."""
     kind = "rostest" if is_rostest else "rosunit"
     name = test_name.replace("/", "_").replace(os.sep, "_")
     return os.path.join(results_dir(env), test_pkg, f"{kind}-{name}.xml")

@@ -30,7 +30,7 @@ def _parser() -> Parser:
         "rosversion",
         "Print the version of a package, or the name of the ROS distribution.",
         "rosversion [-h] [-s] [-d] [-a] [package]",
-        # ROS's own text, although it confuses the two versions.
+        # ROS's own text, although it swaps the descriptions of the two forms.
         about="rosversion -d: Output the version of the given package\n"
         "rosversion package: Output the ROS distribution name",
         ros_argparse="rosversion",

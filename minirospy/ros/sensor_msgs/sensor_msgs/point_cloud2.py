@@ -249,7 +249,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
 def _values(
     cloud: PointCloud2, columns: Iterable[Column], offset: int, shape: tuple[int, int], *, skip_nans: bool
 ) -> list[memoryview]:
-    """Return the values in a block of a cloud: one sequence for each value that a point has."""
+    """Return a block's values, one sequence per number in a point: a column of three numbers gives three sequences."""
     import numpy as np
 
     order = ">" if cloud.is_bigendian else "<"

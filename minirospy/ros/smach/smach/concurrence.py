@@ -188,7 +188,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the container can finish now that another state has finished."""
+        """Return whether the container need not wait for the states that are still executing."""
         others_end = False
         if self._child_termination_cb:
             try:

@@ -171,7 +171,7 @@ class StateMachine(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute states until one leads to an outcome of the machine. Return that outcome, or None at a shutdown."""
+        """Execute states; return the machine's outcome, or None if the machine is inconsistent or a shutdown comes first."""
         with self._state_transitioning_lock:
             try:
                 self.check_consistency()

@@ -134,7 +134,7 @@ class Transformer:
         return self._buffer._chain(target_frame, target_time, source_frame, source_time, fixed_frame)
 
     def clear(self) -> None:
-        """Remove all transforms from the buffer."""
+        """Remove all transforms except static ones from the buffer."""
         self._buffer.clear()
 
     def frameExists(self, frame_id: str) -> bool:

@@ -27,7 +27,7 @@ class TransformSink(Protocol):
         """Insert a static transform, which is valid at all times."""
 
     def clear(self) -> object:
-        """Remove all transforms."""
+        """Remove all transforms except static ones."""
 
 
 class TransformListener:

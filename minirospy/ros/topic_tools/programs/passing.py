@@ -29,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic to publish, with the type of the first forwarded message. If ``latch`` is None, it is latched if the input is."""
+    """A topic to publish. It is advertised with the type of the first forwarded message."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class Output:
 
     @property
     def is_advertised(self) -> bool:
-        """Return whether the first message has arrived."""
+        """Return whether the topic is advertised, which happens with the first message."""
         return self._publisher is not None
 
     @property
@@ -109,7 +109,7 @@ class Input:
 
     @property
     def is_open(self) -> bool:
-        """Return whether the topic is subscribed."""
+        """Return whether this node is subscribed to the topic."""
         return self._subscriber is not None
 
     def open(self) -> None:

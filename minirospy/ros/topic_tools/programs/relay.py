@@ -53,7 +53,7 @@ class Relay:
         self._input.open()
 
     def monitor(self, topic: str, period: float) -> None:
-        """Subscribe to the input only while the output has subscribers; check this every ``period`` seconds."""
+        """Subscribe to the input only while another node subscribes to ``topic``; check this every ``period`` seconds."""
         self._is_stealthy = True
         self._master = MasterProxy(Environment.read().master_uri, rospy.get_name())
         self._timer = rospy.Timer(rospy.Duration.from_sec(period), lambda _event: self._look_for(topic))

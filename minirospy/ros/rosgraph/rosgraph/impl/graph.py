@@ -144,7 +144,7 @@ class Graph:
         self.master_stale = stale_secs
 
     def set_node_stale(self, stale_secs: float) -> None:
-        """Do nothing; accepted for compatibility, because nodes are not queried."""
+        """Store ``stale_secs``, which has no effect, because nodes are not queried."""
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
