@@ -54,7 +54,7 @@ REFUSED = b"n"  # answer to OFFER_WORD: the subscriber cannot map the ring
 
 # The minimum size, in bytes, of a message that is sent through a ring, measured with one subscriber.
 # At 0.9 MB (VGA), the ring saves 6 % of the time and 5 % of the CPU time; at 6 MB, a quarter of both.
-MIN_MESSAGE = 1_000_000
+MIN_MESSAGE = 500_000
 
 MAX_RING = 64 * 1024 * 1024  # maximum bytes per topic; enough for two 4K images (25 MB each)
 MAX_PLACES = 16  # maximum places per ring; enough for a few subscribers, but fits the processor's cache
