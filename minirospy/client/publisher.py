@@ -150,6 +150,8 @@ class PublishedTopic(SharedTopic):
         self._had_subscriber = False
         self._sequence = itertools.count(1)
         self._has_header = bool(getattr(data_class, "_has_header", False))
+        # Only classes that minirospy has generated declare it.
+        self._after_array: int | None = getattr(data_class, "_bytes_after_array", None)
         self._registered = False
 
     def join(
@@ -358,7 +360,7 @@ class PublishedTopic(SharedTopic):
                 message.serialize(pieces)
             except SerializationError as again:
                 raise self._refused(message, again) from None
-        return pieces.frame()
+        return pieces.frame(self._after_array)
 
     def _refused(self, message: Message, error: SerializationError) -> ROSSerializationException:
         """Return the error for a message that does not match its type: rospy's error message and the topic."""

@@ -180,6 +180,47 @@ print(eventually(lambda: got), got[0].point.y, repr(got[0].header.frame_id))
     assert output == "refused\nTrue 2.0 ''\n"
 
 
+def test_a_number_that_equals_the_size_of_the_next_field_loses_no_message(start: Start) -> None:
+    """Both fields look like the length of a byte array and the array, of which only the message class knows better."""
+    output, errors = finished(
+        start("""
+from genpy.dynamic import generate_dynamic
+Table = generate_dynamic("p/Table", "uint32 size\\nfloat64[8192] values\\n")["p/Table"]
+rospy.init_node("both")
+publisher = rospy.Publisher("/t", Table, queue_size=10)
+got = []
+rospy.Subscriber("/t", Table, got.append)
+publisher.wait_for_subscribers()
+for size in (65536, 1):
+    publisher.publish(size, range(8192))
+print(eventually(lambda: len(got) == 2), [table.size for table in got], got[0].values[8191])
+""")
+    )
+    assert (output, errors) == ("True [65536, 1] 8191.0\n", "")
+
+
+def test_the_points_of_a_cloud_arrive_without_another_copy(start: Start) -> None:
+    output, errors = finished(
+        start("""
+import minirospy.runtime.transport.readers as readers
+from sensor_msgs.msg import PointCloud2
+rospy.init_node("both")
+publisher = rospy.Publisher("/t", PointCloud2, queue_size=10)
+frames, got = [], []
+split_frame = readers.split_frame
+def keep(*parts):
+    frames.append(split_frame(*parts))
+    return frames[-1]
+readers.split_frame = keep
+rospy.Subscriber("/t", PointCloud2, got.append)
+publisher.wait_for_subscribers()
+publisher.publish(PointCloud2(data=bytes(range(256)) * 1000, is_dense=True))
+print(eventually(lambda: got), got[0].data is frames[0].array, got[0].is_dense, got[0].data == bytes(range(256)) * 1000)
+""")
+    )
+    assert (output, errors) == ("True True True True\n", "")
+
+
 def test_numpy_scalars_are_values(start: Start) -> None:
     pytest.importorskip("numpy")
     output, _ = finished(

@@ -105,14 +105,14 @@ class McapWriter:
             self._schemas[key] = self._writer.register_schema(key[0], "ros1msg", definition)
         return self._writer.register_channel(topic, "ros1", self._schemas[key], fields)
 
-    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message received at ``time``, in nanoseconds.
+    def write(self, connection: int, time: int, body: Buffer, *others: Buffer) -> None:
+        """Write a message received at ``time``, in nanoseconds; its bytes are ``body`` followed by the others.
 
         Raise BagFormatError if the time is before 1970, OSError if the stream fails.
         """
         if time < 0:
             raise BagFormatError(f"the time {time} ns is before 1970")
-        whole = b"".join((body, tail)) if tail else body
+        whole = b"".join((body, *others)) if others else body
 
         # Number the messages across all connections, like the MCAP tools' converter.
         sequence = self._count % 2**32

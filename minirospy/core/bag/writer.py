@@ -212,14 +212,16 @@ class BagWriter:
         self._streams[number] = _Stream(Connection(number, topic, fields), is_stored=False)
         return number
 
-    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message received at ``time``, in nanoseconds; its bytes are ``body`` followed by ``tail``.
+    def write(self, connection: int, time: int, body: Buffer, *others: Buffer) -> None:
+        """Write a message received at ``time``, in nanoseconds; its bytes are ``body`` followed by the others.
 
         ``bytes`` are referenced until the chunk is written, other buffers are copied. Raise BagFormatError if the message
         or its time exceeds a limit, OSError if the stream fails.
         """
         stream = self._streams[connection]
-        length = len(body) + len(tail)
+        length = len(body)
+        for other in others:
+            length += len(other)
         if self._size + len(stream.record) + _OVERHEAD + length > self._limit:
             self._make_room(stream, length)
 
@@ -241,11 +243,12 @@ class BagWriter:
         small += _UINT32.pack(length)
         if length < _LARGE:
             small += body
-            if tail:
-                small += tail
+            for other in others:
+                small += other
         else:
             self._add_large(body)
-            self._add_large(tail)
+            for other in others:
+                self._add_large(other)
         self._size += _OVERHEAD + length
 
         if not stream.entries:

@@ -76,6 +76,26 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
     )
 
 
+def bytes_after_array(spec: MessageSpec, lookup: Lookup) -> int | None:
+    """Return the number of bytes after a message's last field of variable length, if that is a byte array.
+
+    Return 0 for a string at the end, too, and None for any other message. A message with such a number may be sent in parts,
+    as a split frame (``core/wire/framing``), because ``deserialize`` reads the array and the fields after it by slices. Fields
+    after a string are not read so, because that would slow down every small message whose header is followed by numbers.
+    """
+    chunks = list(_chunks(spec.fields, "", lookup))
+    letters = ""
+    if chunks and chunks[-1].tail is None:
+        letters = "".join(leaf.letters for leaf in chunks.pop().run)
+    last = chunks[-1].tail if chunks else None
+    if last is None or not last.has_length:
+        return None
+    is_read_by_slices = last.type.is_bytes or (
+        last.type.base == "string" and not last.type.is_array and not letters
+    )
+    return _size(letters) if is_read_by_slices else None
+
+
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
     """Return the format characters of the fields that stay bytes until they are read: number arrays of any length."""
     return {
@@ -349,7 +369,8 @@ class _Reader:
         self._line("end = 0")
         if _has_elements_without_bytes(spec, self._lookup):
             self._line(f"spare = len(data) + {_SPARE}")
-        raw = self._fields(chunks, names, lazy)
+        may_be_split = bytes_after_array(spec, self._lookup) is not None
+        raw = self._fields(chunks, names, lazy, may_be_split=may_be_split)
         if self._slices:
             with self._source.block("if end > len(data):"):
                 self._line('raise genpy.DeserializationError("the message ends too early")')
@@ -381,16 +402,22 @@ class _Reader:
         return f"{self._source.use('_new')}({class_})"
 
     def _fields(
-        self, chunks: list[_Chunk], names: dict[str, str], lazy: dict[str, str] | None = None
+        self,
+        chunks: list[_Chunk],
+        names: dict[str, str],
+        lazy: dict[str, str] | None = None,
+        *,
+        may_be_split: bool = False,
     ) -> dict[str, str]:
         """Generate code that reads the fields; for a lazy array it only slices out the raw bytes.
 
-        Return a dict from field name to the local name of its bytes.
+        Return a dict from field name to the local name of its bytes. ``may_be_split``: ``data`` may be a split frame, of which
+        only slices can be read after the last array.
         """
         raw: dict[str, str] = {}
         for chunk in chunks:
-            count = self._run(chunk, names, "data, end")
             tail = chunk.tail
+            count = self._run(chunk, names, "" if may_be_split and tail is None else "data, end")
             if tail is None:
                 continue
             if lazy and tail.path in lazy:
@@ -408,7 +435,8 @@ class _Reader:
     def _run(self, chunk: _Chunk, names: dict[str, str], arguments: str) -> str:
         """Generate code that reads consecutive fixed-size fields and the length that follows.
 
-        Return the length's local name, or the length itself if it is constant.
+        ``arguments``: those of ``unpack_from``, or "" to read a slice. Return the length's local name, or the length itself if
+        it is constant.
         """
         letters = "".join(leaf.letters for leaf in chunk.run)
         targets = []
@@ -431,11 +459,11 @@ class _Reader:
 
         if letters:
             comma = "," if len(targets) == 1 else ""
-            self._line(
-                f"({', '.join(targets)}{comma}) = {self._source.struct(letters)}.unpack_from({arguments})"
-            )
-            if arguments != "data":
-                self._line(f"end += {_size(letters)}")
+            size = _size(letters)
+            unpack = f"unpack_from({arguments})" if arguments else f"unpack({self._slice(str(size))})"
+            self._line(f"({', '.join(targets)}{comma}) = {self._source.struct(letters)}.{unpack}")
+            if arguments == "data, end":
+                self._line(f"end += {size}")
             for leaf in chunk.run:
                 if leaf.type.base == "bool" and not leaf.type.is_array:
                     target = self._target(leaf.path, names)

@@ -13,7 +13,13 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from minirospy.core.idl.codec import keeps_buffer, lazy_arrays, write_deserialize, write_serialize
+from minirospy.core.idl.codec import (
+    bytes_after_array,
+    keeps_buffer,
+    lazy_arrays,
+    write_deserialize,
+    write_serialize,
+)
 from minirospy.core.idl.digest import Lookup, full_text, message_md5, service_md5
 from minirospy.core.idl.source import Source, python_name
 from minirospy.core.idl.spec import Field, FieldType, MessageSpec, ServiceSpec
@@ -317,6 +323,8 @@ class _Module:
             line(f"_has_header = {spec.has_header}")
             line(f"_full_text = {full_text(spec, self._lookup)!r}")
             line(f"_takes_memoryview = {keeps_buffer(spec, self._lookup)}")
+            if (after := bytes_after_array(spec, self._lookup)) is not None:
+                line(f"_bytes_after_array = {after}")
             if lazy:
                 line(f"_letters = {lazy!r}")
             for constant in spec.constants:

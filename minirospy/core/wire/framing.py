@@ -3,9 +3,10 @@
 The reader owns the buffer that a socket receives into, so that bytes are copied only once:
 ``n = sock.recv_into(reader.space()); for frame in reader.received(n): ...``
 
-If a subscriber's header has ``split_frames=1``, a large message that ends with a byte array is sent as a
-split frame: the length with its highest bit set, 4 bytes with the array's size, then the unchanged message. The
-subscriber can then read the array into a separate object, which becomes the field without another copy.
+If a subscriber's header has ``split_frames=2``, a large message is sent as a split frame if its last field of variable
+length is a byte array: the length with its highest bit set, 4 bytes with the array's size, 4 bytes with the size of the
+fields after it, then the unchanged message. The subscriber can then read the array into a separate object, which becomes
+the field without another copy.
 Source: http://wiki.ros.org/ROS/TCPROS, docs/transports.md.
 """
 
@@ -22,15 +23,18 @@ __all__ = [
     "LENGTH_BYTES",
     "MAX_FRAME",
     "SPLIT",
+    "SPLIT_BYTES",
     "Frame",
     "FrameReader",
     "LargeFrame",
     "Pieces",
     "SplitFrame",
+    "check_split",
     "may_split",
     "parse_length",
+    "parse_split",
     "serialize_frame",
-    "split_sizes",
+    "split_frame",
 ]
 
 CHUNK = 64 * 1024  # bytes to receive per call while messages are small
@@ -39,11 +43,13 @@ LENGTH_BYTES = 4  # bytes in the length prefix of a frame or connection header
 
 MAX_FRAME = 1024 * 1024 * 1024  # maximum bytes in a frame; a longer one is rejected as invalid
 
-SPLIT = 1 << 31  # flag bit in the length field: the size of the trailing array follows
+SPLIT = 1 << 31  # flag bit in the length field: the size of the array and of the fields after it follow
+SPLIT_BYTES = 8  # bytes in these two sizes
 
 FIRST_CLAIM = 16 * 1024 * 1024
 _LENGTH = struct.Struct("<I")
 _TWO_LENGTHS = struct.Struct("<II")
+_THREE_LENGTHS = struct.Struct("<III")
 
 
 def serialize_frame(body: bytes) -> bytes:
@@ -57,16 +63,25 @@ def parse_length(data: bytes) -> int:
 
 
 class LargeFrame(NamedTuple):
-    """A message to send in pieces that are too large to be joined: the pieces, in order, and their total size."""
+    """A message to send in pieces that are too large to be joined: the pieces, in order, and their total size.
+
+    ``array``: the size of the second piece if it is a byte array at which the frame may be split, else 0.
+    """
 
     pieces: tuple[bytes, ...]
     size: int
+    array: int = 0
+
+    @property
+    def rest(self) -> int:
+        """The number of bytes after the array, or 0 if the frame must not be split."""
+        return self.size - len(self.pieces[0]) - self.array if self.array else 0
 
     def buffers(self, *, split: bool) -> list[bytes]:
         """Return the buffers to send: a split frame if ``split`` is set and this message can be split, else a normal frame."""
-        first, *others = self.pieces
-        if split and len(others) == 1 and may_split(first, len(others[0])):
-            return [_TWO_LENGTHS.pack(self.size | SPLIT, len(others[0])) + first, *others]
+        if split and self.array:
+            first, *others = self.pieces
+            return [_THREE_LENGTHS.pack(self.size | SPLIT, self.array, self.rest) + first, *others]
         return [_LENGTH.pack(self.size), *self.pieces]
 
 
@@ -76,8 +91,12 @@ class Pieces(list[Any]):
     __slots__ = ()
     write = list.append
 
-    def frame(self) -> bytes | LargeFrame:
-        """Return all bytes written, as one frame."""
+    def frame(self, after_array: int | None = None) -> bytes | LargeFrame:
+        """Return all bytes written, as one frame.
+
+        ``after_array``: the message class's number of bytes after its last byte array, as declared by
+        :func:`minirospy.core.idl.codec.bytes_after_array`.
+        """
         size = len(self[0]) if len(self) == 1 else sum(map(len, self))
         if size < CHUNK:
             self.insert(0, _LENGTH.pack(size))
@@ -100,28 +119,34 @@ class Pieces(list[Any]):
 
         if small:
             joined.append(b"".join(small))
-        return LargeFrame(tuple(joined), sum(map(len, joined)))
+        size = sum(map(len, joined))
+        match joined:
+            case [head, array, *rest] if sum(map(len, rest)) == after_array and may_split(head, len(array)):
+                return LargeFrame(tuple(joined), size, len(array))
+        return LargeFrame(tuple(joined), size)
 
 
 class SplitFrame(bytes):
-    """A message in two parts, for ``deserialize``: the first part's bytes, followed by the bytes of ``tail``.
+    """A message in three parts, for ``deserialize``: the bytes before its array, those of ``array``, and ``rest``.
 
-    Its length and slices are those of the whole message; the slice that equals ``tail`` is that object, without a copy.
+    Its length and slices are those of the whole message; the slice that equals ``array`` is that object, without a copy.
     ``bytes(frame)`` joins the parts. A memoryview contains only the first part.
     """
 
-    tail: bytes
+    array: bytes
+    rest: bytes
 
-    def __new__(cls, head: bytes, tail: bytes) -> SplitFrame:
+    def __new__(cls, head: bytes, array: bytes, rest: bytes = b"") -> SplitFrame:
         frame = super().__new__(cls, head)
-        frame.tail = tail
+        frame.array = array
+        frame.rest = rest
         return frame
 
     def __len__(self) -> int:
-        return super().__len__() + len(self.tail)
+        return super().__len__() + len(self.array) + len(self.rest)
 
     def __bytes__(self) -> bytes:
-        return super().__getitem__(slice(None)) + self.tail
+        return b"".join((super().__getitem__(slice(None)), self.array, self.rest))
 
     @overload
     def __getitem__(self, key: SupportsIndex) -> int: ...
@@ -130,32 +155,49 @@ class SplitFrame(bytes):
     def __getitem__(self, key: slice) -> bytes: ...
 
     def __getitem__(self, key: SupportsIndex | slice) -> int | bytes:
-        head = super().__len__()
         if isinstance(key, slice):
             start, stop, step = key.indices(len(self))
-            if step == 1 and start >= head:
-                return self.tail[start - head : max(start, stop) - head]
-            if step == 1 and stop <= head:
-                return super().__getitem__(slice(start, stop))
+            if step == 1:
+                head = super().__len__()
+                rest = head + len(self.array)
+                stop = max(start, stop)
+                if start >= rest:
+                    return self.rest[start - rest : stop - rest]
+                if start >= head and stop <= rest:
+                    return self.array[start - head : stop - head]
+                if stop <= head:
+                    return super().__getitem__(slice(start, stop))
         return bytes(self)[key]
 
 
 Frame = memoryview | bytes  # a message's bytes as delivered
 
 
-def may_split(head: bytes, tail: int) -> bool:
-    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes.
-
-    If so, the message may be split at this point.
-    """
-    return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
+def may_split(head: bytes, array: int) -> bool:
+    """Return whether ``head`` ends with the length of a byte array of ``array`` bytes, which is large enough to split off."""
+    return array >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == array
 
 
-def split_sizes(size: int, tail: int) -> tuple[int, int]:
-    """Return (bytes before the array, bytes in the array) for a split frame. Raise WireError if the sizes are inconsistent."""
-    if not CHUNK <= tail <= size - 4:
-        raise WireError(f"a split message of {size} bytes says that it ends with an array of {tail}")
-    return size - tail, tail
+def split_frame(head: bytes, array: bytes, rest: bytes = b"") -> SplitFrame:
+    """Return the frame of a received message. Raise WireError if ``head`` does not end with the array's length."""
+    if not may_split(head, len(array)):
+        raise WireError("a split message was not split where its array begins")
+    return SplitFrame(head, array, rest)
+
+
+def parse_split(data: bytes) -> tuple[int, int]:
+    """Return (bytes in the array, bytes after it) from the first :data:`SPLIT_BYTES` bytes after a split frame's length."""
+    array, rest = _TWO_LENGTHS.unpack(data)
+    return array, rest
+
+
+def check_split(size: int, array: int, rest: int) -> int:
+    """Return the number of bytes before the array of a split frame. Raise WireError if the sizes are inconsistent."""
+    if array < CHUNK or size - array - rest < LENGTH_BYTES:
+        raise WireError(
+            f"a split message of {size} bytes says that it has an array of {array}, followed by {rest} bytes"
+        )
+    return size - array - rest
 
 
 class FrameReader:

@@ -15,6 +15,7 @@ from minirospy.core.wire.header import Header
 
 __all__ = [
     "ANY",
+    "LARGE_MESSAGES",
     "InterfaceType",
     "check_publisher",
     "check_service",
@@ -27,6 +28,10 @@ __all__ = [
 ]
 
 _NOT_A_NAME = "field [callerid] contains illegal chars"
+
+LARGE_MESSAGES = (
+    "2"  # version of split frames and of the ring; a peer that declares another one receives normal frames
+)
 
 ANY = "*"  # type and md5sum sent by a peer that accepts any type
 
@@ -59,8 +64,8 @@ def subscriber_header(
     (``core/wire/ring``).
     """
     return {
-        **({"shared_memory": "1"} if shared_memory else {}),
-        **({"split_frames": "1"} if split_frames else {}),
+        **({"shared_memory": LARGE_MESSAGES} if shared_memory else {}),
+        **({"split_frames": LARGE_MESSAGES} if split_frames else {}),
         "callerid": caller_id,
         "md5sum": type_.md5sum,
         "message_definition": type_.definition,

@@ -204,7 +204,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
 
 
 def check_shared_memory(environment: Environment) -> Iterator[Finding]:
-    """Yield a finding on whether processes of this user can send messages of 1 to 32 MB through shared memory."""
+    """Yield a finding on whether processes of this user can send messages of 0.5 to 32 MB through shared memory."""
     if not environment.shares_memory:
         yield ok(
             "shared memory", f"off, by MINIROSPY_TRANSPORT={environment.transport}: messages use sockets"

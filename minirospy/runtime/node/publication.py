@@ -14,7 +14,7 @@ from minirospy.base.closing import close_each
 from minirospy.core.wire import ring
 from minirospy.core.wire.framing import LargeFrame
 from minirospy.core.wire.header import Header, serialize_header
-from minirospy.core.wire.tcpros import InterfaceType, check_subscriber, publisher_header
+from minirospy.core.wire.tcpros import LARGE_MESSAGES, InterfaceType, check_subscriber, publisher_header
 from minirospy.runtime.transport import shared_memory, sockets
 from minirospy.runtime.transport.links import OutLink
 from minirospy.runtime.transport.ring_sender import SharedRing
@@ -107,7 +107,7 @@ class Publication:
         sockets.enlarge_send_buffer(sock)
         answer = publisher_header(self.topic, self.type, caller_id, latch=self.latch, extra=self.headers)
         loop = asyncio.get_running_loop()
-        if shares_memory and fields.get("shared_memory") == "1" and shared_memory.may_share(sock):
+        if shares_memory and fields.get("shared_memory") == LARGE_MESSAGES and shared_memory.may_share(sock):
             self._ring = self._ring or SharedRing(loop)
             sender = self._ring.add(sock)
         else:
@@ -119,7 +119,7 @@ class Publication:
             self.queue_size or 0,
             self._link_closed,
             header=serialize_header(answer),
-            split=fields.get("split_frames") == "1",
+            split=fields.get("split_frames") == LARGE_MESSAGES,
             ring=sender,
         )
 

@@ -23,12 +23,14 @@ from minirospy.core.wire.framing import (
     LENGTH_BYTES,
     MAX_FRAME,
     SPLIT,
+    SPLIT_BYTES,
     Frame,
     FrameReader,
     SplitFrame,
-    may_split,
+    check_split,
     parse_length,
-    split_sizes,
+    parse_split,
+    split_frame,
 )
 from minirospy.runtime.transport.ring_receiver import RingReceiver
 from minirospy.runtime.transport.sockets import (
@@ -286,13 +288,11 @@ class _FrameSource:
         try:
             if not word & SPLIT:
                 return self._take(size)
-            head_size, tail_size = split_sizes(size, parse_length(self._take(LENGTH_BYTES)))
-            head, tail = self._take(head_size), self._take(tail_size)
+            array, rest = parse_split(self._take(SPLIT_BYTES))
+            parts = [self._take(count) for count in (check_split(size, array, rest), array, rest) if count]
         except MemoryError:
             raise WireError(f"no memory for a message of {size} bytes") from None
-        if not may_split(head, tail_size):
-            raise WireError("a split message was not split where its array begins")
-        return SplitFrame(head, tail)
+        return split_frame(*parts)
 
     def _take(self, count: int) -> bytes:
         """Return exactly ``count`` bytes. Raise _Ended if the peer closes, OSError if the connection fails."""

@@ -11,7 +11,7 @@ import socket
 
 from minirospy.base.errors import WireError
 from minirospy.core.wire import ring
-from minirospy.core.wire.framing import SplitFrame, may_split
+from minirospy.core.wire.framing import split_frame
 from minirospy.core.wire.ring import Announcement
 from minirospy.runtime.transport.shared_memory import may_share
 
@@ -68,19 +68,19 @@ class RingReceiver:
 
     def read(self, data: bytes) -> bytes:
         """Return a copy of an announced message, and release its place. Raise WireError if the announcement is invalid."""
-        offset, size, tail = self._parse(data)
+        offset, size, array_size, rest_size = self._parse(data)
         assert self._map is not None
         end = offset + size
-        if tail:
-            head, array_ = self._map[offset : end - tail], self._map[end - tail : end]
-        else:
-            head, array_ = self._map[offset:end], b""
+        if not array_size:
+            whole = self._map[offset:end]
+            os.eventfd_write(self._counter, 1)
+            return whole
+
+        rest = end - rest_size
+        start = rest - array_size
+        parts = self._map[offset:start], self._map[start:rest], self._map[rest:end]
         os.eventfd_write(self._counter, 1)
-        if not tail:
-            return head
-        if not may_split(head, tail):
-            raise WireError("a split message was not split where its array begins")
-        return SplitFrame(head, array_)
+        return split_frame(*parts)
 
     def close(self) -> None:
         """Unmap the ring and close all descriptors. Idempotent."""

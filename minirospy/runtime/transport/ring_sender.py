@@ -19,7 +19,7 @@ import time
 from types import TracebackType
 
 from minirospy.core.wire import ring
-from minirospy.core.wire.framing import LargeFrame, may_split
+from minirospy.core.wire.framing import LargeFrame
 from minirospy.core.wire.ring import Layout, Places, Step
 from minirospy.runtime.transport.shared_memory import ascii_text
 from minirospy.runtime.transport.sockets import peer
@@ -419,15 +419,12 @@ class RingSender:
         if place is None:
             return False
 
-        tail = (
-            len(frame.pieces[1])
-            if len(frame.pieces) == 2 and may_split(frame.pieces[0], len(frame.pieces[1]))
-            else 0
-        )
         with self._ring.lock:
             places.hold(self, place, frame.size)
         try:
-            self._send(ring.announcement(place * memory.layout.place_size, frame.size, tail))
+            self._send(
+                ring.announcement(place * memory.layout.place_size, frame.size, frame.array, frame.rest)
+            )
         except (BlockingIOError, InterruptedError):
             with self._ring.lock:
                 places.take_back(self)

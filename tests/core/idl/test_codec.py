@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import tracemalloc
+from collections.abc import Iterator
 from io import BytesIO
 from typing import Any
 
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from minirospy.base.errors import DeserializationError
 from minirospy.base.times import Duration, Time
 from minirospy.core.idl.load import class_from_text, specs_of_text
+from minirospy.core.wire.framing import SplitFrame
 
 SEPARATOR = "=" * 80
 NUMBERS = {
@@ -152,6 +154,47 @@ def test_bytes_are_those_of_the_rules_and_come_back(message: Any) -> None:
         again = type(message)().deserialize(source)
         assert same(message, again)
         assert serialized(again) == data
+
+
+def leaves(message: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the type and value of each field, with the fields of nested messages in their place."""
+    for name, type_ in zip(message.__slots__, message._slot_types, strict=True):
+        value = getattr(message, name)
+        if hasattr(value, "_slot_types"):
+            yield from leaves(value)
+        else:
+            yield type_, value
+
+
+def last_array(message: Any) -> tuple[bytes, int] | None:
+    """Return a message's last byte array and the number of bytes after it, or its last string if nothing follows.
+
+    Return None if another field of variable length, or an array of numbers, comes later.
+    """
+    after = 0
+    for type_, value in reversed(list(leaves(message))):
+        base, bracket, length = type_.partition("[")
+        if type_ in ("uint8[]", "char[]"):
+            return value, after
+        if type_ == "string" and not after:
+            return value.encode(), 0
+        if type_ == "string" or (bracket and (base not in ("uint8", "char") or length == "0]")):
+            return None
+        after += len(wire_field(value, type_))
+    return None
+
+
+@settings(max_examples=300)
+@given(messages())
+def test_a_class_declares_where_its_messages_may_be_split_and_reads_split_ones(message: Any) -> None:
+    data = serialized(message)
+    ending = last_array(message)
+    assert getattr(type(message), "_bytes_after_array", None) == (ending and ending[1])
+    if ending:
+        array, after = ending
+        end = len(data) - after
+        frame = SplitFrame(data[: end - len(array)], array, data[end:])
+        assert same(message, type(message)().deserialize(frame))
 
 
 @settings(max_examples=100)

@@ -18,9 +18,11 @@ from minirospy.core.wire.framing import (
     LargeFrame,
     Pieces,
     SplitFrame,
+    check_split,
     may_split,
+    parse_split,
     serialize_frame,
-    split_sizes,
+    split_frame,
 )
 
 
@@ -130,7 +132,7 @@ def test_large_pieces_are_not_joined() -> None:
     large, other = b"L" * CHUNK, b"M" * (CHUNK + 5)
     frame = pieces(b"a", b"b", large, other, b"c", b"d").frame()
     assert isinstance(frame, LargeFrame)
-    assert frame == ((b"ab", large, other, b"cd"), 2 * CHUNK + 9)
+    assert frame == ((b"ab", large, other, b"cd"), 2 * CHUNK + 9, 0)
     assert frame.pieces[1] is large
     assert pieces(large).frame() == ((large,), CHUNK)
     assert pieces(b"a", large).frame() == ((b"a", large), CHUNK + 1)
@@ -147,19 +149,54 @@ def test_large_piece_that_can_change_is_copied() -> None:
 
 def test_many_small_pieces_of_a_large_message_are_joined() -> None:
     frame = pieces(*[b"x" * 1000] * 100).frame()
-    assert frame == ((b"x" * 100_000,), 100_000)
+    assert frame == ((b"x" * 100_000,), 100_000, 0)
 
 
 def test_buffers_of_a_large_message() -> None:
-    head, tail = b"head" + CHUNK.to_bytes(4, "little"), b"t" * CHUNK
-    frame = LargeFrame((head, tail), CHUNK + 8)
-    length = struct.pack("<I", CHUNK + 8)
-    assert frame.buffers(split=False) == [length, head, tail]
-    # The highest bit of the length is 1, and the size of the array follows.
-    assert frame.buffers(split=True) == [struct.pack("<II", CHUNK + 8 + 0x80000000, CHUNK) + head, tail]
-    for others in [(tail,), (b"head", tail), (head, tail, b"more")]:
-        whole = LargeFrame(others, sum(map(len, others)))
-        assert whole.buffers(split=True) == [struct.pack("<I", whole.size), *others]
+    head, array = b"head" + CHUNK.to_bytes(4, "little"), b"t" * CHUNK
+    for rest in [(), (b"rest",)]:
+        size = CHUNK + 8 + sum(map(len, rest))
+        length = struct.pack("<I", size)
+        whole = LargeFrame((head, array, *rest), size)
+        for split in (False, True):
+            assert whole.buffers(split=split) == [length, head, array, *rest]
+        frame = LargeFrame((head, array, *rest), size, CHUNK)
+        assert frame.buffers(split=False) == [length, head, array, *rest]
+        # The highest bit of the length is 1; the size of the array, and of what follows it, come next.
+        lengths = struct.pack("<III", size + 0x80000000, CHUNK, sum(map(len, rest)))
+        assert frame.buffers(split=True) == [lengths + head, array, *rest]
+
+
+ARRAY = b"t" * CHUNK
+LENGTH = CHUNK.to_bytes(4, "little")
+
+
+@pytest.mark.parametrize(
+    ("written", "after_array", "array"),
+    [
+        ([b"head", LENGTH, ARRAY], 0, CHUNK),
+        ([LENGTH, ARRAY], 0, CHUNK),
+        ([LENGTH, ARRAY, b"1"], 1, CHUNK),
+        ([LENGTH, ARRAY, b"1", b"23"], 3, CHUNK),
+        ([LENGTH, ARRAY, ARRAY], CHUNK, CHUNK),
+        # The class does not end with a byte array, even if a number happens to equal the size of the next field.
+        ([LENGTH, ARRAY], None, 0),
+        # The last byte array is another one.
+        ([LENGTH, ARRAY, b"\0\0\0\0"], 0, 0),
+        ([LENGTH, ARRAY, LENGTH, ARRAY, b"1"], 1, 0),
+        ([LENGTH, ARRAY, b"1"], 0, 0),
+        ([ARRAY, b"1"], 1, 0),
+        ([b"head", ARRAY], 0, 0),
+    ],
+)
+def test_the_class_says_where_a_large_message_may_be_split(
+    written: list[bytes], after_array: int | None, array: int
+) -> None:
+    frame = pieces(*written).frame(after_array)
+    assert isinstance(frame, LargeFrame)
+    assert frame.array == array
+    assert frame.rest == (after_array if array else 0)
+    assert b"".join(frame.pieces) == b"".join(written)
 
 
 @pytest.mark.parametrize(
@@ -181,29 +218,46 @@ def test_split_is_allowed_if_the_head_ends_with_the_array_length(
 
 
 def test_split_sizes_of_a_frame() -> None:
-    assert split_sizes(CHUNK + 10, CHUNK) == (10, CHUNK)
-    assert split_sizes(CHUNK + 4, CHUNK) == (4, CHUNK)
-    for size, tail in [(CHUNK + 3, CHUNK), (CHUNK + 10, CHUNK - 1), (10, CHUNK)]:
-        with pytest.raises(
-            WireError, match=f"split message of {size} bytes says that it ends with an array of {tail}"
-        ):
-            split_sizes(size, tail)
+    assert parse_split(struct.pack("<II", CHUNK, 7)) == (CHUNK, 7)
+    assert check_split(CHUNK + 10, CHUNK, 0) == 10
+    assert check_split(CHUNK + 4, CHUNK, 0) == 4
+    assert check_split(CHUNK + 10, CHUNK, 6) == 4
+    for size, length, rest in [
+        (CHUNK + 3, CHUNK, 0),
+        (CHUNK + 10, CHUNK - 1, 0),
+        (10, CHUNK, 0),
+        (CHUNK + 10, CHUNK, 7),
+        (CHUNK + 10, CHUNK, 2**32 - 1),
+    ]:
+        words = (
+            f"split message of {size} bytes says that it has an array of {array}, followed by {rest} bytes"
+        )
+        with pytest.raises(WireError, match=words):
+            check_split(size, length, rest)
 
 
 def test_split_frame_is_read_as_the_whole() -> None:
-    head, tail = b"0123456789", b"abcdefghij"
-    frame, whole = SplitFrame(head, tail), head + tail
-    assert (len(frame), bytes(frame), frame.tail) == (20, whole, tail)
-    for start in range(-1, 22):
-        assert frame[start:] == whole[start:]
-        for stop in range(-1, 22):
-            assert frame[start:stop] == whole[start:stop]
-            assert frame[start:stop:2] == whole[start:stop:2]
-    for number in range(20):
-        assert frame[number] == whole[number]
-    # The array becomes the field without a copy.
-    assert frame[10:20] is tail
-    assert frame[10:] is tail
+    head, array = b"0123456789", b"abcdefghij"
+    for rest in (b"", b"xyz"):
+        frame, whole = SplitFrame(head, array, rest), head + array + rest
+        assert (len(frame), bytes(frame), frame.array, frame.rest) == (len(whole), whole, array, rest)
+        for start in range(-1, 26):
+            assert frame[start:] == whole[start:]
+            for stop in range(-1, 26):
+                assert frame[start:stop] == whole[start:stop]
+                assert frame[start:stop:2] == whole[start:stop:2]
+        for number in range(len(whole)):
+            assert frame[number] == whole[number]
+        # The array becomes the field without a copy.
+        assert frame[10:20] is array
+        assert frame[20:] == rest
+    assert SplitFrame(head, array)[10:] is array
+
+
+def test_frame_that_was_split_elsewhere_is_refused() -> None:
+    assert split_frame(LENGTH, ARRAY, b"rest") == SplitFrame(LENGTH, ARRAY, b"rest")
+    with pytest.raises(WireError, match="not split where its array begins"):
+        split_frame(b"head", ARRAY, b"rest")
 
 
 def test_limits_of_the_wire_are_as_documented() -> None:

@@ -20,30 +20,36 @@ def test_words_are_no_lengths() -> None:
     assert all(word > MAX_FRAME | SPLIT for word in words)
     assert ring.prepare() == b"\x01\x00\x00\xc0"
     assert ring.offer(ring.PAGE) == b"\x02\x00\x00\xc0\x00\x00\x01\x00"
-    assert ring.announcement(1, 2, 3) == b"\x03\x00\x00\xc0\x01\0\0\0\x02\0\0\0\x03\0\0\0"
+    assert ring.announcement(1, 2, 3, 4) == b"\3\0\0\xc0\1\0\0\0\2\0\0\0\3\0\0\0\4\0\0\0"
+    assert ring.announcement(1, 2) == b"\3\0\0\xc0\1\0\0\0\2\0\0\0\0\0\0\0\0\0\0\0"
 
 
 def test_announcements_and_offers_are_read_back() -> None:
-    data = ring.announcement(65_536, 100_000, 99_000)[4:]
+    data = ring.announcement(65_536, 100_000, 99_000, 900)[4:]
     assert len(data) == ring.ANNOUNCEMENT_BYTES
-    assert ring.parse_announcement(data, 200_000) == Announcement(65_536, 100_000, 99_000)
+    assert ring.parse_announcement(data, 200_000) == Announcement(65_536, 100_000, 99_000, 900)
     assert ring.parse_offer(ring.offer(ring.MAX_RING)[4:]) == ring.MAX_RING
 
 
 @pytest.mark.parametrize(
-    ("offset", "size", "tail", "words"),
+    ("offset", "size", "array", "rest", "words"),
     [
-        (0, 131_073, 0, "outside the ring"),
-        (131_072, 1, 0, "outside the ring"),
-        (1, 0xFFFFFFFF, 0, "outside the ring"),
-        (0xFFFFFFFF, 1, 0, "outside the ring"),
-        (0, 1000, 997, "ends with an array of 997"),
-        (0, 3, 1, "ends with an array of 1"),
+        (0, 131_073, 0, 0, "outside the ring"),
+        (131_072, 1, 0, 0, "outside the ring"),
+        (1, 0xFFFFFFFF, 0, 0, "outside the ring"),
+        (0xFFFFFFFF, 1, 0, 0, "outside the ring"),
+        (0, 100_000, 99_997, 0, "has an array of 99997"),
+        (0, 100_000, 99_000, 997, "followed by 997"),
+        (0, 100_000, 99_000, 0xFFFFFFFF, "followed by"),
+        (0, 100_000, 0, 1, "followed by 1"),
+        (0, 3, 1, 0, "has an array of 1"),
     ],
 )
-def test_an_announcement_outside_the_ring_is_refused(offset: int, size: int, tail: int, words: str) -> None:
+def test_an_announcement_outside_the_ring_is_refused(
+    offset: int, size: int, array: int, rest: int, words: str
+) -> None:
     with pytest.raises(WireError, match=words):
-        ring.parse_announcement(ring.announcement(offset, size, tail)[4:], 131_072)
+        ring.parse_announcement(ring.announcement(offset, size, array, rest)[4:], 131_072)
 
 
 @pytest.mark.parametrize(

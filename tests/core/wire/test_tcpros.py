@@ -138,7 +138,7 @@ def test_subscriber_header_fields() -> None:
     }
     assert subscriber_header("/t", BOOL, "/sub") == fields
     more = subscriber_header("/t", BOOL, "/sub", tcp_nodelay=True, split_frames=True)
-    assert more == {**fields, "tcp_nodelay": "1", "split_frames": "1"}
+    assert more == {**fields, "tcp_nodelay": "1", "split_frames": "2"}
 
 
 def test_publisher_header_fields() -> None:

@@ -283,7 +283,7 @@ def image(array: bytes) -> LargeFrame:
     pieces.write(b"head")
     pieces.write(struct.pack("<BI", 7, len(array)))
     pieces.write(array)
-    frame = pieces.frame()
+    frame = pieces.frame(0)
     assert isinstance(frame, LargeFrame)
     return frame
 
@@ -344,14 +344,26 @@ def test_the_array_is_an_object_of_its_own(
     reader.join(30)
     (frame,) = frames
     assert isinstance(frame, SplitFrame)
-    assert frame[9:] is frame.tail
+    assert frame[9:] is frame.array
 
 
-def test_a_large_message_with_something_behind_its_array_is_not_split() -> None:
+def test_the_array_is_an_object_of_its_own_if_fields_follow_it(
+    pair: tuple[socket.socket, socket.socket], loop: LoopThread
+) -> None:
+    link = open_link(loop, pair[0], 0, lambda _: None, split=True)
+    frames: list[Frame] = []
+    reader = read_in_thread(pair[1], frames)
     pieces = Pieces([struct.pack("<I", CHUNK), bytes(CHUNK), b"dense"])
-    frame = pieces.frame()
-    assert isinstance(frame, LargeFrame)
-    assert frame.buffers(split=True) == [struct.pack("<I", CHUNK + 9), *pieces]
+    link.send(pieces.frame(5))
+    link.send(pieces.frame())
+    loop.run(link.drain(30))
+    loop.loop.call_soon_threadsafe(link.close)
+    reader.join(30)
+    frame, unsplit = frames
+    assert isinstance(frame, SplitFrame)
+    assert (frame.array, frame.rest) == (bytes(CHUNK), b"dense")
+    assert type(unsplit) is bytes
+    assert bytes(frame) == unsplit == b"".join(pieces)
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 20_000])

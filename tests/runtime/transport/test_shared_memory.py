@@ -74,16 +74,26 @@ def rings_of_this_process() -> list[str]:
     ]
 
 
+def splittable(data: bytes) -> int:
+    """Return the size of an array, or 0 if it is too small to be split off."""
+    return len(data) if len(data) >= CHUNK else 0
+
+
 def image(number: int, size: int) -> LargeFrame:
     """Return a message of ``size`` bytes that ends with a byte array of random contents."""
     data = random.Random(number).randbytes(size - 12)
-    return LargeFrame((struct.pack("<QI", number, len(data)), data), size)
+    return LargeFrame((struct.pack("<QI", number, len(data)), data), size, splittable(data))
 
 
 def cloud(number: int, size: int) -> LargeFrame:
-    """Return a message with something behind its array."""
+    """Return a message with one more field after its array of random contents."""
     data = random.Random(number).randbytes(size - 13)
-    return LargeFrame((struct.pack("<QI", number, len(data)), data, b"\1"), size)
+    return LargeFrame((struct.pack("<QI", number, len(data)), data, b"\1"), size, splittable(data))
+
+
+def block(number: int, size: int) -> LargeFrame:
+    """Return a message that must not be split."""
+    return LargeFrame((random.Random(number).randbytes(size),), size)
 
 
 def take(sock: socket.socket, count: int) -> bytes:
@@ -227,14 +237,14 @@ def test_messages_arrive_whole_and_in_order(mouth: Mouth) -> None:
     count = mouth.warm_up(ear, size=1_000_000)
     sent: list[bytes] = []
     for number in range(60):
-        frame = (image, cloud)[number % 2](number, CHUNK + 100 + number * 15_000)
+        frame = (image, cloud, block)[number % 3](number, CHUNK + 100 + number * 15_000)
         small = [bytes([number]) * size for size in [0, 9, CHUNK - 5][: number % 4]]
         mouth.publish(frame, *map(serialize_frame, small))
         sent += [whole(frame), *small]
     ear.wait(count + len(sent))
     assert list(map(bytes, ear.frames[count:])) == sent
     split = [isinstance(frame, SplitFrame) for frame in ear.frames[count:] if len(frame) >= CHUNK]
-    assert split == [number % 2 == 0 for number in range(60)]
+    assert split == [number % 3 < 2 for number in range(60)]
 
     (link,) = mouth.links
     assert mouth.sender(0).announced
@@ -587,12 +597,12 @@ def test_a_subscriber_of_another_user_uses_the_socket(mouth: Mouth, monkeypatch:
     ear.close()
 
 
-def test_a_subscriber_that_does_not_know_rings_is_sent_plain_frames(mouth: Mouth) -> None:
+def test_a_subscriber_that_does_not_know_rings_is_sent_frames(mouth: Mouth) -> None:
     sock = mouth.connect(shared=False)
     frames = [cloud(number, 100_000) for number in range(3)]
     thread = threading.Thread(target=mouth.publish, args=frames)
     thread.start()
-    expected = b"".join(serialize_frame(whole(frame)) for frame in frames)
+    expected = b"".join(buffer for frame in frames for buffer in frame.buffers(split=True))
     assert take(sock, len(expected)) == expected
     thread.join(SECONDS)
     sock.close()
@@ -719,7 +729,7 @@ def test_releases_of_places_that_are_not_held_end_the_ring(mouth: Mouth) -> None
     sock.send(ring.MAPPED + b"nonsense")
     wait_until(lambda: mouth.steps() == [Step.IN_USE], SECONDS)
     mouth.publish(image(3, CHUNK))
-    assert take(sock, 16)[:4] == ring.announcement(0, 0, 0)[:4]
+    assert take(sock, len(ring.announcement(0, 0)))[:4] == ring.announcement(0, 0)[:4]
     os.eventfd_write(counter, 2)
     frame = image(4, CHUNK)
     thread = threading.Thread(target=mouth.publish, args=(frame, frame))
@@ -778,7 +788,7 @@ def test_only_a_sealed_ring_of_the_right_size_is_mapped(
 @pytest.mark.parametrize(
     ("words", "data"),
     [
-        ("before any memory was offered", ring.announcement(0, 10, 0)),
+        ("before any memory was offered", ring.announcement(0, 10)),
         ("a ring of 0 bytes", ring.offer(0)),
         ("over the limit", struct.pack("<I", ring.PLACE_WORD + 1)),
     ],
@@ -803,7 +813,7 @@ def test_an_announcement_that_lies_ends_the_connection() -> None:
     files = offered_files(ring.PAGE)
     socket.send_fds(one, [ring.offer(ring.PAGE)], files)
     assert one.recv(1) == ring.MAPPED
-    one.sendall(ring.announcement(0, 100, 0) + ring.announcement(ring.PAGE - 99, 100, 0))
+    one.sendall(ring.announcement(0, 100) + ring.announcement(ring.PAGE - 99, 100))
     wait_until(lambda: ear.fault, SECONDS)
     assert "outside the ring" in str(ear.fault)
     assert ear.frames == [bytes(100)]
@@ -821,7 +831,7 @@ def test_an_announcement_that_lies_ends_the_connection() -> None:
         ([struct.pack("<I", 5000), b"cut off"], None),
         ([struct.pack("<I", CHUNK + 1), b"cut off"], None),
         ([struct.pack("<I", 0xC0000009)], "is over the limit"),
-        ([struct.pack("<III", ring.PLACE_WORD, 0, 9) + b"\0" * 4], "before any memory was offered"),
+        ([ring.announcement(0, 9)], "before any memory was offered"),
     ],
 )
 def test_what_arrived_before_the_end_is_delivered(newest: int, end: list[bytes], fault: str | None) -> None:

@@ -443,30 +443,45 @@ def test_a_node_on_tcp_looks_for_no_unix_socket() -> None:
 
 
 @pytest.mark.parametrize("transport", ["auto", "unix", "tcp"])
-def test_image_arrives_by_unix_socket_without_a_copy(transport: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kind", ["image", "cloud"])
+def test_image_or_cloud_arrives_by_unix_socket_without_a_copy(
+    kind: str, transport: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("MINIROSPY_TRANSPORT", transport)
-    from sensor_msgs.msg import Image
+    from sensor_msgs.msg import Image, PointCloud2, PointField
 
-    sent = Image(height=480, width=640, encoding="rgb8", step=1920, data=os.urandom(921_600))
+    sent: Image | PointCloud2
+    if kind == "image":
+        sent = Image(height=480, width=640, encoding="rgb8", step=1920, data=os.urandom(921_600))
+    else:
+        sent = PointCloud2(
+            width=40_000,
+            height=1,
+            fields=[PointField("x", 0, PointField.FLOAT32, 1)],
+            point_step=4,
+            data=os.urandom(160_000),
+            is_dense=True,
+        )
+    message_class = type(sent)
     pieces = Pieces()
     sent.serialize(pieces)
-    got: list[tuple[Any, Image]] = []
+    got: list[tuple[Any, Image | PointCloud2]] = []
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")
-            await listen(b, "/t", lambda frame, _: got.append((frame, Image().deserialize(frame))))
+            await listen(b, "/t", lambda frame, _: got.append((frame, message_class().deserialize(frame))))
             await until(lambda: publication.links)
-            publication.publish(pieces.frame())
+            publication.publish(pieces.frame(message_class._bytes_after_array))
             await until(lambda: got)
 
     run(scene)
-    ((frame, image),) = got
+    ((frame, received),) = got
     if transport != "tcp":
         assert isinstance(frame, SplitFrame)
-        assert image.data is frame.tail
-    assert image == sent
-    assert Image().deserialize(bytes(frame)) == sent
+        assert received.data is frame.array
+    assert received == sent
+    assert message_class().deserialize(bytes(frame)) == sent
 
 
 LISTENER = """

@@ -37,8 +37,8 @@ class FileWriter(Protocol):
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Add a connection and return its number."""
 
-    def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message."""
+    def write(self, connection: int, time: int, body: Buffer, *others: Buffer) -> None:
+        """Write a message, given in one part or more."""
 
     def write_ready(self) -> None:
         """Write the complete chunks whose compression has finished."""
@@ -95,8 +95,8 @@ class BagFile:
         """Return the number of buffered bytes, excluding those in the disk thread's queue."""
         return self._writer.gathered
 
-    def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:
-        """Write a message received with this connection header.
+    def write(self, topic: str, header: Mapping[str, str], time: int, *parts: Buffer) -> None:
+        """Write a message received with this connection header, given in one part or more.
 
         Raise BagFormatError if the bag format cannot store the message.
         """
@@ -106,7 +106,7 @@ class BagFile:
         known = self._by_identity.get(id(header))
         number = known[1] if known and known[0] is header else self._connection(topic, header)
         try:
-            self._writer.write(number, time, body, tail)
+            self._writer.write(number, time, *parts)
         except BagFormatError:
             raise
         except Exception as error:  # noqa: BLE001 - a compression may fail with any exception

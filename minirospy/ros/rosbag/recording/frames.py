@@ -24,12 +24,12 @@ class ReceivedFrame(AnyMsg):
         return self
 
 
-def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
-    """Return a frame's bytes in two parts; the second is empty unless a large message was received in two parts."""
+def parts_of(frame: Buffer) -> tuple[Buffer, ...]:
+    """Return the parts in which a frame was received: one, or three if it is a split frame."""
     if isinstance(frame, SplitFrame):
         # A memoryview of the frame contains only the first part.
-        return memoryview(frame), frame.tail
-    return frame, b""
+        return memoryview(frame), frame.array, frame.rest
+    return (frame,)
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:

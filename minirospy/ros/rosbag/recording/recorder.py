@@ -67,7 +67,7 @@ class Recorder:
         self._finished = SignalSafeEvent()
         self._file: BagFile | None = None
         self._is_complete = False
-        self._latched: dict[tuple[str, str], tuple[Mapping[str, str], bytes, bytes]] = {}
+        self._latched: dict[tuple[str, str], tuple[Mapping[str, str], list[bytes]]] = {}
         self._reported: Counter[str] = Counter()
         self._clock: Callable[[], int] = time.time_ns
         self._announcement: client.Publisher[Message] | None = None
@@ -285,8 +285,8 @@ class Recorder:
 
         client.loginfo("Recording to '%s'.", name)
         # Latched messages were received before this file was opened: record them at its start time.
-        for (topic, _), (header, body, tail) in self._latched.items():
-            self._file.write(topic, header, now, body, tail)
+        for (topic, _), (header, parts) in self._latched.items():
+            self._file.write(topic, header, now, *parts)
         if self._announcement:
             self._announcement.publish(self._announcement.data_class(name))
 
@@ -320,7 +320,7 @@ class Recorder:
     def _receive(self, message: ReceivedFrame, topic: _Topic) -> None:
         now = self._clock()
         header = message._connection_header
-        body, tail = parts_of(message.frame)
+        parts = parts_of(message.frame)
         with self._lock:
             if not self._file or not topic.left:
                 return
@@ -331,10 +331,10 @@ class Recorder:
                 return
 
             if self.options.repeat_latched and header.get("latching") == "1":
-                kept = bytes(body) if not isinstance(body, bytes) else body
-                self._latched[topic.name, header.get("callerid", "")] = header, kept, tail
+                kept = [part if isinstance(part, bytes) else bytes(part) for part in parts]
+                self._latched[topic.name, header.get("callerid", "")] = header, kept
             most = self.options.buffer_size
-            size = len(body) + len(tail)
+            size = sum(map(len, parts))
             if most and self._waiting(self._file) + size > most:
                 # Free memory by writing the chunks compressed so far, without waiting for the next message.
                 self._file.write_ready()
@@ -342,7 +342,7 @@ class Recorder:
                     self.dropped[topic.name] += 1
                     return
             try:
-                self._file.write(topic.name, header, now, body, tail)
+                self._file.write(topic.name, header, now, *parts)
             except BagFormatError as error:
                 self.dropped[topic.name] += 1
                 client.logerr("%s", error)
