@@ -102,7 +102,7 @@ class Environment(NamedTuple):
         return environment.on_this_machine() if local else environment
 
     def on_this_machine(self) -> Environment:
-        """Return a copy for a process that listens on loopback, advertises localhost and refuses other machines."""
+        """Return a copy that makes a process listen on loopback, advertise localhost and refuse other machines."""
         return self._replace(host="localhost", allow=LOOPBACK, local=True)
 
     @property

@@ -481,7 +481,7 @@ class ROSInterruptException(ROSException):
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
-    """Simulated time jumped back to ``time`` seconds before a sleep started."""
+    """Simulated time jumped back during a sleep; it is now ``time`` seconds before the sleep's start."""
 
     def __init__(self, time: float) -> None:
         super().__init__("ROS time moved backwards")

@@ -106,8 +106,8 @@ class Lifecycle:
         Return False, without waiting, if a shutdown is already in progress.
         """
         with self.deferral:
-            # Enter the deferral before claiming the shutdown.
-            # Otherwise a second signal right after the claim would leave the shutdown claimed but never performed.
+            # Defer signals before acquiring ``_claim``. Otherwise a second signal right after it could interrupt this
+            # call, and the shutdown would never be performed.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)

@@ -37,7 +37,7 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """During a sleep, simulated time jumped back to ``time`` seconds before the sleep's start.
+    """Simulated time jumped back during a sleep; it is now ``time`` seconds before the sleep's start.
 
     As in rospy, also a KeyboardInterrupt.
     """

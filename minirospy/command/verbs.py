@@ -79,10 +79,10 @@ def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB")
 def with_options(
     options: Callable[..., _Options], body: Callable[[_Options], int | None]
 ) -> Callable[..., int | None]:
-    """Return a function that takes a parser's arguments as keywords, makes a record of them, and calls ``body(record)``.
+    """Return a function that takes keyword arguments, puts them into an ``options`` object, and passes it to ``body``.
 
-    ``options`` is the record's class, whose fields have the names of the parser's arguments: a NamedTuple, because
-    importing dataclasses takes longer than a command runs.
+    ``options`` is a class whose fields have the names of the parser's arguments: a NamedTuple, because importing
+    dataclasses takes longer than a command runs.
     """
 
     @functools.wraps(options)  # lets inspect.signature list the fields

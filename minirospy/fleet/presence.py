@@ -15,7 +15,7 @@ __all__ = ["Presence"]
 REGULAR_SECONDS, LOST_SECONDS = 60.0, 10.0
 """Seconds between checks: normally, and while a gateway is lost, to notice its return soon."""
 _SETTLE_SECONDS = 2.0
-"""Seconds to wait after a robot has left, because robots that are lost together disappear one by one."""
+"""Seconds between a robot's departure and the check: robots that are lost together disappear one by one."""
 _ROUNDS, ROUND_SECONDS = 2, 5.0
 
 

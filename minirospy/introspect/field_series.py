@@ -172,7 +172,7 @@ def _leaves(value: object, label: str) -> Iterator[tuple[str, float]]:
             if (number := _number(each)) is not None:
                 yield f"{label}[{index}]", number
     else:
-        # As in rqt_plot, a message selects its direct numeric fields.
+        # As in rqt_plot, a path to a message selects the numeric fields directly in it.
         for name in _slots(value):
             if (number := _number(getattr(value, name))) is not None:
                 yield f"{label}/{name}", number

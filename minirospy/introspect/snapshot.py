@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference between two snapshots. A topic of which only the type has changed is not a difference."""
+    """Return the differences between two snapshots, except changes of a topic's type."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),

@@ -73,7 +73,7 @@ def parse_cancel(data: bytes | memoryview) -> GoalId:
 
 
 def status_and_body(secs: int, nsecs: int, status: Status, body: bytes) -> bytes:
-    """Serialize an ActionFeedback or ActionResult."""
+    """Serialize an ActionFeedback or ActionResult from its status and its serialized body."""
     return _header(secs, nsecs) + _status(status) + body
 
 

@@ -91,7 +91,7 @@ class _Types:
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
-        """Return an installed message type. Raise TypesDiffer if the type is not installed, as for an incompatible type."""
+        """Return a message type. Raise TypesDiffer, the error for incompatible types, if the type is not installed."""
         try:
             return self._catalogue.message(name), self._catalogue.message
         except (NotFoundError, DefinitionError) as error:

@@ -84,7 +84,7 @@ def _base(text: str, whole: str) -> str:
 def transcoder(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Transcoder:
-    """Return functions that convert a message type. Raise TypesDiffer if the two types have no common layout."""
+    """Return functions that convert a ROS 1 type to a ROS 2 type and back. Raise TypesDiffer if no layout fits both."""
     layout = layout_of(ros1, ros1_lookup, ros2, ros2_lookup, rules)
     try:
         made = make_transcoder(ros1.full_name, layout)

@@ -64,7 +64,7 @@ def assignment(name: str, value: str) -> str:
 
 
 def powershell_base(base: Mapping[str, str], programs: Path) -> str:
-    """Return code that sets ROS's variables unless they are set, and adds minirospy's commands to PATH."""
+    """Return PowerShell code that sets the ROS variables that are unset, and adds minirospy's commands to PATH."""
     variables = "".join(
         f"if (-not $env:{name}) {{ $env:{name} = {quoted(value)} }}\n" for name, value in base.items()
     )

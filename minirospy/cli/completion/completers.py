@@ -375,7 +375,7 @@ def parameters(cursor: Cursor) -> Iterable[str]:
 
 
 def parameter_value(cursor: Cursor) -> Iterable[str]:
-    """Return a parameter's current value for editing, for `rosparam set PARAMETER`."""
+    """Return a parameter's current value, which the user can edit, for `rosparam set PARAMETER`."""
     from minirospy.introspect.parameters import get_parameter
     from minirospy.introspect.values import format_value
 

@@ -76,7 +76,7 @@ class _Recovered(NamedTuple):
 
 
 class McapRepair:
-    """Rebuilds an MCAP file's summary, in place. The library must be installed.
+    """Rebuilds an MCAP file's summary in place. Requires the ``mcap`` package.
 
     ``limit``: number of bytes at the start of the stream that are known to be written; by default, the whole stream.
     After :meth:`run`, ``problems`` contains lines about data that could not be recovered.

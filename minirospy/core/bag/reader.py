@@ -229,7 +229,7 @@ class _Merge:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the messages as blocks, in order."""
-        # Ordered by the time and rank of each run's next message, then by the chunk's position. The number prevents ties.
+        # Entries: time and rank of a run's next message, the chunk's position and its unique number, the run.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:

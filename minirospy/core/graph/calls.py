@@ -167,7 +167,7 @@ def anything(value: object, name: str, caller_id: str) -> object:
 
 
 def some(value: object, name: str, caller_id: str) -> object:
-    """Return a value of any type, except an empty one, 0 or False."""
+    """Return the value unchanged. Raise CallRefused if it is false, such as 0, None or an empty string."""
     if not value:
         raise CallRefused(f"ERROR: parameter [{name}] must be specified and non-empty")
     return value

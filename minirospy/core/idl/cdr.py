@@ -459,7 +459,7 @@ class _Generator:
         self._source.line(f"at += -at & {mask}")
 
     def _length(self, side: Side, *, is_text: bool) -> str:
-        """Generate code that reads a length after the pending tokens; return the name of the local variable.
+        """Generate code that reads the pending tokens and then a length; return the name of the length's variable.
 
         The code writes the length if both messages have it. In CDR a string's length includes the trailing NUL.
         """

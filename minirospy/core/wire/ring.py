@@ -182,7 +182,7 @@ class Places:
         return tuple(self._free)
 
     def take(self) -> int | None:
-        """Return a free place, which the calling thread holds until :meth:`let_go`; None if no place is free."""
+        """Return a free place, which the caller holds until :meth:`let_go`, or None if every place is held."""
         if not self._free:
             return None
         place = self._free.pop()

@@ -45,7 +45,7 @@ class InterfaceType(NamedTuple):
 
     @classmethod
     def of(cls, described: Any) -> InterfaceType:
-        """Return the type of a message or service class; a service's type has no full text."""
+        """Return the InterfaceType of a message or service class. For a service, ``definition`` is empty."""
         return cls(described._type, described._md5sum, getattr(described, "_full_text", ""))
 
 

@@ -31,7 +31,7 @@ class _Patterns(NamedTuple):
 
 
 def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
-    """Return the method called in ``body`` (None for a response) and the parameters; return None if the body is not plain."""
+    """Parse a call to (method, parameters), a response to (None, parameters). Return None if ``body`` is not plain."""
     try:
         text = body.decode("ascii")
         if text.count("<") > _MAX_TAGS:

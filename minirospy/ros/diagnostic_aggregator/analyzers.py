@@ -150,7 +150,7 @@ class GenericAnalyzer(_Items):
             return _words(params.get(key, []), log)
 
         prefixes = words("find_and_remove_prefix")
-        # As in ROS, find_and_remove_prefix stands for both startswith and remove_prefix, and adds to them.
+        # As in ROS, the words of find_and_remove_prefix are added to both startswith and remove_prefix.
         self._starts = prefixes + words("startswith")
         self._removed = [_shown(word) for word in prefixes + words("remove_prefix")]
         self._names = words("name")

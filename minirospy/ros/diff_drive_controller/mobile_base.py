@@ -226,7 +226,7 @@ def read_robot(context: ControllerContext, text: str) -> Robot:
 
 
 def described_joint(robot: Robot, name: str) -> Joint:
-    """Return a joint of the robot's description. Raise ControllerError if the joint is missing."""
+    """Return a joint from the robot description. Raise ControllerError if the joint is missing."""
     joint = robot.joints.get(name)
     if joint is None:
         raise ControllerError(f"{name} couldn't be retrieved from model description")

@@ -18,7 +18,7 @@ class Definition(ParameterGenerator):
     """Defines parameters without a .cfg file: call ``add`` as in such a file. A server reads it like a generated module."""
 
     def __init__(self) -> None:
-        """Define a configuration without parameters. Unlike a .cfg file, it needs no folders."""
+        """Start with no parameters. Unlike in a .cfg file, no output folders are needed."""
         self.group = self.Group(self, "Default", "", True, 0, 0)
         self.constants = []
 

@@ -39,7 +39,7 @@ def number_of(element: XmlElement | None, tag: str, default: float) -> float:
 
 
 def numbers_of(element: XmlElement | None, tag: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-    """Return a child element's numbers, or () if there are none. Raise PluginError if a number or their count is invalid."""
+    """Return a child element's numbers, or () if it has none. Raise PluginError if a number or the count is invalid."""
     text = text_of(element, tag)
     words = text.split()
     if words and len(words) not in counts:

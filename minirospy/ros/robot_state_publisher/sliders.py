@@ -19,7 +19,7 @@ _MOVES = {"up": -1, "down": 1, "k": -1, "j": 1}
 
 
 class Row(NamedTuple):
-    """A joint's screen line: its name, bar, position and limits, and whether it is selected."""
+    """A joint's line on the screen: its name, bar, position and limits, and whether it is selected."""
 
     name: str
     bar: str

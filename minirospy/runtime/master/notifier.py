@@ -111,7 +111,7 @@ class Notifier:
 
         # The last serialized update: cached, because all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
-        # The last serialized large update of a topic or parameter.
+        # The last large update of a topic or parameter: its name, its value and the serialized call.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
         # The queued large calls, the total bytes of those in progress, and whether one is being serialized.

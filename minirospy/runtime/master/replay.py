@@ -24,7 +24,7 @@ class Replay:
     def __init__(self, registry: Registry, parameters: ParameterTree) -> None:
         self._registry = registry
         self._parameters = parameters
-        # The parts of each large value found so far, keyed by number.
+        # The parts read so far of each incomplete large value, keyed by the value's number.
         self._parts: dict[int, list[bytes]] = {}
 
     def apply(self, what: str, *args: Any) -> None:

@@ -177,7 +177,7 @@ class Reader:
 
     def __init__(self, sock: socket.socket) -> None:
         self._receive = sock.recv
-        self.rest = b""  # bytes received beyond those of the last read
+        self.rest = b""  # bytes received, but not yet returned by read()
 
     def read(self, count: int, *, at_end_ok: bool = False) -> bytes:
         """Return ``count`` bytes, or b"" if ``at_end_ok`` and the peer closed before the first byte.

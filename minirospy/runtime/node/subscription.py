@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a master that has lost its state
 
-# Number of failed connections before a publisher is reported; a publisher that is shutting down is gone by then
+# failed connections before a publisher is reported; a publisher that is shutting down unregisters before that
 _WARN_AFTER = 3
 
 # maximum number of log lines about publishers that send invalid responses; further lines are only counted
@@ -51,7 +51,7 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options for delivering a subscription's messages of up to ``most`` bytes in steps on the loop. ``start`` runs the steps.
+    """Delivers messages of up to ``most`` bytes in steps on the loop: ``start`` runs the steps from ``deliver``.
 
     A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """

@@ -12,16 +12,16 @@ _T = TypeVar("_T")
 
 
 class Deadlines(Generic[_T]):
-    """The time limit of each operation in progress.
+    """The deadline of each operation in progress.
 
-    ``late`` is called on the loop with each overdue operation, in the order of the limits.
+    ``late`` is called on the loop with each overdue operation, in the order of their deadlines.
     """
 
     def __init__(self, late: Callable[[_T], object]) -> None:
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # The time at which the timer fires; no limit is earlier.
+        # The time at which the timer fires, no later than the earliest deadline.
         self._next = 0.0
 
     def __len__(self) -> int:
@@ -31,18 +31,18 @@ class Deadlines(Generic[_T]):
         return iter(self._ends)
 
     def set(self, each: _T, seconds: float) -> None:
-        """Set the time limit of ``each`` to ``seconds`` from now, replacing its previous limit."""
+        """Set the deadline of ``each`` to ``seconds`` from now, replacing its previous one."""
         loop = asyncio.get_running_loop()
         end = self._ends[each] = loop.time() + seconds
         if self._timer is None or end < self._next:
             self._watch(loop, end)
 
     def drop(self, each: _T) -> None:
-        """Remove the limit of a completed operation. Idempotent."""
+        """Remove the deadline of a completed operation. Idempotent."""
         self._ends.pop(each, None)
 
     def close(self) -> None:
-        """Remove all limits. Idempotent."""
+        """Remove all deadlines. Idempotent."""
         self._ends.clear()
         self._stop_timer()
 
@@ -61,12 +61,12 @@ class Deadlines(Generic[_T]):
         loop = asyncio.get_running_loop()
         now = loop.time()
 
-        # After a stall, several limits may have passed. Process them in order of the limits, not of the calls to set().
+        # After a stall, several deadlines may have passed: process them in order of time, not of the set() calls.
         late = sorted(
             (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
         )
         for end, _, each in late:
-            # The call for an earlier operation may have completed this operation or extended its limit.
+            # The call for an earlier operation may have completed this operation or extended its deadline.
             if self._ends.get(each) == end:
                 self.drop(each)
                 self._late(each)

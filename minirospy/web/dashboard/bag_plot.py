@@ -18,8 +18,8 @@ __all__ = ["BagPath", "Operand", "SeriesRequest", "fields_of", "series_of"]
 
 _MAX_COLUMNS = 5_000  # maximum number of columns: with MAX_SERIES series, 2,000,000 points
 _MAX_SERIES = 100  # maximum number of series per request
-_MARGIN_SECONDS = 10.0  # seconds before a range in which to look for a point of the subtrahend
-_WIDER = 4  # factor by which this margin grows until it contains a point of the subtrahend
+_MARGIN_SECONDS = 10.0  # seconds before a range that are searched first for a point of the subtrahend
+_WIDER = 4  # factor by which this margin grows until it contains such a point
 
 
 class Operand(NamedTuple):

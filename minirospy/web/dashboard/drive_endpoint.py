@@ -84,11 +84,11 @@ class Joystick:
 
     @property
     def is_zero(self) -> bool:
-        """Return whether no control is held."""
+        """Return whether all axes are 0 and no button is pressed."""
         return not any(self.axes) and not any(self.buttons)
 
     def zero(self) -> Joystick:
-        """Return a copy of the joystick's state with no control held."""
+        """Return a joystick state whose axes are 0 and whose buttons are released."""
         return Joystick((0.0,) * len(self.axes), (0,) * len(self.buttons))
 
 

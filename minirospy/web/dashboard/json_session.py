@@ -249,7 +249,7 @@ _S = TypeVar("_S", bound=JsonSession)
 
 
 class JsonEndpoint(Generic[_S]):
-    """Opens a session, created by ``session``, for each client that uses the endpoint's sub-protocol."""
+    """Serves a WebSocket sub-protocol: calls ``session`` to create the session of each client."""
 
     def __init__(self, subprotocol: str, session: Callable[[WebClient], _S]) -> None:
         self.sessions: set[_S] = set()

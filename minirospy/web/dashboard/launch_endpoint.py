@@ -161,7 +161,7 @@ class LaunchSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the launches if any of them has changed, and new lines of the shown log."""
+        """Send the list of launches if it has changed, and new lines of the log that the page shows."""
         # Read this before sending: if a launch ends while data is being sent, another call must send its final state.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()

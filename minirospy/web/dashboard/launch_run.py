@@ -170,7 +170,7 @@ class LaunchRun:
         return process.stdout_file if process else None
 
     def stop(self) -> None:
-        """Start to stop all nodes, without waiting for them. May be called from any thread."""
+        """Begin to stop all nodes, and return without waiting for them. May be called from any thread."""
         with self._lock:
             self._is_stopped = True
             if self._state in ("starting", "running"):

@@ -75,7 +75,7 @@ class OperationSession(Protocol):
         """Send messages that are already encoded as JSON or CBOR."""
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status message if the client has requested its level."""
+        """Send a status message if the client has requested messages of this level."""
 
     def count(self) -> None:
         """Count this client's memory towards the server's budget."""

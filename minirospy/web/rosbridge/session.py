@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 # Bytes of memory that a parsed operation takes per byte of text, if it contains objects or lists of numbers.
 _VALUE_FACTOR = 4
 
-# maximum size of a CBOR message from a read-only client: its requests are small, and each byte may become a value
+# maximum bytes of a CBOR message from a read-only client: its requests are small, and each byte may decode to an object
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4
@@ -141,7 +141,7 @@ class RosbridgeSession:
                 self.client.send_text(message)
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status message if the client has requested its level. Log warnings and errors."""
+        """Send a status message if the client has requested messages of this level. Log warnings and errors."""
         if level <= self._level:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:

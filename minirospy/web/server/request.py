@@ -59,7 +59,7 @@ class RequestHead(NamedTuple):
 
 
 def read_head(request: Request) -> RequestHead:
-    """Return the target and headers of a request. The last of repeated headers counts."""
+    """Return the target and headers of a request. If a header is repeated, the last one is used."""
     return RequestHead(request.path, {name.lower(): value for name, value in request.headers.raw_items()})
 
 

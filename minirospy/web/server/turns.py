@@ -70,7 +70,7 @@ class Share:
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
         self.queue = queue  # the queue that contains the client: interactive or bulk
-        # seconds used; raised to at least the queue's tag whenever the client becomes active
+        # seconds used, divided by the weight; a client that becomes active starts at ``queue.served`` or later
         self.tag = queue.served
         self.weight = 1.0  # set when the client's rights are known
         # expected seconds of the client's next job, estimated from earlier ones

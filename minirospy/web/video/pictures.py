@@ -62,7 +62,7 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
             image = _colors(pixels(raw), encoding)
         else:
             raise BridgeError(f"messages of [{type_}] are not images: {IMAGE} and {COMPRESSED} are")
-        image = _changed(image, picture)
+        image = _transformed(image, picture)
         return _file(image, picture), f"image/{picture.format or 'jpeg'}"
     except BridgeError:
         raise
@@ -188,8 +188,8 @@ def _of_bayer(image: Pixels, pattern: str) -> Pixels:
     return cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))  # type: ignore[no-any-return]
 
 
-def _changed(image: Pixels, picture: Picture) -> Pixels:
-    """Return an image scaled to the requested size and, if requested, rotated by 180 degrees."""
+def _transformed(image: Pixels, picture: Picture) -> Pixels:
+    """Return the image scaled to the requested size and, if requested, rotated by 180 degrees."""
     if picture.is_inverted:
         image = image[::-1, ::-1]
     height, width = image.shape[:2]

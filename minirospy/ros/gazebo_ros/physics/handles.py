@@ -335,7 +335,7 @@ class SimJoint:
         engine.is_stale = True
 
     def bind(self) -> None:
-        """Look up MuJoCo's ids after a compilation and restore the motor."""
+        """Look up the joint in the newly compiled MuJoCo model, and restore the motor's settings there."""
         if not self.scoped or self.record.kind == "ball":
             return
         row = self.engine.model.joint(self.scoped)

@@ -156,7 +156,7 @@ class RealtimeActionServer:
             self._finish(active, _call)
 
     def _finish(self, active: _Active, call: Callable[[Callable[[], None]], None]) -> None:
-        """Report the outcome of a goal that is ending; without an outcome, the goal is cancelled."""
+        """Report the outcome of a goal that is ending. A goal without an outcome is reported as cancelled."""
         if self._active is active:
             self._active = None
         active.goal.finish(CANCELLED)

@@ -238,7 +238,7 @@ class Player:
             self._playback.leave_end()
 
     def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
-        """Publish each latched topic's last message before ``start``; return the messages from ``start`` on."""
+        """Return the messages from ``start`` on, after publishing each latched topic's last earlier message."""
         messages.join()
         selection = selection._replace(start=start)
         for number, message in self._bags.last_latched(selection):

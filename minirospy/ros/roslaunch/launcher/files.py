@@ -143,7 +143,7 @@ def _launch_files_of(package: str, packages: Packages) -> str:
 
 
 def _in_one_word(word: str, packages: Packages) -> str:
-    """Return a hint for a package and a file written as one path."""
+    """Return a hint for a user who typed ``package/file`` in place of ``package file``."""
     package, _, file = word.partition("/")
     return _command_hint(package, file.rpartition("/")[2], packages)
 

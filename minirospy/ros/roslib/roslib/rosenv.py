@@ -72,7 +72,7 @@ def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
 
 
 def makedirs_with_parent_perms(p: str) -> None:
-    """Create a folder and its parents."""
+    """Create a folder and its missing parents. Unlike in ROS, they get the default permissions."""
     os.makedirs(p, exist_ok=True)
 
 

@@ -197,7 +197,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat the invalid text as field names, which no message has.
+        # Treat the invalid text as field names: no message has such fields, so they are reported as missing.
         steps = tuple(Step(each, None) for each in fields)
 
     def report(error: NotFoundError | IndexError) -> None:

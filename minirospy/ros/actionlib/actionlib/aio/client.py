@@ -245,7 +245,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         asyncio.get_running_loop().call_later(SERVER_SECONDS, self._check_server, goals, self._statuses)
 
     def _check_server(self, goals: list[ClientGoal[_R, _F]], last: StatusList | None) -> None:
-        """Mark ``goals`` as LOST if no server is connected, else those missing from a status list newer than ``last``."""
+        """Mark ``goals`` missing from a status list newer than ``last`` as LOST, or all if no server is connected."""
         if self._is_closed or self._node.is_shutdown:
             return
         statuses, is_connected = self._statuses, self._status.num_connections > 0
