@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from minirospy.aio.handle import Handle, pieces_of, registered
 from minirospy.base.errors import MasterUnreachableError, ROSException, ROSInterruptException, RpcError
 from minirospy.core.idl.message import args_kwds_to_message
-from minirospy.core.idl.protocols import Message, is_stamped
+from minirospy.core.idl.protocols import Message, declared, is_stamped
 from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, serialize_frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
@@ -45,7 +45,7 @@ class Subscription(Handle, Generic[_M_co]):
         self._node = node
         self._message_class = message_class
         self._misfits = RateLimitedLogger(node.log)
-        self._takes_memoryview = getattr(message_class, "_takes_memoryview", False)
+        self._takes_memoryview = bool(declared(message_class, "deserialize", "_takes_memoryview"))
         self._queue: deque[tuple[bytes | memoryview, Header]] = deque(maxlen=queue_size)
         self._arrived = asyncio.Event()
         self._ended = node.is_shutdown

@@ -27,7 +27,7 @@ from minirospy.client.topic import (
     unregister_from_master,
 )
 from minirospy.core.idl.message import args_kwds_to_message
-from minirospy.core.idl.protocols import Message
+from minirospy.core.idl.protocols import Message, declared
 from minirospy.core.wire.framing import LargeFrame, Pieces
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.runtime.transport.workers import InOrder
@@ -150,8 +150,8 @@ class PublishedTopic(SharedTopic):
         self._had_subscriber = False
         self._sequence = itertools.count(1)
         self._has_header = bool(getattr(data_class, "_has_header", False))
-        # Only classes that minirospy has generated declare it.
-        self._after_array: int | None = getattr(data_class, "_bytes_after_array", None)
+        after_array = declared(data_class, "serialize", "_bytes_after_array")
+        self._after_array = after_array if isinstance(after_array, int) else None
         self._registered = False
 
     def join(

@@ -24,6 +24,7 @@ from minirospy.client.session import NEW_SECONDS, current_session
 from minirospy.client.topic import unregister_from_master
 from minirospy.client.type_advice import advice_for_service_class
 from minirospy.core.idl.message import number_header
+from minirospy.core.idl.protocols import declared
 from minirospy.core.idl.service import to_response
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.service import RESPONSE_HEAD, parse_response_head, serialize_failure
@@ -78,7 +79,7 @@ class Service(Generic[_S_co]):
         self.buff_size = buff_size
         self.handler = handler
         self.error_handler = error_handler or self._log_error
-        self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
+        self._takes_memoryview = bool(declared(self.request_class, "deserialize", "_takes_memoryview"))
         self._since = time.monotonic()
         self.seq = 0  # number of responses so far; it becomes ``seq`` in responses that start with a header
         self._server: ServiceServer | None = None

@@ -30,6 +30,7 @@ from minirospy.base.times import Duration
 from minirospy.client.session import Session, current_session
 from minirospy.client.type_advice import advice_for_service_class
 from minirospy.core.idl.message import args_kwds_to_message, number_header
+from minirospy.core.idl.protocols import declared
 from minirospy.core.wire.tcpros import ANY
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class ServiceProxy(Generic[_S_co]):
         self.uri: str | None = None  # last known URI of the service, ``rosrpc://host:port``
 
         self._headers = dict(headers or {})
-        self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
+        self._takes_memoryview = bool(declared(self.response_class, "deserialize", "_takes_memoryview"))
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
         # Number of calls that reached the service; it becomes ``seq`` in requests that start with a header.

@@ -18,8 +18,8 @@ from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import NEW_SECONDS, Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
 from minirospy.client.type_advice import advice_for_callback
-from minirospy.core.idl.protocols import Message
-from minirospy.core.wire.framing import Frame
+from minirospy.core.idl.protocols import Message, declared
+from minirospy.core.wire.framing import Frame, SplitFrame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
@@ -156,11 +156,19 @@ class _Callback(NamedTuple):
 
 
 class _Receiver(NamedTuple):
-    """A message class, its callbacks, and whether the class can deserialize a memoryview (genpy's classes cannot)."""
+    """A message class, whether it can deserialize a memoryview and a split frame (genpy's cannot), and its callbacks."""
 
     data_class: type[Message]
     takes_memoryview: bool
+    takes_split_frames: bool
     callbacks: tuple[_Callback, ...]
+
+    @classmethod
+    def of(cls, data_class: type[Message], callbacks: tuple[_Callback, ...]) -> _Receiver:
+        """Return a receiver with what the class declares."""
+        takes_memoryview = bool(declared(data_class, "deserialize", "_takes_memoryview"))
+        takes_split_frames = bool(declared(data_class, "deserialize", "_takes_split_frames"))
+        return cls(data_class, takes_memoryview, takes_split_frames, callbacks)
 
 
 class SubscribedTopic(SharedTopic):
@@ -331,14 +339,12 @@ class SubscribedTopic(SharedTopic):
                 callbacks.append(_Callback(handle.callback, handle.callback_args))
         by_class.setdefault(self.data_class, []).extend(self._added)
         self._receivers = tuple(
-            _Receiver(cls, getattr(cls, "_takes_memoryview", False), tuple(callbacks))
-            for cls, callbacks in by_class.items()
-            if callbacks
+            _Receiver.of(cls, tuple(callbacks)) for cls, callbacks in by_class.items() if callbacks
         )
 
     def replay(self, data_class: type[Message], callback: _Callback, links: tuple[InLink, ...]) -> None:
         """Call a newly added callback with the last message of each latched publisher."""
-        receivers = (_Receiver(data_class, False, (callback,)),)
+        receivers = (_Receiver(data_class, False, False, (callback,)),)
         for link in links:
             frame = link.latched
             if frame is None:
@@ -358,10 +364,12 @@ class SubscribedTopic(SharedTopic):
 
     def _deliver(self, frame: Frame, header: Header, receivers: tuple[_Receiver, ...] | None = None) -> None:
         statistics = None if receivers else self._statistics
-        for data_class, takes_memoryview, callbacks in receivers or self._receivers:
+        is_split = isinstance(frame, SplitFrame)
+        for data_class, takes_memoryview, takes_split_frames, callbacks in receivers or self._receivers:
             message = data_class()
+            takes = takes_split_frames if is_split else takes_memoryview
             try:
-                message.deserialize(frame if takes_memoryview else bytes(frame))
+                message.deserialize(frame if takes else bytes(frame))
             except Exception as error:  # noqa: BLE001 - whatever a foreign message class raises on bad bytes
                 self._misfits.error(
                     "a message on %s from %s does not fit %s: %s",

@@ -221,6 +221,37 @@ print(eventually(lambda: got), got[0].data is frames[0].array, got[0].is_dense, 
     assert (output, errors) == ("True True True True\n", "")
 
 
+def test_a_class_that_overrides_deserialize_receives_bytes(start: Start) -> None:
+    """As in rospy: such a class keeps them, or reads them as a generated class does not."""
+    output, errors = finished(
+        start("""
+from sensor_msgs.msg import PointCloud2
+class Cloud(PointCloud2):
+    def deserialize(self, data):
+        self.received = data
+        return self
+class Raw(rospy.AnyMsg):
+    def deserialize(self, data):
+        self._buff = data
+        return self
+rospy.init_node("both")
+publisher = rospy.Publisher("/t", PointCloud2, queue_size=10)
+relay = rospy.Publisher("/copy", Raw, queue_size=10)
+clouds, copies = [], []
+rospy.Subscriber("/t", Cloud, clouds.append)
+rospy.Subscriber("/t", Raw, relay.publish)
+rospy.Subscriber("/copy", PointCloud2, copies.append)
+publisher.wait_for_subscribers()
+relay.wait_for_subscribers()
+for size in (100, 200_000):
+    publisher.publish(PointCloud2(data=bytes(size), is_dense=True))
+print(eventually(lambda: len(clouds) == len(copies) == 2))
+print([type(cloud.received).__name__ for cloud in clouds], [len(copy.data) for copy in copies], copies[1].is_dense)
+""")
+    )
+    assert (output, errors) == ("True\n['bytes', 'bytes'] [100, 200000] True\n", "")
+
+
 def test_numpy_scalars_are_values(start: Start) -> None:
     pytest.importorskip("numpy")
     output, _ = finished(

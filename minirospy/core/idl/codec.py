@@ -16,7 +16,7 @@ from minirospy.core.idl.digest import Lookup
 from minirospy.core.idl.source import Source, python_name
 from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 
-__all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
+__all__ = ["bytes_after_array", "keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
 _SPARE = 10_000  # maximum number of zero-size elements, in addition to one per byte of the message
@@ -77,23 +77,17 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def bytes_after_array(spec: MessageSpec, lookup: Lookup) -> int | None:
-    """Return the number of bytes after a message's last field of variable length, if that is a byte array.
+    """Return the number of bytes after a message's last field of variable length if that is a byte array, else None.
 
-    Return 0 for a string at the end, too, and None for any other message. A message with such a number may be sent in parts,
-    as a split frame (``core/wire/framing``), because ``deserialize`` reads the array and the fields after it by slices. Fields
-    after a string are not read so, because that would slow down every small message whose header is followed by numbers.
+    A message with such a number may be sent in parts, as a split frame (``core/wire/framing``), because ``deserialize``
+    reads the array and the fields after it by slices.
     """
     chunks = list(_chunks(spec.fields, "", lookup))
     letters = ""
     if chunks and chunks[-1].tail is None:
         letters = "".join(leaf.letters for leaf in chunks.pop().run)
     last = chunks[-1].tail if chunks else None
-    if last is None or not last.has_length:
-        return None
-    is_read_by_slices = last.type.is_bytes or (
-        last.type.base == "string" and not last.type.is_array and not letters
-    )
-    return _size(letters) if is_read_by_slices else None
+    return _size(letters) if last and last.has_length and last.type.is_bytes else None
 
 
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:

@@ -325,6 +325,7 @@ class _Module:
             line(f"_takes_memoryview = {keeps_buffer(spec, self._lookup)}")
             if (after := bytes_after_array(spec, self._lookup)) is not None:
                 line(f"_bytes_after_array = {after}")
+                line("_takes_split_frames = True")
             if lazy:
                 line(f"_letters = {lazy!r}")
             for constant in spec.constants:

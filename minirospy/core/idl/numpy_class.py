@@ -13,7 +13,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.base.installation import install_command
 from minirospy.core.idl.arrays import arrays_from_bytes
 from minirospy.core.idl.message import Message as BaseMessage
-from minirospy.core.idl.protocols import Buffer, Message, Writer
+from minirospy.core.idl.protocols import Buffer, Message, Writer, declared
 
 __all__ = ["NumpyMissingError", "numpy_class"]
 
@@ -67,7 +67,11 @@ def _own_methods(message_class: type[Message], numpy: ModuleType) -> dict[str, o
         return arrays_from_bytes(self, numpy)
 
     # minirospy's serialize accepts numpy arrays as well as lists.
-    return {"deserialize": deserialize}
+    flags = ("_takes_memoryview", "_takes_split_frames")
+    return {
+        "deserialize": deserialize,
+        **{name: declared(message_class, "deserialize", name) for name in flags},
+    }
 
 
 def _genpy_methods(_: type[Message], numpy: ModuleType) -> dict[str, object]:

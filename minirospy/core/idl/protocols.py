@@ -23,6 +23,7 @@ __all__ = [
     "ServiceClass",
     "Stamped",
     "Writer",
+    "declared",
     "is_message",
     "is_stamped",
 ]
@@ -159,6 +160,15 @@ class Action(Message, Protocol):
     @property
     def action_feedback(self) -> ActionFeedback:
         """The action's feedback message."""
+
+
+def declared(message_class: type[Message], method: str, name: str) -> object:
+    """Return the class attribute ``name``, which describes a generated method; None if a subclass overrides the method.
+
+    Such a subclass inherits the attribute, but need not read or write the message as the generated method does.
+    """
+    owner = next((each for each in message_class.__mro__ if method in vars(each)), None)
+    return vars(owner).get(name) if owner else None
 
 
 def is_message(value: object) -> TypeGuard[Message]:

@@ -3,10 +3,10 @@
 The reader owns the buffer that a socket receives into, so that bytes are copied only once:
 ``n = sock.recv_into(reader.space()); for frame in reader.received(n): ...``
 
-If a subscriber's header has ``split_frames=2``, a large message is sent as a split frame if its last field of variable
-length is a byte array: the length with its highest bit set, 4 bytes with the array's size, 4 bytes with the size of the
-fields after it, then the unchanged message. The subscriber can then read the array into a separate object, which becomes
-the field without another copy.
+If a subscriber's header has ``split_frames=2``, a large message is sent as a split frame if its class declares a byte array
+as its last field of variable length: the length with its highest bit set, 4 bytes with the array's size, 4 bytes with the
+size of the fields after it, then the unchanged message. The subscriber can then read the array into a separate object,
+which becomes the field without another copy.
 Source: http://wiki.ros.org/ROS/TCPROS, docs/transports.md.
 """
 
@@ -110,7 +110,7 @@ class Pieces(list[Any]):
         small: list[bytes] = []
         for piece in self:
             # Copy any type except bytes, because the caller may change the data before it is sent.
-            whole = piece if isinstance(piece, bytes) else bytes(piece)
+            whole = piece if type(piece) is bytes else bytes(piece)
             if len(whole) < CHUNK:
                 small.append(whole)
             else:
@@ -120,10 +120,14 @@ class Pieces(list[Any]):
         if small:
             joined.append(b"".join(small))
         size = sum(map(len, joined))
-        match joined:
-            case [head, array, *rest] if sum(map(len, rest)) == after_array and may_split(head, len(array)):
-                return LargeFrame(tuple(joined), size, len(array))
-        return LargeFrame(tuple(joined), size)
+        # The class writes the array, and then the fields after it, if there are any, together. Compare identity, because
+        # an earlier number may happen to equal the size of other pieces that were joined.
+        has_rest = bool(after_array)
+        may_be_split = (
+            after_array is not None and len(joined) == 2 + has_rest and joined[1] is self[-1 - has_rest]
+        )
+        array = len(joined[1]) if may_be_split and may_split(joined[0], len(joined[1])) else 0
+        return LargeFrame(tuple(joined), size, array)
 
 
 class SplitFrame(bytes):

@@ -29,9 +29,8 @@ __all__ = [
 
 _NOT_A_NAME = "field [callerid] contains illegal chars"
 
-LARGE_MESSAGES = (
-    "2"  # version of split frames and of the ring; a peer that declares another one receives normal frames
-)
+# The version of split frames and of the ring's announcements. A subscriber that declares another one receives normal frames.
+LARGE_MESSAGES = "2"
 
 ANY = "*"  # type and md5sum sent by a peer that accepts any type
 

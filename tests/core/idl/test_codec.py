@@ -167,17 +167,15 @@ def leaves(message: Any) -> Iterator[tuple[str, Any]]:
 
 
 def last_array(message: Any) -> tuple[bytes, int] | None:
-    """Return a message's last byte array and the number of bytes after it, or its last string if nothing follows.
+    """Return a message's last byte array and the number of bytes after it.
 
-    Return None if another field of variable length, or an array of numbers, comes later.
+    Return None if a string or another array, except bytes of a fixed number, comes later.
     """
     after = 0
     for type_, value in reversed(list(leaves(message))):
         base, bracket, length = type_.partition("[")
         if type_ in ("uint8[]", "char[]"):
             return value, after
-        if type_ == "string" and not after:
-            return value.encode(), 0
         if type_ == "string" or (bracket and (base not in ("uint8", "char") or length == "0]")):
             return None
         after += len(wire_field(value, type_))

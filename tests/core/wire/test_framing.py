@@ -134,8 +134,8 @@ def test_large_pieces_are_not_joined() -> None:
     assert isinstance(frame, LargeFrame)
     assert frame == ((b"ab", large, other, b"cd"), 2 * CHUNK + 9, 0)
     assert frame.pieces[1] is large
-    assert pieces(large).frame() == ((large,), CHUNK)
-    assert pieces(b"a", large).frame() == ((b"a", large), CHUNK + 1)
+    assert pieces(large).frame() == ((large,), CHUNK, 0)
+    assert pieces(b"a", large).frame() == ((b"a", large), CHUNK + 1, 0)
 
 
 def test_large_piece_that_can_change_is_copied() -> None:
@@ -177,7 +177,7 @@ LENGTH = CHUNK.to_bytes(4, "little")
         ([b"head", LENGTH, ARRAY], 0, CHUNK),
         ([LENGTH, ARRAY], 0, CHUNK),
         ([LENGTH, ARRAY, b"1"], 1, CHUNK),
-        ([LENGTH, ARRAY, b"1", b"23"], 3, CHUNK),
+        ([LENGTH, ARRAY, b"123"], 3, CHUNK),
         ([LENGTH, ARRAY, ARRAY], CHUNK, CHUNK),
         # The class does not end with a byte array, even if a number happens to equal the size of the next field.
         ([LENGTH, ARRAY], None, 0),
@@ -186,6 +186,8 @@ LENGTH = CHUNK.to_bytes(4, "little")
         ([LENGTH, ARRAY, LENGTH, ARRAY, b"1"], 1, 0),
         ([LENGTH, ARRAY, b"1"], 0, 0),
         ([ARRAY, b"1"], 1, 0),
+        # The number before many small pieces happens to equal their size when joined.
+        ([ARRAY[4:] + LENGTH, *([b"small"] * (CHUNK // 5)), b"x"], 0, 0),
         ([b"head", ARRAY], 0, 0),
     ],
 )
@@ -230,10 +232,15 @@ def test_split_sizes_of_a_frame() -> None:
         (CHUNK + 10, CHUNK, 2**32 - 1),
     ]:
         words = (
-            f"split message of {size} bytes says that it has an array of {array}, followed by {rest} bytes"
+            f"split message of {size} bytes says that it has an array of {length}, followed by {rest} bytes"
         )
         with pytest.raises(WireError, match=words):
             check_split(size, length, rest)
+
+
+def test_split_frame_that_is_written_again_is_joined() -> None:
+    frame = pieces(SplitFrame(LENGTH, ARRAY, b"rest")).frame()
+    assert frame == ((LENGTH + ARRAY + b"rest",), CHUNK + 8, 0)
 
 
 def test_split_frame_is_read_as_the_whole() -> None:
@@ -255,7 +262,8 @@ def test_split_frame_is_read_as_the_whole() -> None:
 
 
 def test_frame_that_was_split_elsewhere_is_refused() -> None:
-    assert split_frame(LENGTH, ARRAY, b"rest") == SplitFrame(LENGTH, ARRAY, b"rest")
+    frame = split_frame(LENGTH, ARRAY, b"rest")
+    assert (frame.array, frame.rest, bytes(frame)) == (ARRAY, b"rest", LENGTH + ARRAY + b"rest")
     with pytest.raises(WireError, match="not split where its array begins"):
         split_frame(b"head", ARRAY, b"rest")
 

@@ -12,6 +12,7 @@ import pytest
 from minirospy.base.installation import install_command
 from minirospy.core.bag import records
 from minirospy.core.bag.writer import BagWriter
+from minirospy.core.wire.framing import LargeFrame
 from tests.ros.rosbag.conftest import (
     GUARD,
     STRING,
@@ -63,6 +64,25 @@ def test_messages_are_recorded_as_they_came(talker: Talker, start: Start, tmp_pa
     assert [said(one.body) for one in found if one.topic == "/map"] == ["before"]
     assert [one.body[4:] for one in found if one.topic == "/chatter"] == [b"one", large, b"two", b"last"]
     assert {one.callerid for one in found} == {"/talker"}
+
+
+def test_messages_in_parts_are_recorded_whole_and_repeated(
+    talker: Talker, start: Start, tmp_path: Path
+) -> None:
+    latched = talker.advertise("/map", latch=True)
+    data = bytes(range(256)) * 4000
+    body = len(data).to_bytes(4, "little") + data + b"rest"
+    frame = LargeFrame((body[:4], data, body[-4:]), len(body), len(data))
+    process = start(
+        "record", "--split", "--size", "1", "--repeat-latched", "--chunksize", "0", "-O", "s", "/map"
+    )
+    connected(latched)
+    for _ in range(3):
+        latched.publish(frame)
+    wait_until((tmp_path / "s_1.bag.active").exists)
+    assert end(process)[0] == 0
+    found = [messages(tmp_path / f"s_{number}.bag") for number in (0, 1)]
+    assert all(file and all(one.body == body for one in file) for file in found)
 
 
 def test_all_topics_are_found_while_it_runs(talker: Talker, start: Start, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from minirospy.base.errors import WireError
 from minirospy.core.wire import framing
-from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
+from minirospy.core.wire.framing import CHUNK, SPLIT, Frame, LargeFrame, Pieces, SplitFrame, serialize_frame
 from minirospy.runtime.transport import links, readers
 from minirospy.runtime.transport.loop import LoopThread
 from minirospy.runtime.transport.sockets import is_writable
@@ -398,7 +398,15 @@ def test_a_peer_that_ends_in_the_middle_of_a_large_message(
     assert link.waiting == 0
 
 
-@pytest.mark.parametrize("start", [b"\x50\xc3\0\x80", b"\x50\xc3\x01\x80\x40\xc3\x01\0headABCD"])
+@pytest.mark.parametrize(
+    "start",
+    [
+        struct.pack("<I", 115_536 | SPLIT),
+        struct.pack("<II", 115_536 | SPLIT, 115_520),
+        struct.pack("<III", 115_536 | SPLIT, 115_520, 0) + b"headABCD",
+        struct.pack("<III", CHUNK + 12 | SPLIT, CHUNK, 8) + struct.pack("<I", CHUNK) + bytes(CHUNK) + b"rest",
+    ],
+)
 def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
     pair: tuple[socket.socket, socket.socket], start: bytes
 ) -> None:
@@ -410,19 +418,21 @@ def test_a_publisher_that_ends_in_the_middle_of_a_split_frame(
 
 
 @pytest.mark.parametrize(
-    ("size", "array", "head", "words"),
+    ("size", "array", "rest", "head", "words"),
     [
-        (200_000, 100_000, bytes(100_000), "not split where its array begins"),
-        (200_000, 199_999, b"", "ends with an array of 199999"),
-        (200_000, 10, b"", "ends with an array of 10"),
-        (100, 90, b"", "ends with an array of 90"),
-        (1 << 30 | 1, 90, b"", "over the limit"),
+        (200_000, 100_000, 0, bytes(100_000), "not split where its array begins"),
+        (200_000, 199_999, 0, b"", "has an array of 199999, followed by 0"),
+        (200_000, 100_000, 99_997, b"", "has an array of 100000, followed by 99997"),
+        (200_000, 100_000, 2**32 - 1, b"", "has an array of 100000, followed by 4294967295"),
+        (200_000, 10, 0, b"", "has an array of 10"),
+        (100, 90, 0, b"", "has an array of 90"),
+        (1 << 30 | 1, 90, 0, b"", "over the limit"),
     ],
 )
 def test_split_frames_that_lie(
-    pair: tuple[socket.socket, socket.socket], size: int, array: int, head: bytes, words: str
+    pair: tuple[socket.socket, socket.socket], size: int, array: int, rest: int, head: bytes, words: str
 ) -> None:
-    data = struct.pack("<II", size | 1 << 31, array) + head + bytes(array if head else 0)
+    data = struct.pack("<III", size | SPLIT, array, rest) + head + bytes(array if head else 0)
     sender = threading.Thread(target=pair[1].sendall, args=(data,))
     sender.start()
     with pytest.raises(WireError, match=words):

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from minirospy.base.errors import WireError
-from minirospy.core.wire import ring
+from minirospy.core.wire import ring, tcpros
 from minirospy.core.wire.framing import CHUNK, Frame, LargeFrame, SplitFrame, serialize_frame
 from minirospy.core.wire.ring import Step
 from minirospy.core.wire.tcpros import InterfaceType, subscriber_header
@@ -595,6 +595,21 @@ def test_a_subscriber_of_another_user_uses_the_socket(mouth: Mouth, monkeypatch:
     assert mouth.steps() == [None]
     assert list(map(bytes, ear.frames)) == list(map(whole, frames))
     ear.close()
+
+
+def test_a_subscriber_of_another_version_is_sent_whole_frames_and_no_ring(
+    mouth: Mouth, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tcpros, "LARGE_MESSAGES", "1")  # in the subscriber's header
+    sock = mouth.connect()
+    frames = [cloud(number, 100_000) for number in range(3)]
+    thread = threading.Thread(target=mouth.publish, args=frames)
+    thread.start()
+    expected = b"".join(serialize_frame(whole(frame)) for frame in frames)
+    assert take(sock, len(expected)) == expected
+    thread.join(SECONDS)
+    assert mouth.steps() == [None]
+    sock.close()
 
 
 def test_a_subscriber_that_does_not_know_rings_is_sent_frames(mouth: Mouth) -> None:

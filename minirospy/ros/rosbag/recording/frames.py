@@ -15,6 +15,8 @@ class ReceivedFrame(AnyMsg):
     ``frame`` contains its bytes, valid only during the callback unless ``frame`` is ``bytes``.
     """
 
+    _takes_memoryview = True
+    _takes_split_frames = True
     __slots__ = ["frame"]
     frame: Buffer
 
