@@ -29,7 +29,7 @@ __all__ = ["Classroom", "Shared", "Student", "class_table", "gather", "merge", "
 
 MAX_STUDENTS = 200  # rows, and publishers of topics
 MAX_EXERCISES = 100  # columns: the course has 15
-MAX_MESSAGE = 150_000  # characters: 15 exercises with 5 failures of 300 characters, each as \\u0000
+MAX_MESSAGE = 150_000  # characters: 15 exercises with 5 failures of 300 characters, each as \u0000
 _MAX_BYTES = 4 + 4 * MAX_MESSAGE  # a length, and at most four bytes for a character
 _TYPE = "std_msgs/String"
 _TOOL = "check_class"
@@ -148,14 +148,14 @@ def merge(parameters: object, shared: Iterable[tuple[str, Shared]]) -> list[Stud
                 student.name = _printable(value["student"])
             add(student, _results(value.get("exercises")))
 
-    with_topics: set[str] = set()
+    with_topics: dict[str, str] = {}  # the row's name -> its topic
     for topic, found in shared:
         robot = topic[1 : -len(CLASS_PARAMETER)]
-        # Computers of one name, which have no parameters, have a row each.
-        is_known = found.key in rows and found.key not in with_topics
+        # Computers of one name, which have no parameters, have a row each. One computer may have two publishers of its topic.
+        is_known = found.key in rows and with_topics.get(found.key, topic) == topic
         name = found.key if is_known else f"{robot}/{found.key}"
         if student := row(name, found.key):
-            with_topics.add(name)
+            with_topics[name] = topic
             student.robot = _printable(robot)
             student.name = found.student or student.name
             add(student, found.results.items())

@@ -140,6 +140,15 @@ def test_topics_at_a_master_are_gathered_with_its_parameters(master: str, publis
     assert not found.unreadable
 
 
+def test_computer_with_two_publishers_has_one_row(master: str, publish: Publish) -> None:
+    with contextlib.closing(MasterProxy(master, "/test")) as proxy:
+        proxy.set_param("/minirospy_class/anna", {"student": "Anna", "exercises": {"led": PASSED}})
+    for name in ("first", "second"):
+        publish("/minirospy_class", text_of("anna", count=PASSED), name=name)
+    [student] = gather(master, Environment.read(), LONG).students
+    assert (student.title, *student.results) == ("Anna", "led", "count")
+
+
 def test_class_has_another_master_than_the_environment(
     master: str, publish: Publish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
