@@ -63,7 +63,7 @@ class Shared(NamedTuple):
 
 
 class Classroom(NamedTuple):
-    """The students, sorted by name, and for each topic that could not be read a sentence with the reason."""
+    """The students, sorted by name, and for what could not be read a phrase with the reason, such as a topic."""
 
     students: list[Student]
     unreadable: list[str]
@@ -89,9 +89,12 @@ def gather(uri: str, environment: Environment, patience: float = SECONDS) -> Cla
         for topic in sorted(publishers)
         if topic.endswith(CLASS_PARAMETER) and types.get(topic) == _TYPE
         for publisher in sorted(publishers[topic])
-    ][:MAX_STUDENTS]
+    ]
+    beyond = [f"more than {MAX_STUDENTS} publishers"] if len(sources) > MAX_STUDENTS else []
+    sources = sources[:MAX_STUDENTS]
     received = _receive(sources, environment._replace(master_uri=uri), patience) if sources else {}
-    shared, unreadable = [], []
+    shared: list[tuple[str, Shared]] = []
+    unreadable = []
     for source in sources:
         topic, publisher = source
         found = _read(received[source]) if source in received else None
@@ -100,7 +103,7 @@ def gather(uri: str, environment: Environment, patience: float = SECONDS) -> Cla
         else:
             why = "its message is not a student's" if source in received else "it sent no message"
             unreadable.append(f"{topic} of {publisher}: {why}")
-    return Classroom(merge(parameters, shared), unreadable)
+    return Classroom(merge(parameters, shared), beyond + unreadable)
 
 
 def read_shared(text: str) -> Shared | None:

@@ -180,6 +180,15 @@ def test_publisher_that_sends_nothing_is_named(master: str, publish: Publish) ->
     ]
 
 
+def test_publishers_beyond_the_limit_are_named(master: str) -> None:
+    with contextlib.closing(MasterProxy(master, "/gone")) as proxy:
+        for index in range(MAX_STUDENTS + 1):
+            proxy.register_publisher(f"/r{index}/minirospy_class", "std_msgs/String", "http://localhost:1")
+    found = gather(master, Environment.read(), 0.0)
+    assert found.unreadable[0] == "more than 200 publishers"
+    assert len(found.unreadable) == MAX_STUDENTS + 1
+
+
 def test_topic_of_another_type_is_ignored(master: str, publish: Publish) -> None:
     publish("/robot1/minirospy_class", None, type_="std_msgs/Int32")
     assert gather(master, Environment.read(), LONG) == ([], [])
