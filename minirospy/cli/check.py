@@ -162,7 +162,7 @@ def _check(
             share_state(record, environment)
         return 0
     if shows_class:
-        return _show_class(record.master or environment.master_uri, environment)
+        return _show_class(record.master or environment.master_uri, environment, patience)
     if exercise is None:
         return _list(record)
     try:
@@ -279,12 +279,13 @@ def _state(record: Record, exercise: Exercise) -> str:
     return "-" if result is None else "passed" if result.ever else "not passed"
 
 
-def _show_class(uri: str, environment: Environment) -> int:
+def _show_class(uri: str, environment: Environment, patience: float) -> int:
     from minirospy.base.escape import escaped
     from minirospy.course.classroom import class_table, gather
     from minirospy.course.exercise import built_in_names
+    from minirospy.course.results import SECONDS
 
-    students, unreadable = gather(uri, environment)
+    students, unreadable = gather(uri, environment, patience * SECONDS)
     if unreadable:
         more = f", and {len(unreadable) - _MAX_NAMED} more" if len(unreadable) > _MAX_NAMED else ""
         warn(escaped(f"results are missing: {'; '.join(unreadable[:_MAX_NAMED])}{more}"))

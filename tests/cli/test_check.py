@@ -13,9 +13,10 @@ import pytest
 from std_msgs.msg import String
 
 from minirospy.base.environment import Environment
-from minirospy.course.classroom import Student, gather
+from minirospy.course import classroom
+from minirospy.course.classroom import Classroom, Student, gather
 from minirospy.course.exercise import built_in_names
-from minirospy.course.results import CLASS_PARAMETER, Record
+from minirospy.course.results import CLASS_PARAMETER, SECONDS, Record
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
@@ -252,7 +253,7 @@ def test_class_shows_students_whose_topics_a_fleet_forwards(command: Command, ma
         ):
             publisher = node.publisher(f"/{robot}/minirospy_class", String, latch=True)
             publisher.publish(String(data))
-        result = command("check", "--class")
+        result = command("check", "--class", "--patience", "20")
         assert result.status == 0
         assert result.out.splitlines() == [
             "             led",
@@ -263,6 +264,20 @@ def test_class_shows_students_whose_topics_a_fleet_forwards(command: Command, ma
         assert result.err == (
             f"WARNING: results are missing: /eve/minirospy_class of {node.name}: its message is not a student's\n"
         )
+
+
+def test_patience_multiplies_the_time_limit_of_the_class(
+    command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits: list[float] = []
+
+    def gather(_uri: str, _environment: Environment, patience: float) -> Classroom:
+        limits.append(patience)
+        return Classroom([], [])
+
+    monkeypatch.setattr(classroom, "gather", gather)
+    assert command("check", "--class", "--patience", "20").status == 0
+    assert limits == [20 * SECONDS]
 
 
 @pytest.mark.parametrize("when", [1e300, float("inf"), float("nan"), -1e17, "noon", [1]])

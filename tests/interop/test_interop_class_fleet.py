@@ -167,5 +167,5 @@ def test_students_of_a_fleet_are_shown_with_their_boards_and_results(
     # A later result is shown.
     students[1].check("odom")
     page.wait(f"return {second}.querySelector('.class-yes')")
-    lines = teacher.output("check", "--class").splitlines()
+    lines = teacher.output("check", "--class", "--patience", "20").splitlines()
     assert lines[:3] == ["             missing_frame", "pi (robot1)  yes", "pi (robot2)  yes"]
