@@ -281,14 +281,16 @@ def _state(record: Record, exercise: Exercise) -> str:
 
 def _show_class(uri: str, environment: Environment, patience: float) -> int:
     from minirospy.base.escape import escaped
-    from minirospy.course.classroom import class_table, gather
+    from minirospy.course.classroom import NO_MESSAGE, class_table, gather
     from minirospy.course.exercise import built_in_names
     from minirospy.course.results import SECONDS
 
     students, unreadable = gather(uri, environment, patience * SECONDS)
     if unreadable:
         more = f", and {len(unreadable) - _MAX_NAMED} more" if len(unreadable) > _MAX_NAMED else ""
-        warn(escaped(f"results are missing: {'; '.join(unreadable[:_MAX_NAMED])}{more}"))
+        is_silent = any(each.endswith(NO_MESSAGE) for each in unreadable)
+        hint = ". `rosnode cleanup` makes the master forget nodes that were killed." if is_silent else ""
+        warn(escaped(f"results may be missing: {'; '.join(unreadable[:_MAX_NAMED])}{more}{hint}"))
     if not students:
         print(
             f"No results at {uri} yet: students type `minirospy check --join {uri} --name NAME` once, or, in a fleet, "

@@ -25,8 +25,9 @@ from minirospy.introspect.messages import Received
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
-__all__ = ["Classroom", "Shared", "Student", "class_table", "gather", "merge", "read_shared"]
+__all__ = ["NO_MESSAGE", "Classroom", "Shared", "Student", "class_table", "gather", "merge", "read_shared"]
 
+NO_MESSAGE = "it sent no message"  # why a publisher is unreadable
 MAX_STUDENTS = 200  # rows, and publishers of topics
 MAX_EXERCISES = 100  # columns: the course has 15
 MAX_MESSAGE = 150_000  # characters: 15 exercises with 5 failures of 300 characters, each as \u0000
@@ -101,7 +102,7 @@ def gather(uri: str, environment: Environment, patience: float = SECONDS) -> Cla
         if found:
             shared.append((topic, found))
         else:
-            why = "its message is not a student's" if source in received else "it sent no message"
+            why = "its message is not a student's" if source in received else NO_MESSAGE
             unreadable.append(f"{topic} of {publisher}: {why}")
     return Classroom(merge(parameters, shared), beyond + unreadable)
 

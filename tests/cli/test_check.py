@@ -262,7 +262,7 @@ def test_class_shows_students_whose_topics_a_fleet_forwards(command: Command, ma
             "pi (robot2), led: it stays dark",
         ]
         assert result.err == (
-            f"WARNING: results are missing: /eve/minirospy_class of {node.name}: its message is not a student's\n"
+            f"WARNING: results may be missing: /eve/minirospy_class of {node.name}: its message is not a student's\n"
         )
 
 
@@ -278,6 +278,16 @@ def test_patience_multiplies_the_time_limit_of_the_class(
     monkeypatch.setattr(classroom, "gather", gather)
     assert command("check", "--class", "--patience", "20").status == 0
     assert limits == [20 * SECONDS]
+
+
+def test_class_names_the_remedy_for_publishers_that_were_killed(command: Command, master: str) -> None:
+    proxy = MasterProxy(master, "/gone")
+    proxy.register_publisher("/robot1/minirospy_class", "std_msgs/String", "http://localhost:1")
+    proxy.close()
+    assert command("check", "--class", "--patience", "0.1").err == (
+        "WARNING: results may be missing: /robot1/minirospy_class of /gone: it sent no message. "
+        "`rosnode cleanup` makes the master forget nodes that were killed.\n"
+    )
 
 
 @pytest.mark.parametrize("when", [1e300, float("inf"), float("nan"), -1e17, "noon", [1]])
