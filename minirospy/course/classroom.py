@@ -11,6 +11,7 @@ import functools
 import json
 import os
 import re
+import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -34,6 +35,8 @@ MAX_MESSAGE = 150_000  # characters: 15 exercises with 5 failures of 300 charact
 _MAX_BYTES = 4 + 4 * MAX_MESSAGE  # a length, and at most four bytes for a character
 _TYPE = "std_msgs/String"
 _TOOL = "check_class"
+_RESULT = {"passed", "ever", "time", "number", "failures"}  # fields of an exercise
+_NOW = {"leds", "buttons", "nodes", "beat"}  # fields of the board's state, which only the page shows
 _NAME = re.compile(rf"[A-Za-z0-9_]{{1,{MAX_KEY}}}")
 
 
@@ -147,10 +150,14 @@ def merge(parameters: object, shared: Iterable[tuple[str, Shared]]) -> list[Stud
             student.results[name] = replace(latest, ever=result.ever or bool(old and old.ever))
 
     for key, value in parameters.items() if isinstance(parameters, dict) else ():
-        if _NAME.fullmatch(key) and isinstance(value, dict) and (student := row(key, key)):
-            if isinstance(value.get("student"), str):
-                student.name = _printable(value["student"])
-            add(student, _results(value.get("exercises")))
+        if not _NAME.fullmatch(key) or not isinstance(value, dict):
+            continue
+        own_name, results = value.get("student"), _results(value.get("exercises"))
+        is_shown = isinstance(own_name, str) or results or _has_any(_NOW, value.get("now"))
+        if is_shown and (student := row(key, key)):
+            if isinstance(own_name, str):
+                student.name = _printable(own_name)
+            add(student, results)
 
     with_topics: dict[str, str] = {}  # the row's name -> its topic
     for topic, found in shared:
@@ -163,7 +170,8 @@ def merge(parameters: object, shared: Iterable[tuple[str, Shared]]) -> list[Stud
             student.robot = _printable(robot)
             student.name = found.student or student.name
             add(student, found.results.items())
-    return sorted(rows.values(), key=lambda student: (student.name.lower(), student.robot))
+    in_order = sorted(rows, key=lambda name: (_letters(rows[name].name), rows[name].robot, name))
+    return [rows[name] for name in in_order]
 
 
 def class_table(students: list[Student], names: list[str]) -> list[list[str]]:
@@ -218,8 +226,21 @@ def _results(exercises: object) -> list[tuple[str, Result]]:
     """Return the results with their exercises' names."""
     found = exercises.items() if isinstance(exercises, Mapping) else ()
     return [
-        (name, result_of(each)) for name, each in found if _NAME.fullmatch(name) and isinstance(each, Mapping)
+        (name, result_of(each)) for name, each in found if _NAME.fullmatch(name) and _has_any(_RESULT, each)
     ]
+
+
+def _has_any(fields: set[str], found: object) -> bool:
+    """Return whether a value is a dictionary with one of the fields; a field's value is no dictionary itself."""
+    return isinstance(found, Mapping) and any(
+        name in fields and not isinstance(each, Mapping) for name, each in found.items()
+    )
+
+
+def _letters(name: str) -> str:
+    """Return a name's letters for sorting: in upper case, without accents."""
+    parts = unicodedata.normalize("NFKD", name)
+    return "".join(each for each in parts if not unicodedata.category(each).startswith("M")).upper()
 
 
 def _printable(text: str) -> str:

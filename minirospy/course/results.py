@@ -229,4 +229,6 @@ def result_of(found: Mapping[str, object]) -> Result:
 
 def _time_of(found: object) -> float:
     """Return the time, or 0 (unknown) if the value is invalid, because any node may have set the parameter."""
-    return float(found) if isinstance(found, int | float) and 0 <= found < _MAX_TIME else 0.0
+    if isinstance(found, bool) or not isinstance(found, int | float) or not 0 <= found < _MAX_TIME:
+        return 0.0
+    return float(found)

@@ -131,6 +131,24 @@ test("a long message is refused", () => {
   assert.equal(shared({ exercises }).exercises.e14.failures.length, 5);
 });
 
+test("the order in which messages arrive does not matter", () => {
+  const [first, second] = ["/robot1/minirospy_class", "/robot2/minirospy_class"].map((topic) => [topic, shared({})]);
+  const parameters = new Map([["/minirospy_class/anna/student", "Anna"]]);
+  for (const messages of [
+    [first, second],
+    [second, first],
+  ]) {
+    const { students } = classTable(parameters, new Map(messages));
+    assert.deepEqual(
+      students.map(({ key, robot }) => [key, robot]),
+      [
+        ["anna", "robot1"],
+        ["robot2/anna", "robot2"],
+      ],
+    );
+  }
+});
+
 test("a full map drops the topics that are no channels any more", () => {
   const map = new Map();
   for (let i = 0; i < 1000; i++) storeShared(map, `/old${i}/minirospy_class`, i, () => true);
@@ -141,9 +159,9 @@ test("a full map drops the topics that are no channels any more", () => {
   assert.equal(map.get("/new/minirospy_class"), "newer");
 });
 
-/** Return [path, value] of each parameter below a value, as the bridge sends them. */
+/** Return [path, value] of each parameter below a value, as the bridge sends them: an empty dictionary is a value. */
 const leaves = (path, value) =>
-  value && typeof value === "object" && !Array.isArray(value)
+  value && typeof value === "object" && !Array.isArray(value) && Object.keys(value).length
     ? Object.entries(value).flatMap(([name, each]) => leaves(`${path}/${name}`, each))
     : [[path, value]];
 

@@ -10,8 +10,10 @@ const MAX_NAME = 60; // characters of a student's name
 const MAX_NODES = 10; // of a student
 const MAX_FAILURES = 5; // of an exercise
 const MAX_TEXT = 300; // characters, as `minirospy check` cuts them
+const MAX_TIME = 4e9; // year 2096 in seconds since 1970, as in results.py
 const MAX_MESSAGE = 150_000; // characters: 15 exercises with MAX_FAILURES texts of MAX_TEXT, each as \u0000
 const RESULT = ["passed", "ever", "time", "number", "failures"]; // fields of an exercise
+const NOW = ["leds", "buttons", "nodes", "beat"]; // fields of the board's state
 const NAME = /^[A-Za-z0-9_]{1,64}$/;
 
 /**
@@ -32,13 +34,13 @@ export function readShared(text) {
   try {
     const { key, student, now, exercises } = JSON.parse(text);
     if (typeof key !== "string" || !NAME.test(key)) return null;
-    const results = entries(exercises).filter(([name]) => NAME.test(name));
+    const known = entries(exercises).filter(([name, each]) => NAME.test(name) && entries(only(each, RESULT)).length);
     return {
       key,
-      student: typeof student === "string" ? student.slice(0, MAX_NAME) : "",
-      now: only(now, ["leds", "buttons", "nodes", "beat"]),
+      student: typeof student === "string" ? cut(student, MAX_NAME) : "",
+      now: only(now, NOW),
       // fromEntries, since an exercise may have the name __proto__.
-      exercises: Object.fromEntries(results.slice(0, MAX_EXERCISES).map(([name, each]) => [name, only(each, RESULT)])),
+      exercises: Object.fromEntries(known.slice(0, MAX_EXERCISES).map(([name, each]) => [name, only(each, RESULT)])),
     };
   } catch {
     return null;
@@ -71,20 +73,21 @@ export function classTable(parameters, shared = new Map(), seenAt = () => 0) {
   const numbers = new Map(); // exercise -> its place in the course
   for (const [path, value] of parameters) {
     if (!path.startsWith(ROOT)) continue;
-    const [key, part, name, field] = path.slice(ROOT.length).split("/");
-    if (!NAME.test(key)) continue;
+    const [key, ...parts] = path.slice(ROOT.length).split("/");
+    const [part, name, field] = parts;
+    if (!NAME.test(key) || !isShown(parts, value)) continue;
     const student = studentOf(students, key, key);
     if (student) setPart(student, numbers, part, name, field, value);
   }
   for (const student of students.values()) if (student.beat) student.at = seenAt(student.key, student.beat);
-  for (const [topic, found] of shared) {
+  for (const [topic, found] of [...shared].sort(([a], [b]) => order(a, b))) {
     const robot = topic.slice(1, -TOPIC.length);
     const known = students.get(found.key);
     const isKnown = known && known.topic === undefined;
     const student = isKnown ? known : studentOf(students, `${robot}/${found.key}`, found.key);
     if (!student) continue;
     student.topic = topic;
-    student.robot = robot;
+    student.robot = cut(robot, MAX_NAME);
     const sent = newStudent(student.key, student.name);
     if (found.student) setPart(sent, numbers, "student", "", "", found.student);
     for (const [name, value] of entries(found.now)) setPart(sent, numbers, "now", name, "", value);
@@ -95,8 +98,29 @@ export function classTable(parameters, shared = new Map(), seenAt = () => 0) {
     merge(student, sent);
   }
   const exercises = [...numbers.keys()].sort((a, b) => numbers.get(a) - numbers.get(b) || (a < b ? -1 : 1));
-  const listed = [...students.values()].sort((a, b) => a.name.localeCompare(b.name) || (a.key < b.key ? -1 : 1));
+  const listed = [...students.values()].sort(
+    (a, b) => order(letters(a.name), letters(b.name)) || order(a.robot, b.robot) || order(a.key, b.key),
+  );
   return { exercises, students: listed };
+}
+
+/** Return whether a parameter has a value that the table shows. An empty dictionary is sent as a value, too. */
+function isShown(parts, value) {
+  const [part, name, field] = parts;
+  if (parts.length > 3 || isDictionary(value)) return false;
+  if (part === "student") return name === undefined && typeof value === "string";
+  if (part === "now") return NOW.includes(name) && field === undefined;
+  return part === "exercises" && NAME.test(name ?? "") && RESULT.includes(field);
+}
+
+/** Return a name's letters for sorting: in upper case, without accents. */
+function letters(name) {
+  return name.normalize("NFKD").replace(/\p{M}/gu, "").toUpperCase();
+}
+
+function order(a, b) {
+  if (a === b) return 0;
+  return a < b ? -1 : 1;
 }
 
 /** Add what a topic sent to a row that may already have the values of parameters. */
@@ -136,11 +160,15 @@ function only(value, fields) {
 }
 
 function entries(value) {
-  return value && typeof value === "object" && !Array.isArray(value) ? Object.entries(value) : [];
+  return isDictionary(value) ? Object.entries(value) : [];
+}
+
+function isDictionary(value) {
+  return value !== null && typeof value === "object" && !Array.isArray(value);
 }
 
 function setPart(student, numbers, part, name, field, value) {
-  if (part === "student" && typeof value === "string") student.name = value.slice(0, MAX_NAME);
+  if (part === "student" && typeof value === "string") student.name = cut(value, MAX_NAME);
   else if (part === "now") setNow(student, name, value);
   else if (part === "exercises" && name && NAME.test(name)) setResult(student, numbers, name, field, value);
 }
@@ -159,19 +187,25 @@ function setResult(student, numbers, name, field, value) {
   if (!student.results.has(name)) student.results.set(name, { passed: false, ever: false, time: 0, failures: [] });
   const result = student.results.get(name);
   if (field === "number" && Number.isFinite(value)) numbers.set(name, Math.min(numbers.get(name), value));
-  else if (["passed", "ever"].includes(field)) result[field] = value === true;
-  else if (field === "time" && Number.isFinite(value)) result.time = value;
+  else if (field === "time" && typeof value === "number" && value >= 0 && value < MAX_TIME) result.time = value;
   else if (field === "failures" && Array.isArray(value)) result.failures = texts(value, MAX_FAILURES);
+  else if (field === "passed") result.passed = value === true;
+  if (["passed", "ever"].includes(field)) result.ever ||= value === true;
 }
 
 function isLevels(value) {
   return ["string", "number"].includes(typeof value) && /^[01]{0,6}$/.test(String(value));
 }
 
-/** Return the texts among the first values of a list, each cut. */
+/** Return the first texts of a list, each cut. */
 function texts(values, most) {
   return values
-    .slice(0, most)
     .filter((each) => typeof each === "string")
-    .map((each) => each.slice(0, MAX_TEXT));
+    .slice(0, most)
+    .map((each) => cut(each, MAX_TEXT));
+}
+
+/** Return the beginning of a text. Whole characters are counted, as in Python: an emoji is one. */
+function cut(text, most) {
+  return [...text.slice(0, 2 * most)].slice(0, most).join("");
 }
