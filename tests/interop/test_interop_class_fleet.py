@@ -155,7 +155,9 @@ def test_students_of_a_fleet_are_shown_with_their_boards_and_results(
     first, second = (row.format(robot) for robot in ("robot1", "robot2"))
     page.wait(f"return {first}?.querySelector('.class-yes') && {second}?.querySelector('.class-no')")
     names = "[...document.querySelectorAll('.class-table tbody th')].map(e => e.textContent).join()"
-    assert page.evaluate(names) == "pi robot1,pi robot2"
+    assert page.evaluate(names) == "pi (robot1),pi (robot2)"
+    failed = "document.querySelector('.class-failures li b').textContent"
+    assert page.evaluate(failed) == "pi (robot2), missing_frame: "
     with Board(students[1].board) as board:
         board.set(7, 1)
         page.wait(f"return {second}.querySelectorAll('.class-led.red').length === 1")

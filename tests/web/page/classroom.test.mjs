@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
-import { classTable, readShared, storeShared } from "../../../minirospy/web/dashboard/page/js/classroom.js";
+import { classTable, readShared, storeShared, titleOf } from "../../../minirospy/web/dashboard/page/js/classroom.js";
 
 const ODD = [{ toString: 1, valueOf: 1 }, null, 5, ["/deep"]];
 const table = (values) =>
@@ -129,6 +129,11 @@ test("a long message is refused", () => {
   const failures = Array(5).fill("\u65e5".repeat(300));
   const exercises = Object.fromEntries(Array.from({ length: 15 }, (_, i) => [`e${i}`, { passed: false, failures }]));
   assert.equal(shared({ exercises }).exercises.e14.failures.length, 5);
+});
+
+test("a title has the robot's name if it differs", () => {
+  const titles = ["", "pi", "robot1"].map((robot) => titleOf({ name: "pi", robot }));
+  assert.deepEqual(titles, ["pi", "pi", "pi (robot1)"]);
 });
 
 test("the order in which messages arrive does not matter", () => {

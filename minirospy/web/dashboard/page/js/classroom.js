@@ -61,6 +61,14 @@ export function storeShared(shared, topic, found, isChannel) {
 }
 
 /**
+ * Return the student's name, with the robot's if it differs: fresh computers share a name.
+ * @param {{name: string, robot: string}} student
+ */
+export function titleOf({ name, robot }) {
+  return robot && robot !== name ? `${name} (${robot})` : name;
+}
+
+/**
  * Return the exercises, in the order of the course, and the students, by name. Values of other kinds, which any node
  * may set, are left out. A student with a parameter and a topic has one row, with the later state of the board and the
  * later result of each exercise.

@@ -1,7 +1,7 @@
 // Class: the students at this master and in the fleet, with their boards and the exercises that each has passed. Only
 // shows.
 
-import { classTable, classTopics, readShared, storeShared } from "../classroom.js";
+import { classTable, classTopics, readShared, storeShared, titleOf } from "../classroom.js";
 import { h, refill, setText } from "../dom.js";
 import { t } from "../texts.js";
 
@@ -115,12 +115,7 @@ export class Class {
         h(
           "tr",
           {},
-          h(
-            "th",
-            { scope: "row" },
-            student.name,
-            student.robot && student.robot !== student.name && h("span", { class: "muted" }, ` ${student.robot}`),
-          ),
+          h("th", { scope: "row" }, titleOf(student)),
           h("td", { title: student.nodes.join("\n") }, live.includes(student.key) ? board(student) : ""),
           exercises.map((name) => mark(student.results.get(name))),
         ),
@@ -131,7 +126,7 @@ export class Class {
       students.flatMap((student) =>
         [...student.results]
           .filter(([, { passed: isPassed, failures }]) => !isPassed && failures.length)
-          .map(([name, { failures }]) => h("li", {}, h("b", {}, `${student.name}, ${name}: `), failures[0])),
+          .map(([name, { failures }]) => h("li", {}, h("b", {}, `${titleOf(student)}, ${name}: `), failures[0])),
       ),
     );
   }
