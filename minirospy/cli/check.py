@@ -292,9 +292,10 @@ def _show_class(uri: str, environment: Environment, patience: float) -> int:
         hint = ". `rosnode cleanup` makes the master forget nodes that were killed." if is_silent else ""
         warn(escaped(f"results may be missing: {'; '.join(unreadable[:_MAX_NAMED])}{more}{hint}"))
     if not students:
+        address, meaning = _address_for_students(environment._replace(master_uri=uri))
         print(
-            f"No results at {uri} yet: students type `minirospy check --join {uri} --name NAME` once, or, in a fleet, "
-            "`minirospy check --share`."
+            f"No results at {uri} yet: students type `minirospy check --join {address} --name NAME` once{meaning}, or, in a "
+            "fleet, `minirospy check --share`."
         )
         return 0
     table = [[escaped(cell) for cell in row] for row in class_table(students, built_in_names())]
@@ -307,6 +308,22 @@ def _show_class(uri: str, environment: Environment, patience: float) -> int:
                 when = time.strftime(", %H:%M", time.localtime(result.time)) if result.time else ""
                 print(escaped(f"{student.title}, {name}{when}: {result.failures[0]}"))
     return 0
+
+
+def _address_for_students(environment: Environment) -> tuple[str, str]:
+    """Return what students pass to --join to reach the master, and a parenthesis that explains it if it is a placeholder.
+
+    On another computer, localhost is that computer.
+    """
+    from minirospy.base.environment import DEFAULT_MASTER_PORT
+
+    if not environment.master_is_local:
+        return environment.master_uri, ""
+    port = environment.master_address[1]
+    if environment.bind_host in ("0.0.0.0", "::"):  # the address that it advertises is not localhost
+        return f"http://{environment.uri_host}:{port}", ""
+    address = "ADDRESS" if port == DEFAULT_MASTER_PORT else f"ADDRESS:{port}"
+    return address, " (ADDRESS: the IP address of this computer in the classroom's network)"
 
 
 COMMAND = Command("minirospy check", _parser, _check, interrupted=130)

@@ -130,6 +130,19 @@ def test_result_is_at_the_master(command: Command, master: str, question: str) -
     assert command("check", "--class").out == "         question\nAnna B.  yes\n"
 
 
+def test_students_are_told_an_address_that_their_computers_reach(
+    command: Command, master: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = Environment.read().master_address[1]
+    monkeypatch.setenv("ROS_HOSTNAME", "localhost")
+    assert command("check", "--class").out == (
+        f"No results at {master} yet: students type `minirospy check --join ADDRESS:{port} --name NAME` once (ADDRESS: the IP "
+        "address of this computer in the classroom's network), or, in a fleet, `minirospy check --share`.\n"
+    )
+    monkeypatch.setenv("ROS_HOSTNAME", "192.168.65.50")
+    assert f"--join http://192.168.65.50:{port} --name" in command("check", "--class").out
+
+
 def test_own_master_gets_no_parameters_without_join(command: Command, master: str, question: str) -> None:
     """A student's `rosparam list` shows what the pages of the course show."""
     proxy = MasterProxy(master, "/test")

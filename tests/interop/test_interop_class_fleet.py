@@ -171,3 +171,15 @@ def test_students_of_a_fleet_are_shown_with_their_boards_and_results(
     page.wait(f"return {second}.querySelector('.class-yes')")
     lines = teacher.output("check", "--class", "--patience", "20").splitlines()
     assert lines[:3] == ["             missing_frame", "pi (robot1)  yes", "pi (robot2)  yes"]
+
+
+@needs_chromium
+def test_class_without_results_says_what_students_type(
+    serve: Callable[..., Served], browse: Callable[..., Page]
+) -> None:
+    page = browse(address(serve(), "class"))
+    page.wait("return document.querySelectorAll('main .empty code').length === 2")
+    assert page.evaluate("document.querySelector('main .empty').textContent") == (
+        "No results yet. Each student types once: minirospy check --join ADDRESS --name NAME. ADDRESS is the IP address of the "
+        "computer with the master. In a fleet, this suffices: minirospy check --share"
+    )

@@ -1266,6 +1266,7 @@ export const GERMAN = {
   "no button is pressed": "kein Taster ist gedrückt",
   "no LED is lit": "keine LED leuchtet",
   "{count} students, {passed} exercises passed": "{count} Teilnehmende, {passed} Aufgaben geschafft",
-  "No results yet. Each student types `minirospy check --join {uri} --name NAME` once, or, in a fleet, `minirospy check --share`.":
-    "Noch keine Ergebnisse. Alle tippen einmal `minirospy check --join {uri} --name NAME` oder in einer Flotte `minirospy check --share`.",
+  "No results yet. Each student types once:": "Noch keine Ergebnisse. Alle tippen einmal:",
+  "ADDRESS is the IP address of the computer with the master. In a fleet, this suffices:":
+    "ADDRESS ist die IP-Adresse des Rechners mit dem Master. In einer Flotte genügt:",
 };

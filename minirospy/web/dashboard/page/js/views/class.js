@@ -95,15 +95,7 @@ export class Class {
       }),
     );
     this.table.hidden = !students.length;
-    setText(
-      this.empty,
-      students.length
-        ? ""
-        : t(
-            "No results yet. Each student types `minirospy check --join {uri} --name NAME` once, or, in a fleet, `minirospy check --share`.",
-            { uri: "URI" },
-          ),
-    );
+    refill(this.empty, students.length ? [] : advice());
     refill(this.head, [
       h("th", { scope: "col" }, t("Student")),
       h("th", { scope: "col" }, t("Board")),
@@ -130,6 +122,16 @@ export class Class {
       ),
     );
   }
+}
+
+/** Return what students type, for a class without results. */
+function advice() {
+  return [
+    `${t("No results yet. Each student types once:")} `,
+    h("code", {}, "minirospy check --join ADDRESS --name NAME"),
+    `. ${t("ADDRESS is the IP address of the computer with the master. In a fleet, this suffices:")} `,
+    h("code", {}, "minirospy check --share"),
+  ];
 }
 
 function board(student) {
