@@ -16,14 +16,17 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from minirospy.base.environment import Environment, split_uri
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, UsageError
 from minirospy.base.escape import escaped
 from minirospy.base.private_files import replace_file
-from minirospy.course.checker import Report
 from minirospy.course.exercise import built_in_names
 from minirospy.runtime.rpc.master_proxy import MasterProxy
+
+if TYPE_CHECKING:
+    from minirospy.course.checker import Report
 
 __all__ = [
     "CLASS_PARAMETER",
