@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import roslib
 import roslib.message
 import roslib.names
 import roslib.packages
+import roslib.rosenv
 from rospkg import ResourceNotFound
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty
@@ -142,3 +144,14 @@ def test_interactive() -> None:
     roslib.set_interactive(True)
     assert roslib.is_interactive()
     roslib.set_interactive(False)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no permissions of this kind")
+def test_new_folders_have_the_permissions_of_the_existing_one(tmp_path: Path) -> None:
+    tmp_path.chmod(0o700)
+    before = os.umask(0o022)
+    try:
+        roslib.rosenv.makedirs_with_parent_perms(str(tmp_path / "a" / "b"))
+    finally:
+        os.umask(before)
+    assert [(tmp_path / each).stat().st_mode & 0o777 for each in ("a", "a/b")] == [0o700, 0o700]

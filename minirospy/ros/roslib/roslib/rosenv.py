@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from minirospy.ros.rosgraph.rosgraph import rosenv
 from minirospy.ros.rosgraph.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_MASTER_URI, ROS_NAMESPACE
+from minirospy.ros.rosgraph.rosgraph.roslogging import makedirs_with_parent_perms
 from minirospy.ros.roslib.roslib.exceptions import ROSLibException
 from minirospy.ros.rospkg.rospkg import environment
 
@@ -69,11 +70,6 @@ def get_log_dir(env: Mapping[str, str] | None = None) -> str:
 def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
     """Return the folder for test results."""
     return environment.get_test_results_dir(env)
-
-
-def makedirs_with_parent_perms(p: str) -> None:
-    """Create a folder and its missing parents. Unlike in ROS, they get the default permissions."""
-    os.makedirs(p, exist_ok=True)
 
 
 def _variable(name: str, required: bool, env: Mapping[str, str] | None) -> str | None:
