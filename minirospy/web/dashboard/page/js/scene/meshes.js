@@ -219,6 +219,8 @@ async function readDae(link, uri, bytes) {
   const materials = new Set();
   parsed.scene.traverse((/** @type {any} */ each) => {
     if (!each.isMesh) return;
+    // Light is computed at the vertices, from their normals. As in RViz, a file without normals has flat faces.
+    if (!each.geometry.getAttribute("normal")) each.geometry.computeVertexNormals();
     each.material = Array.isArray(each.material) ? each.material.map(known) : known(each.material);
     for (const material of [each.material].flat()) materials.add(material);
   });
