@@ -222,7 +222,7 @@ print(eventually(lambda: got), got[0].data is frames[0].array, got[0].is_dense, 
 
 
 def test_a_class_that_overrides_deserialize_receives_bytes(start: Start) -> None:
-    """As in rospy: such a class keeps them, or reads them as a generated class does not."""
+    """Such a class may keep the bytes, as in rospy, or read them in another way than a generated class."""
     output, errors = finished(
         start("""
 from sensor_msgs.msg import PointCloud2

@@ -153,7 +153,7 @@ class Window:
         markers[0].header.frame_id = "world"
         known, self._known = self._known, {}
         for model in self._simulation.models.values():
-            # Create a static model's markers anew, because the model may have been moved.
+            # Create a static model's markers again, because the model may have been moved.
             shapes = known[model] if model in known and not model.is_static else _shapes(model)
             self._known[model] = shapes
             markers += shapes
