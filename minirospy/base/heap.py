@@ -21,10 +21,10 @@ def return_large_blocks(least: int = _LARGE) -> None:
     """
     if sys.platform != "linux":
         return
-    import ctypes
+    # Ignore errors: musl has no mallopt(), and a Python that was built without libffi has no ctypes.
+    with contextlib.suppress(OSError, AttributeError, ImportError):
+        import ctypes
 
-    # Ignore errors: musl has no mallopt().
-    with contextlib.suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
@@ -39,7 +39,7 @@ def return_free_memory() -> None:
     """
     if sys.platform != "linux":
         return
-    import ctypes
+    with contextlib.suppress(OSError, AttributeError, ImportError):
+        import ctypes
 
-    with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)

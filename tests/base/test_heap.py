@@ -10,6 +10,7 @@ import sys
 
 import pytest
 
+from minirospy.base.heap import return_free_memory, return_large_blocks
 from minirospy.runtime.master import master as masters
 
 PROGRAM = """
@@ -65,3 +66,9 @@ def test_garbage_collector_looks_at_few_objects_at_a_time(monkeypatch: pytest.Mo
 
     asyncio.run(scene())
     assert thresholds[0][0] * thresholds[0][1] <= 10_000
+
+
+def test_python_without_ctypes_keeps_its_default_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ctypes", None)  # an import raises ImportError, as without libffi
+    return_large_blocks()
+    return_free_memory()
