@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from minirospy.runtime.node.service_client import ServiceClient
 
 __all__ = [
-    "ServiceNode",
     "ServiceOffer",
+    "ServiceProviders",
     "call_service",
     "fill_request",
     "find_services_of_type",
@@ -46,7 +46,7 @@ _PROBE_SECONDS = 5.0
 _ANY = "*"
 
 
-class ServiceNode(NamedTuple):
+class ServiceProviders(NamedTuple):
     """A service and the nodes that provide it. The node that registered it last receives the calls."""
 
     name: str
@@ -60,11 +60,11 @@ class ServiceOffer(NamedTuple):
     uri: str
 
 
-def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
+def list_services(graph: Graph, namespace: str = "/") -> list[ServiceProviders]:
     """Return the services at or below ``namespace``, each with its nodes, sorted by name."""
     state = graph.state()
     return [
-        ServiceNode(name, tuple(state.services[name]))
+        ServiceProviders(name, tuple(state.services[name]))
         for name in sorted(state.services)
         if in_namespace(name, namespace)
     ]

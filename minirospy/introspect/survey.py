@@ -67,7 +67,7 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
         place = MasterLocation(host, port, [])
     counts: dict[tuple[int, object, Edge], Counts] = {}
     for answer in answers.values():
-        counts.update(interface_counts(answer))
+        counts.update(connection_counts(answer))
     return Survey(
         time.monotonic(), state, answers, place, counts, _loads(answers, processes) if processes else {}
     )
@@ -159,7 +159,7 @@ def _topics(
     return [[topic, types.get(topic, "")] for topic in sorted(table) if answer.node.name in table[topic]]
 
 
-def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
+def connection_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
     """Return a node's counters for each outbound connection. Skip rows that are not in the documented format."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction

@@ -74,11 +74,11 @@ class Reach:
             while not self._client.is_ready:
                 await asyncio.sleep(_LOOK_SECONDS)
             servers = self._client.servers
-            if servers is None or await self._has_reached(servers):
+            if servers is None or await self._wait_for_servers(servers):
                 self._reached = servers
                 return
 
-    async def _has_reached(self, servers: frozenset[bytes]) -> bool:
+    async def _wait_for_servers(self, servers: frozenset[bytes]) -> bool:
         """Wait until the servers respond to a probe, or for a second if they cannot be probed; then return True.
 
         Return False if a server disappears first.

@@ -13,7 +13,7 @@ from minirospy.introspect.configurations import parameter_values
 from minirospy.introspect.doctor.graph import NodeAnswer
 from minirospy.introspect.doctor.reach import MasterLocation
 from minirospy.introspect.graph import Graph, NodeAddress
-from minirospy.introspect.survey import Edge, Survey, describe, interface_counts, survey, traffic
+from minirospy.introspect.survey import Edge, Survey, connection_counts, describe, survey, traffic
 from minirospy.runtime.rpc.master_proxy import BusConnection, SystemState
 from minirospy.runtime.transport.loop import LoopThread
 
@@ -42,7 +42,7 @@ def answer(stats: object, pid: int = 5) -> NodeAnswer:
 def looked(seconds: float, stats: object, pid: int = 5) -> Survey:
     found = answer(stats, pid)
     state = SystemState({"/t": ["/a"]}, {"/t": ["/b", "/c"]}, {"/s": ["/a"]})
-    return Survey(seconds, state, {"/a": found}, PLACE, interface_counts(found))
+    return Survey(seconds, state, {"/a": found}, PLACE, connection_counts(found))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_traffic_omits_incomparable_counts() -> None:
     "stats", [0, None, [1], [["/t"]], [["/t", 0, [[1]]]], [["/t", 0, 5]], [["/t", 0, [["x", "y", "z"]]]]]
 )
 def test_rows_that_are_not_as_documented_count_nothing(stats: object) -> None:
-    assert interface_counts(answer(stats)) == {}
+    assert connection_counts(answer(stats)) == {}
 
 
 def test_description_has_nodes_and_what_is_wrong_with_them() -> None:
@@ -152,7 +152,7 @@ def test_nodes_are_queried_and_their_traffic_is_counted(master: str, monkeypatch
 
 
 def test_counts_that_are_not_finite_are_left_out() -> None:
-    assert interface_counts(answer([["/t", 0, [[1, float("inf"), float("inf"), True]]]])) == {}
+    assert connection_counts(answer([["/t", 0, [[1, float("inf"), float("inf"), True]]]])) == {}
 
 
 @pytest.mark.parametrize("text", ["a: !!bool x", "a: !!timestamp x", "a: !!int ''", "a: !!float ''"])

@@ -255,11 +255,11 @@ class Repair:
         self._add_connections(content)
         if not content.messages:
             return record.end
-        self.end = self._keep_index(record, content, limit)
+        self.end = self._check_index(record, content, limit)
         self.chunks.append(content.info(record.position))
         return self.end
 
-    def _keep_index(self, record: Record, content: _Content, limit: int) -> int:
+    def _check_index(self, record: Record, content: _Content, limit: int) -> int:
         """Check a chunk's index records, and schedule a rewrite if they are damaged; return the position after them."""
         end, entries = _read_index(self._stream, record.end, limit)
         is_whole = entries == content.entries

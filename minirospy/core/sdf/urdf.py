@@ -182,7 +182,7 @@ class _Converter:
 
     def _sum(self, body: _Body) -> None:
         """Collect the parts of a body's links in sdformat's order: its own parts, then those of the merged links, depth first."""
-        for name, pose in _deepest_first(body, self._robot):
+        for name, pose in _merged_links(body, self._robot):
             link = self._robot.links[name]
             body.visuals += [(name, pose, visual) for visual in link.visuals]
             body.collisions += [(name, pose, collision) for collision in link.collisions]
@@ -434,7 +434,7 @@ _LINK_TAGS = ("turnGravityOff", "dampingFactor", "selfCollide")
 _OWN_TAGS = frozenset(("material", "visual", "collision", "static")) | _WITHOUT_EFFECT | frozenset(_DYNAMICS)
 
 
-def _deepest_first(body: _Body, robot: Robot) -> Iterator[tuple[str, Pose]]:
+def _merged_links(body: _Body, robot: Robot) -> Iterator[tuple[str, Pose]]:
     """Yield a body's links in the order in which sdformat adds their parts: a link, then all of each merged child's links."""
     poses = dict(body.merged)
     stack = [body.link.name]

@@ -51,14 +51,14 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """Delivers messages of up to ``most`` bytes in steps on the loop: ``start`` runs the steps from ``deliver``.
+    """Delivers messages of up to ``max_bytes`` in steps on the loop: ``start`` runs the steps from ``deliver``.
 
     A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """
 
     deliver: Callable[[Frame, Header], Steps[None]]
     start: Callable[[Steps[None]], None]
-    most: int
+    max_bytes: int
     on_left_out: Callable[[Header], None]
 
 
@@ -310,7 +310,7 @@ class Subscription:
                     lambda frame: in_steps(frame, link.header),
                     ended,
                     deliver.start,
-                    deliver.most,
+                    deliver.max_bytes,
                     lambda: left_out(link.header),
                 )
             elif self._on_loop:
