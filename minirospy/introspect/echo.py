@@ -125,7 +125,7 @@ class Echo:
         return not self._is_type_known and not is_message(value)
 
     def _block(self, value: object) -> str:
-        from minirospy.core.idl.message import strify_message
+        from minirospy.core.idl.message_text import strify_message
 
         if self._is_shown_whole(value):
             return strify_message(value, fixed_numeric_width=self._width) + "\n---\n"

@@ -94,7 +94,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
     Return the message. ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise
     MessageException if the values do not match the fields.
     """
-    from minirospy.core.idl.message import fill_message_args
+    from minirospy.core.idl.fill_message import fill_message_args
 
     # Without values, the message keeps its defaults.
     try:

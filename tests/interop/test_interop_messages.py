@@ -24,6 +24,7 @@ from minirospy.base.errors import DefinitionError, DeserializationError, Message
 from minirospy.base.times import Duration, Time
 from minirospy.core.idl.digest import full_text, service_md5
 from minirospy.core.idl.emit import python_name
+from minirospy.core.idl.fill_message import fill_message_args
 from minirospy.core.idl.load import (
     Catalogue,
     class_from_text,
@@ -32,7 +33,7 @@ from minirospy.core.idl.load import (
     specs_of_text,
     write_package,
 )
-from minirospy.core.idl.message import fill_message_args, strify_message
+from minirospy.core.idl.message_text import strify_message
 from minirospy.core.idl.spec import FieldType, MessageSpec
 
 HERE = Path(__file__).parent

@@ -121,7 +121,8 @@ def fill_message(msg: Message, pub_args: Sequence[object] | None) -> None:
     from std_msgs.msg import Header
 
     from minirospy.base.errors import MessageException
-    from minirospy.core.idl.message import fill_message_args, get_printable_message_args
+    from minirospy.core.idl.fill_message import fill_message_args
+    from minirospy.core.idl.message_text import get_printable_message_args
 
     now = rospy.get_rostime()
     try:

@@ -158,7 +158,7 @@ class _Progress:
         """Send the goal, wait until it ends, and return the exit status."""
         from actionlib_msgs.msg import GoalStatus
 
-        from minirospy.core.idl.message import strify_message
+        from minirospy.core.idl.message_text import strify_message
 
         client = self._client
         self._tell("Sent")

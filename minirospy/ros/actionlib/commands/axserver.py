@@ -41,7 +41,7 @@ def _parser() -> Parser:
 
 def _axserver(action: str, type: str) -> None:
     from minirospy import client as rospy
-    from minirospy.core.idl.message import strify_message
+    from minirospy.core.idl.message_text import strify_message
     from minirospy.ros.actionlib.actionlib import SimpleActionServer
 
     cls = action_class(type)

@@ -3,8 +3,9 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from minirospy.base.errors import DeserializationError, MessageException, SerializationError
     from minirospy.base.times import Duration, Time, TVal
-    from minirospy.core.idl.message import DeserializationError, Message, MessageException, SerializationError
+    from minirospy.core.idl.message import Message
     from minirospy.ros.genpy.genpy import base as base
     from minirospy.ros.genpy.genpy import dynamic as dynamic
     from minirospy.ros.genpy.genpy import message as message

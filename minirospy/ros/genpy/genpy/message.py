@@ -10,17 +10,12 @@ import codecs
 import struct
 from typing import TYPE_CHECKING
 
+from minirospy.base.errors import DeserializationError, MessageException, SerializationError
 from minirospy.base.times import Duration, Time, TVal
-from minirospy.core.idl.message import (
-    DeserializationError,
-    Message,
-    MessageException,
-    SerializationError,
-    check_type,
-    fill_message_args,
-    get_printable_message_args,
-    strify_message,
-)
+from minirospy.core.idl.field_checks import check_type
+from minirospy.core.idl.fill_message import fill_message_args
+from minirospy.core.idl.message import Message
+from minirospy.core.idl.message_text import get_printable_message_args, strify_message
 from minirospy.ros.genpy.genpy.base import is_simple
 
 if TYPE_CHECKING:

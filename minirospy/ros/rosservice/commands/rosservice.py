@@ -226,7 +226,7 @@ def _filled_request(type_: str, values: Sequence[object]) -> Message:
         return services.fill_request(type_, values)
     except MessageException as error:
         from minirospy.core.idl.load import service_class
-        from minirospy.core.idl.message import get_printable_message_args
+        from minirospy.core.idl.message_text import get_printable_message_args
 
         expected = get_printable_message_args(service_class(type_)._request_class())
         given = [f" * {value} (type {type(value).__name__})" for value in values]

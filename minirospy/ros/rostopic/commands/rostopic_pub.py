@@ -250,7 +250,7 @@ def _ros_argument_error(text: str) -> str:
 
 
 def _filled(cls: type[Message], values: list[object]) -> Message:
-    from minirospy.core.idl.message import get_printable_message_args
+    from minirospy.core.idl.message_text import get_printable_message_args
     from minirospy.introspect.echo import fill_message
 
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.core.idl.message import strify_message
+from minirospy.core.idl.message_text import strify_message
 from minirospy.core.idl.protocols import Message, is_stamped
 from minirospy.introspect.echo import elided
 from minirospy.introspect.plot import plot_header, plot_row

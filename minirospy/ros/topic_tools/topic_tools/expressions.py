@@ -17,8 +17,8 @@ from std_msgs.msg import Header
 from minirospy import client as rospy
 from minirospy.base.errors import MinirospyError
 from minirospy.base.yaml_text import safe_load
+from minirospy.core.idl.fill_message import fill_message_args
 from minirospy.core.idl.load import message_class
-from minirospy.core.idl.message import fill_message_args
 from minirospy.core.idl.protocols import Message
 from minirospy.ros.rostopic import rostopic
 
