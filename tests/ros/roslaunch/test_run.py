@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import stat
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -156,6 +157,22 @@ def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: s
     changed.replace(file)
     said = launch.read_until("changed __name:=a")
     assert f"[a-1] {file} has changed\nended by SIGINT\n[a-1] restarting process\n" in said
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a node reads exactly two bytes from a pipe")
+@pytest.mark.parametrize("count", [1, 3])
+def test_nodes_read_the_standard_input_of_roslaunch(
+    count: int, start: Start, package: Path, master: str
+) -> None:
+    """A keyboard node in a launch file works as in ROS. Three similar nodes are forked from a preloaded process."""
+    (package / "read.py").write_text(
+        "import os, sys\nsys.stdout.write(f'read {os.read(0, 2).decode().strip()}\\n')\n"
+    )
+    nodes = [f'<node pkg="pkg" type="read.py" name="n{i}" output="screen"/>' for i in range(count)]
+    said, _ = start("".join(nodes), stdin=subprocess.PIPE).process.communicate("a\nb\nc\n", timeout=60)
+    assert sorted(line for line in said.splitlines() if line.startswith("read")) == [
+        f"read {letter}" for letter in "abc"[:count]
+    ]
 
 
 def test_a_node_is_guarded_and_watched_before_it_is_announced(

@@ -17,6 +17,7 @@ import time
 import traceback
 import weakref
 from collections.abc import Sequence
+from dataclasses import replace
 from types import FrameType
 from typing import ClassVar
 
@@ -56,6 +57,7 @@ class ApiLauncher(Launcher):
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
     ) -> None:
+        options = replace(options or RunOptions(), inherit_stdin=True)
         super().__init__(spec, environment, Packages(environment), options, Output(title=False))
         self.run_id = run_id
         self.listeners: list[ProcessListener] = []
