@@ -20,6 +20,7 @@ from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.launcher.process import Guardian, Process, start_process
 from minirospy.ros.roslaunch.launcher.runner import Launcher, RunOptions
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, NodeSpec
+from minirospy.ros.roslaunch.roslaunch.pmon import init_signal_handlers
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 from tests.conftest import free_port, modules_loaded_by, write_files
@@ -201,6 +202,26 @@ def test_a_node_is_guarded_and_watched_before_it_is_announced(
     launcher.start()
     launcher.close()
     assert found == [(True, package / "wait.py")]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGHUP")
+@pytest.mark.parametrize(("before", "stops"), [(signal.SIG_IGN, False), (signal.SIG_DFL, True)])
+def test_nohup_keeps_a_launch_running(before: signal.Handlers, stops: bool) -> None:
+    """A shell whose terminal is closed sends SIGHUP to all its jobs. Nodes and roscore ignore it under nohup, too."""
+    environment = Environment.read()
+    launcher = Launcher(LaunchSpec(), environment, Packages(environment))
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    initial = {number: signal.getsignal(number) for number in numbers}
+    try:
+        signal.signal(signal.SIGHUP, before)
+        with launcher.signals():
+            assert (signal.getsignal(signal.SIGHUP) != before) is stops
+        assert signal.getsignal(signal.SIGHUP) == before
+        init_signal_handlers()
+        assert (signal.getsignal(signal.SIGHUP) != before) is stops
+    finally:
+        for number, handler in initial.items():
+            signal.signal(number, handler)
 
 
 def test_rosparam_commands_come_before_the_parameters(start: Start, master: str, tmp_path: Path) -> None:

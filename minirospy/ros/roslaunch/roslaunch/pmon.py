@@ -470,14 +470,19 @@ class _Handler:
 
 
 def init_signal_handlers() -> None:
-    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes. Works only in the main thread."""
+    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes. Works only in the main thread.
+
+    A SIGHUP that is ignored, as under nohup, stays ignored.
+    """
     if threading.current_thread() is not threading.main_thread():
         return
     numbers: Sequence[signal.Signals | None] = [
         getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")
     ]
     for number in numbers:
-        if number is not None and not isinstance(signal.getsignal(number), _Handler):
+        if number is None or isinstance(handler := signal.getsignal(number), _Handler):
+            continue
+        if (number.name, handler) != ("SIGHUP", signal.SIG_IGN):
             _Handler(number)
 
 
