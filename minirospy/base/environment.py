@@ -45,6 +45,9 @@ ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
+_NO_FOLDER = "/nonexistent"  # Debian's home folder for users that have none
+
+
 LOOPBACK = "127.0.0.0/8, ::1"
 """Networks whose hosts may connect to a local process. Listening only on loopback is not enough: if net.ipv4.route_localnet
 is set in the kernel, as on container hosts, neighbouring machines can connect to it.
@@ -84,7 +87,7 @@ class Environment(NamedTuple):
         from pathlib import Path
 
         environ = os.environ if environ is None else environ
-        home = Path(environ.get("ROS_HOME") or Path.home() / ".ros")
+        home = Path(environ.get("ROS_HOME") or os.path.join(_user_folder(), ".ros"))
         master_uri, namespace = master_and_namespace(environ, **overrides)
         local = is_local(environ)
         environment = cls(
@@ -286,6 +289,13 @@ def _port_range(text: str) -> range | None:
     if not ports or ports[0] < 1 or ports[-1] > 65535:
         raise UsageError(f"MINIROSPY_PORTS [{text}] is not a range of ports, as 40000-40100")
     return ports
+
+
+def _user_folder() -> str:
+    """Return the user's home folder, or one that does not exist if the user has none, as in containers with any user id."""
+    folder = os.path.expanduser("~")
+    # A folder named "~" in the working folder would be deleted by accident, or with it the real home folder.
+    return _NO_FOLDER if folder == "~" else folder
 
 
 def _advertised_host(environ: Mapping[str, str]) -> str:

@@ -6,10 +6,11 @@ import contextlib
 import os
 import sys
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import ClassVar
 
-__all__ = ["LOOK_SECONDS", "Keys"]
+__all__ = ["LOOK_SECONDS", "Keys", "has_own_terminal"]
 
 LOOK_SECONDS = 0.05  # seconds for which Keys.next waits for a key
 
@@ -80,3 +81,20 @@ class Keys:
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
         return self._ARROWS.get(sequence[-1:], "")
+
+
+def has_own_terminal(argv: Sequence[str]) -> bool:
+    """Return whether stdin and stdout are terminals, and a program with the command line ``argv`` may draw on them.
+
+    A node of roslaunch has roslaunch's terminal, which other nodes use, too. Such a node has a ``__log:=`` argument, and the
+    terminal does not control its session, unless a launch-prefix such as ``xterm -e`` opens another one.
+    """
+    if any(stream is None or not stream.isatty() for stream in (sys.stdin, sys.stdout)):
+        return False
+    if sys.platform == "win32" or not any(word.startswith("__log:=") for word in argv):
+        return True
+    try:
+        os.tcgetpgrp(sys.stdin.fileno())
+    except OSError:
+        return False
+    return True

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from minirospy.base.keyboard import has_own_terminal
 from minirospy.cli.dashboard import Serving, _main, _parser, _serve
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Command
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _uses_page(words: Sequence[str]) -> bool:
     from minirospy.web.dashboard.browser import has_screen
 
-    is_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+    is_terminal = has_own_terminal(words)
     asks_for_page = any(word in ("--page", "-h", "--help") for word in words)
     return asks_for_page or not is_terminal or has_screen(os.environ)
 

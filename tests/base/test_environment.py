@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,23 @@ def test_variables_are_read() -> None:
     assert environment.namespace == "/wg"
     assert environment.log_dir == Path("/home/x/.ros/log")
     assert environment.package_path == (Path("/a"), Path("/b"))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no user ids")
+def test_a_user_without_a_home_folder_has_an_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a container, the user id may be missing in /etc/passwd, and HOME unset: a node then runs without a log file."""
+    import pwd
+
+    def fail(uid: int) -> None:
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    monkeypatch.setattr(pwd, "getpwuid", fail)
+    monkeypatch.delenv("HOME")
+    environment = Environment.read({})
+    assert (environment.home, environment.log_dir) == (
+        Path("/nonexistent/.ros"),
+        Path("/nonexistent/.ros/log"),
+    )
 
 
 def test_ros_hostname_has_precedence_over_ros_ip() -> None:

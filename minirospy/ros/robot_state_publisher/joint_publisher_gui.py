@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from minirospy import client as rospy
 from minirospy.base.escape import escaped, own_output
-from minirospy.base.keyboard import Keys
+from minirospy.base.keyboard import Keys, has_own_terminal
 from minirospy.ros.robot_state_publisher.joint_publisher import JointPublisher, run_node
 from minirospy.ros.robot_state_publisher.sliders import HINT, Row, Sliders
 
@@ -33,7 +33,7 @@ def main() -> int:
 
 def _run() -> None:
     publisher = JointPublisher()
-    if sys.stdin is None or not sys.stdin.isatty() or not sys.stdout.isatty():
+    if not has_own_terminal(sys.argv):
         rospy.loginfo(
             "no terminal: the joints stay at their zeros. `rosrun joint_state_publisher_gui joint_state_publisher_gui` in a "
             "separate terminal shows sliders"

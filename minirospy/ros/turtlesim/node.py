@@ -36,6 +36,7 @@ from turtlesim.srv import (
 )
 
 from minirospy import client as rospy
+from minirospy.base.keyboard import has_own_terminal
 from minirospy.base.names import join
 from minirospy.ros.turtlesim.canvas import Color
 from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Velocity, World, WorldError
@@ -51,7 +52,7 @@ def main() -> int:
     """Run the node until it shuts down; return the exit status."""
     try:
         rospy.init_node("turtlesim")
-        is_headless = bool(rospy.get_param("~headless", False)) or not _has_terminal()
+        is_headless = bool(rospy.get_param("~headless", False)) or not has_own_terminal(sys.argv)
         simulator = Simulator()
         with contextlib.ExitStack() as drawing:
             if not is_headless:
@@ -63,15 +64,6 @@ def main() -> int:
     except rospy.ROSInterruptException:
         pass
     return 0
-
-
-def _has_terminal() -> bool:
-    """Return whether stdin and stdout are terminals.
-
-    A node started by roslaunch has no stdin, and shares roslaunch's terminal.
-    """
-    streams = sys.stdin, sys.stdout
-    return all(stream is not None and stream.isatty() for stream in streams)
 
 
 def _background() -> Color:

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -33,6 +34,20 @@ class LogFileHandler(RotatingFileHandler):
     def __init__(self, path: Path, max_bytes: int = 0, older_files: int = 0) -> None:
         """Open ``path``. If ``max_bytes`` is 0, there is no size limit. Raise OSError if the file cannot be opened."""
         super().__init__(path, maxBytes=max_bytes, backupCount=older_files, encoding="utf-8")
+        self._has_warned = False
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - logging's
+        """Warn once, in one line, if the file cannot be written; logging prints a traceback for each record."""
+        error = sys.exc_info()[1]
+        if not isinstance(error, OSError):
+            super().handleError(record)
+        elif logging.raiseExceptions and not self._has_warned and sys.stderr is not None:
+            self._has_warned = True
+            with contextlib.suppress(OSError, ValueError):
+                print(
+                    f"WARNING: cannot write the log file [{self.baseFilename}]: {error.strerror}",
+                    file=sys.stderr,
+                )
 
     def _open(self) -> TextIOWrapper:
         return cast("TextIOWrapper", private_files.open_text(Path(self.baseFilename), "a"))

@@ -87,7 +87,7 @@ def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
 
 def _parent() -> Path | None:
     """Return the parent folder for the link file's folder, or None for the system's temporary folder."""
-    home = Path.home()
+    home = Path(os.path.expanduser("~"))  # unlike Path.home(), works for a user without a home folder
     if any(each.exists() for each in SNAPS) and os.access(home, os.W_OK):
         return home
     return None

@@ -73,11 +73,12 @@ def start(package: Path) -> Iterator[Start]:
     """Return a function that starts roslaunch with the text of a launch file, and options."""
     running: list[Running] = []
 
-    def start(text: str, *options: str) -> Running:
+    def start(text: str, *options: str, stdin: int | None = None) -> Running:
         file = package / f"{len(running)}.launch"
         file.write_text(f"<launch>{text}</launch>")
         process = subprocess.Popen(
             [str(BIN / "roslaunch"), *options, str(file)],
+            stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import stat
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -19,6 +20,7 @@ from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.launcher.process import Guardian, Process, start_process
 from minirospy.ros.roslaunch.launcher.runner import Launcher, RunOptions
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, NodeSpec
+from minirospy.ros.roslaunch.roslaunch.pmon import init_signal_handlers
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.workspace.packages import Packages
 from tests.conftest import free_port, modules_loaded_by, write_files
@@ -158,6 +160,22 @@ def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: s
     assert f"[a-1] {file} has changed\nended by SIGINT\n[a-1] restarting process\n" in said
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a node reads exactly two bytes from a pipe")
+@pytest.mark.parametrize("count", [1, 3])
+def test_nodes_read_the_standard_input_of_roslaunch(
+    count: int, start: Start, package: Path, master: str
+) -> None:
+    """A keyboard node in a launch file works as in ROS. Three similar nodes are forked from a preloaded process."""
+    (package / "read.py").write_text(
+        "import os, sys\nsys.stdout.write(f'read {os.read(0, 2).decode().strip()}\\n')\n"
+    )
+    nodes = [f'<node pkg="pkg" type="read.py" name="n{i}" output="screen"/>' for i in range(count)]
+    said, _ = start("".join(nodes), stdin=subprocess.PIPE).process.communicate("a\nb\nc\n", timeout=60)
+    assert sorted(line for line in said.splitlines() if line.startswith("read")) == [
+        f"read {letter}" for letter in "abc"[:count]
+    ]
+
+
 def test_a_node_is_guarded_and_watched_before_it_is_announced(
     package: Path, master: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -184,6 +202,26 @@ def test_a_node_is_guarded_and_watched_before_it_is_announced(
     launcher.start()
     launcher.close()
     assert found == [(True, package / "wait.py")]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGHUP")
+@pytest.mark.parametrize(("before", "stops"), [(signal.SIG_IGN, False), (signal.SIG_DFL, True)])
+def test_nohup_keeps_a_launch_running(before: signal.Handlers, stops: bool) -> None:
+    """A shell whose terminal is closed sends SIGHUP to all its jobs. Nodes and roscore ignore it under nohup, too."""
+    environment = Environment.read()
+    launcher = Launcher(LaunchSpec(), environment, Packages(environment))
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    initial = {number: signal.getsignal(number) for number in numbers}
+    try:
+        signal.signal(signal.SIGHUP, before)
+        with launcher.signals():
+            assert (signal.getsignal(signal.SIGHUP) != before) is stops
+        assert signal.getsignal(signal.SIGHUP) == before
+        init_signal_handlers()
+        assert (signal.getsignal(signal.SIGHUP) != before) is stops
+    finally:
+        for number, handler in initial.items():
+            signal.signal(number, handler)
 
 
 def test_rosparam_commands_come_before_the_parameters(start: Start, master: str, tmp_path: Path) -> None:

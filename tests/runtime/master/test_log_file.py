@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from minirospy.runtime.master import log_file
-from minirospy.runtime.master.log_file import LogFile
+from minirospy.runtime.master.log_file import LogFile, LogFileHandler
 
 
 def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,6 +82,23 @@ def test_no_line_is_lost_if_several_threads_log(tmp_path: Path) -> None:
         flusher.join()
         file.close()
     assert (tmp_path / "master.log").read_text().count("\n") == 3000
+
+
+def test_a_node_warns_once_of_a_full_disk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    class FullDisk(io.StringIO):
+        def flush(self) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    handler = LogFileHandler(tmp_path / "log")
+    handler.stream.close()
+    handler.stream = FullDisk()  # type: ignore[assignment]
+    for text in ("a", "b"):
+        handler.handle(logging.makeLogRecord({"msg": text}))
+    handler.stream = None  # type: ignore[assignment]
+    handler.close()
+    assert capsys.readouterr().err == (
+        f"WARNING: cannot write the log file [{tmp_path / 'log'}]: No space left on device\n"
+    )
 
 
 def test_disk_that_was_full_is_written_again(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 import threading
@@ -41,8 +42,10 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
 
 def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
     import select
+    import termios
 
-    with contextlib.suppress(OSError, ValueError):
+    # The terminal's window may be closed at any time.
+    with contextlib.suppress(OSError, ValueError, termios.error):
         number = sys.stdin.fileno()
         terminal = _Terminal(number) if os.isatty(number) else None
         try:
@@ -74,7 +77,7 @@ class _Terminal:
 
         Return False for a background process, which the system would suspend if it read from the terminal.
         """
-        if os.tcgetpgrp(self._number) != os.getpgrp():
+        if self._is_in_background():
             self._before = None
             return False
         if self._before is None:
@@ -88,10 +91,19 @@ class _Terminal:
 
     def restore(self) -> None:
         """Restore the terminal's settings."""
-        if self._before is not None and os.tcgetpgrp(self._number) == os.getpgrp():
+        if self._before is not None and not self._is_in_background():
             import termios
 
             termios.tcsetattr(self._number, termios.TCSANOW, self._before)  # type: ignore[arg-type]
+
+    def _is_in_background(self) -> bool:
+        try:
+            return os.tcgetpgrp(self._number) != os.getpgrp()
+        except OSError as error:
+            # This process does not belong to the terminal's session, like a node of roslaunch. The system never suspends it.
+            if error.errno == errno.ENOTTY:
+                return False
+            raise
 
 
 def _read_windows(on_key: Callable[[str], object], stop: threading.Event) -> None:

@@ -170,6 +170,7 @@ def _run_options(options: LaunchOptions, name: str) -> RunOptions:
         watch=options.watch,
         summary=not options.no_summary,
         name=name,
+        inherit_stdin=not options.ui,
         timeouts=Timeouts(options.sigint_timeout, options.sigterm_timeout),
         master_arguments=tuple(master),
     )

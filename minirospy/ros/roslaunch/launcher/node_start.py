@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -67,6 +68,8 @@ class NodeStarter:
             folder=folder,
             stdout_file=None if screen else log.with_name(f"{log.name}-stdout.log"),
             log_errors=self._options.log_errors,
+            # If this process has no stdin, its first opened file may have the descriptor 0.
+            stdin=None if self._options.inherit_stdin and sys.__stdin__ is not None else subprocess.DEVNULL,
             preload=self._preload,
         )
         process.node = node

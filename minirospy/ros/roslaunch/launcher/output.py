@@ -69,8 +69,9 @@ class Output:
         stream = sys.stderr if level == ERROR else sys.stdout
         # Write each line in one call: nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # If the output's reader (`| head`) has exited, still terminate the nodes in the right order.
-        with contextlib.suppress(BrokenPipeError):
+        # Continue without the line if the reader (`| head`) has exited, the terminal was closed, or the disk is full:
+        # the nodes must keep running, or be terminated in the right order.
+        with contextlib.suppress(OSError):
             stream.write(shown + "\n")
             stream.flush()
         if text:

@@ -144,13 +144,15 @@ def start_process(
 ) -> Process:
     """Start a process. Its stdout (and stderr if ``log_errors``) goes to ``stdout_file``, or is inherited.
 
-    ``preload``: fork the process from a preloaded one if possible; its stdin is empty then.
+    ``stdin`` and ``stdout`` are as in subprocess. ``preload``: fork the process from a preloaded one if possible; its stdin is
+    then empty unless ``stdin`` is None.
 
     Raise MinirospyError if the process cannot be started or the file cannot be written.
     """
     try:
         with _opened(stdout_file) as output:
-            forked = _forked(preload, command, environ, folder, output, log_errors) if preload else None
+            start = Start(tuple(command), environ, folder) if preload and folder else None
+            forked = _forked(preload, start, stdin, output, log_errors) if preload and start else None
             popen = forked or subprocess.Popen(
                 command,
                 env=dict(environ),
@@ -210,20 +212,13 @@ def _own_group() -> _Group:
 
 
 def _forked(
-    preload: Preload,
-    command: Sequence[str],
-    environ: Mapping[str, str],
-    folder: Path | None,
-    output: IO[str] | None,
-    log_errors: bool,
+    preload: Preload, start: Start, stdin: int | None, output: IO[str] | None, log_errors: bool
 ) -> ForkedProcess | None:
     """Fork a process from a preloaded one, or return None if it must be started normally."""
-    if folder is None:
-        return None
     stdout = output.fileno() if output else 1
-    with open(os.devnull, "rb") as stdin:
-        fds = (stdin.fileno(), stdout, stdout if log_errors and output else 2)
-        return preload.fork(Start(tuple(command), environ, folder), fds)
+    with open(os.devnull, "rb") as empty:
+        fds = (0 if stdin is None else empty.fileno(), stdout, stdout if log_errors and output else 2)
+        return preload.fork(start, fds)
 
 
 @contextlib.contextmanager

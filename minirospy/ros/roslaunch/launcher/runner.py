@@ -359,13 +359,22 @@ class Launcher:
 
     @contextlib.contextmanager
     def signals(self) -> Iterator[None]:
-        """Let SIGINT, SIGTERM and SIGHUP stop the run inside the ``with`` block (main thread only)."""
+        """Let SIGINT, SIGTERM and SIGHUP stop the run inside the ``with`` block (main thread only).
+
+        A SIGHUP that is ignored, as under nohup, stays ignored.
+        """
 
         def on_signal(number: int, _: FrameType | None) -> None:
             self.stop(signal.Signals(number).name)
 
-        wanted = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")]
-        before = {number: signal.signal(number, on_signal) for number in wanted if number is not None}
+        numbers = {
+            name: getattr(signal, name)
+            for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+            if hasattr(signal, name)
+        }
+        if "SIGHUP" in numbers and signal.getsignal(numbers["SIGHUP"]) == signal.SIG_IGN:
+            del numbers["SIGHUP"]
+        before = {number: signal.signal(number, on_signal) for number in numbers.values()}
         try:
             yield
         finally:

@@ -17,6 +17,7 @@ import time
 import traceback
 import weakref
 from collections.abc import Sequence
+from dataclasses import replace
 from types import FrameType
 from typing import ClassVar
 
@@ -56,6 +57,7 @@ class ApiLauncher(Launcher):
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
     ) -> None:
+        options = replace(options or RunOptions(), inherit_stdin=True)
         super().__init__(spec, environment, Packages(environment), options, Output(title=False))
         self.run_id = run_id
         self.listeners: list[ProcessListener] = []
@@ -468,14 +470,19 @@ class _Handler:
 
 
 def init_signal_handlers() -> None:
-    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes. Works only in the main thread."""
+    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes. Works only in the main thread.
+
+    A SIGHUP that is ignored, as under nohup, stays ignored.
+    """
     if threading.current_thread() is not threading.main_thread():
         return
     numbers: Sequence[signal.Signals | None] = [
         getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")
     ]
     for number in numbers:
-        if number is not None and not isinstance(signal.getsignal(number), _Handler):
+        if number is None or isinstance(handler := signal.getsignal(number), _Handler):
+            continue
+        if (number.name, handler) != ("SIGHUP", signal.SIG_IGN):
             _Handler(number)
 
 
