@@ -41,6 +41,7 @@ _INTERNAL = {
     "bondpy": "machine",
     "camera_calibration_parsers": "convert texts",
     "dynamic_reconfigure": "dynparam generated",
+    "genpy": "run_time",
     "image_geometry": "rectification",
     "kdl_parser_py": "tree",
     "message_filters": "stamps",

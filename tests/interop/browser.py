@@ -5,14 +5,17 @@ Source: https://chromedevtools.github.io/devtools-protocol.
 
 from __future__ import annotations
 
+import atexit
 import base64
 import contextlib
+import functools
 import itertools
 import json
 import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +39,12 @@ _FLAGS = (
     "--disable-component-update",
     "--remote-debugging-port=0",
     "--hide-scrollbars",
+    # Several tabs are in use at the same time; none of them is in the background.
+    "--disable-background-timer-throttling",
+    "--disable-backgrounding-occluded-windows",
+    "--disable-renderer-backgrounding",
 )
+_numbers = itertools.count(1)  # the ids of the messages to browsers
 
 _WAIT = """
 new Promise((resolve, reject) => {
@@ -64,8 +72,112 @@ addEventListener("click", () => { window.clickedByTest = Boolean(pressed?.isConn
 """
 
 
+class Browser:
+    """A running chromium. Each tab has a profile of its own, as a private window, and is never in the background."""
+
+    def __init__(self, *flags: str) -> None:
+        assert CHROMIUM
+        self._folder = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
+        self.process = subprocess.Popen(
+            [CHROMIUM, *_FLAGS, *flags, f"--user-data-dir={self._folder.name}", "about:blank"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        self._port = ""
+        self._stack = contextlib.ExitStack()
+        try:
+            self._socket = self._stack.enter_context(self._connect())
+        except BaseException:
+            self.process.kill()
+            self.process.wait()
+            self._folder.cleanup()
+            raise
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the browser still runs."""
+        return self.process.poll() is None
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        """Call a protocol method of the browser; return its result."""
+        answer = ask(self._socket, method, params)
+        assert "error" not in answer, answer
+        result: dict[str, Any] = answer["result"]
+        return result
+
+    def open_tab(self) -> tuple[str, contextlib.AbstractContextManager[ClientConnection]]:
+        """Open an empty tab; return the id of its profile, and the connection to the tab."""
+        context = str(self.call("Target.createBrowserContext")["browserContextId"])
+        tab = self.call("Target.createTarget", url="about:blank", browserContextId=context, newWindow=True)
+        return context, self._open(f"/devtools/page/{tab['targetId']}")
+
+    def close(self) -> None:
+        """Close the browser and all of its processes. Idempotent."""
+        with contextlib.suppress(ConnectionClosed):  # the browser may exit before it answers
+            ask(self._socket, "Browser.close", {})
+        try:
+            self.process.wait(30)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        with contextlib.suppress(ConnectionClosed):
+            self._stack.close()
+        self._folder.cleanup()
+
+    def processes(self) -> list[psutil.Process]:
+        """Return the browser and its child processes; an empty list if it has exited."""
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process = psutil.Process(self.process.pid)
+            return [process, *process.children(recursive=True)]
+        return []
+
+    def _connect(self) -> contextlib.AbstractContextManager[ClientConnection]:
+        file = Path(self._folder.name, "DevToolsActivePort")
+
+        def has_started() -> bool:
+            assert self.is_alive, "chromium has ended"
+            return file.exists() and len(file.read_text().splitlines()) == 2
+
+        wait_until(has_started, PATIENCE, "chromium does not start")
+        self._port, path = file.read_text().splitlines()
+        return self._open(path)
+
+    def _open(self, path: str) -> contextlib.AbstractContextManager[ClientConnection]:
+        return connect(
+            f"ws://127.0.0.1:{self._port}{path}", max_size=None, compression=None, open_timeout=PATIENCE
+        )
+
+
+@functools.cache
+def _shared() -> list[Browser]:
+    """Return a list of at most one browser, which serves all tabs of this process that need none of their own."""
+    shared: list[Browser] = []
+    atexit.register(close_shared_browser)
+    return shared
+
+
+def shared_browser() -> Browser:
+    """Return the browser of this process; start one if none runs. Starting one takes more than a second of CPU."""
+    shared = _shared()
+    if shared and not shared[0].is_alive:
+        close_shared_browser()
+    if not shared:
+        shared.append(Browser())
+    return shared[0]
+
+
+def close_shared_browser() -> None:
+    """Close the browser of this process, if any."""
+    shared = _shared()
+    while shared:
+        shared.pop().close()
+
+
 class Page:
-    """A browser tab. ``script`` is JavaScript; ``find`` is a CSS selector."""
+    """A browser tab. ``script`` is JavaScript; ``find`` is a CSS selector.
+
+    ``own_browser``, or ``flags`` of chromium: start a browser for this tab alone.
+    """
 
     def __init__(
         self,
@@ -75,27 +187,18 @@ class Page:
         height: int = 760,
         dark: bool = False,
         flags: tuple[str, ...] = (),
+        own_browser: bool = False,
     ) -> None:
-        assert CHROMIUM
-        self._folder = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
-        self._process = subprocess.Popen(
-            [
-                CHROMIUM,
-                *_FLAGS,
-                *flags,
-                f"--user-data-dir={self._folder.name}",
-                f"--window-size={width},{height}",
-                "about:blank",
-            ],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        self._numbers = itertools.count(1)
+        self._own = Browser(*flags) if flags or own_browser else None
+        self._browser = self._own or shared_browser()
         self.errors: list[str] = []
         """Errors that the page logged: exceptions, and violations of its Content-Security-Policy."""
+        self._stack = contextlib.ExitStack()
+        self._stack.callback(self._close_profile)
+        self._context = ""
         try:
-            self._stack = contextlib.ExitStack()
-            self._socket = self._stack.enter_context(self._connect())
+            self._context, connection = self._browser.open_tab()
+            self._socket = self._stack.enter_context(connection)
             for domain in ("Page", "Runtime", "Log"):
                 self.call(f"{domain}.enable")
             self.call(
@@ -109,6 +212,8 @@ class Page:
                 "Emulation.setEmulatedMedia",
                 features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
             )
+            # Otherwise, only one of several tabs has the focus.
+            self.call("Emulation.setFocusEmulationEnabled", enabled=True)
             self.open(url)
         except BaseException:
             self.close()
@@ -132,13 +237,7 @@ class Page:
         return answer["result"]
 
     def _answer(self, method: str, params: dict[str, Any]) -> dict[str, Any]:
-        number = next(self._numbers)
-        self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
-        while True:
-            answer: dict[str, Any] = json.loads(self._socket.recv(timeout=PATIENCE * 2))
-            if answer.get("id") == number:
-                return answer
-            self._event(answer)
+        return ask(self._socket, method, params, self._event)
 
     def _event(self, event: dict[str, Any]) -> None:
         params = event.get("params", {})
@@ -231,71 +330,59 @@ class Page:
         data = self.call("Page.captureScreenshot", format="png")["data"]
         path.write_bytes(base64.b64decode(data))
 
+    def save_downloads(self, folder: Path) -> None:
+        """Save the files that this tab downloads into a folder."""
+        self._browser.call(
+            "Browser.setDownloadBehavior",
+            behavior="allow",
+            downloadPath=str(folder),
+            browserContextId=self._context,
+        )
+
     def close(self) -> None:
-        """Close the browser and all of its processes."""
-        socket = getattr(self, "_socket", None)
-        if socket:
-            with contextlib.suppress(ConnectionClosed):  # the browser may exit before it answers
-                self.call("Browser.close")
+        """Close the tab and its profile, and the browser if it is the tab's own."""
+        with contextlib.suppress(ConnectionClosed):
             self._stack.close()
-        else:
-            self._process.terminate()
-        try:
-            self._process.wait(30)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._folder.cleanup()
+
+    def _close_profile(self) -> None:
+        if self._own:
+            self._own.close()
+        elif self._context and self._browser.is_alive:
+            self._browser.call("Target.disposeBrowserContext", browserContextId=self._context)
 
     def start(self, script: str, method: str = "Runtime.evaluate") -> None:
         """Start a script (for example one that hangs) or a method without parameters; do not wait for the answer."""
         params = {"expression": script} if script else {}
-        self._socket.send(json.dumps({"id": next(self._numbers), "method": method, "params": params}))
+        self._socket.send(json.dumps({"id": next(_numbers), "method": method, "params": params}))
 
     def processes(self) -> list[psutil.Process]:
-        """Return the browser and its child processes; an empty list if it has exited."""
-        with contextlib.suppress(psutil.NoSuchProcess):
-            process = psutil.Process(self._process.pid)
-            return [process, *process.children(recursive=True)]
-        return []
+        """Return the processes of the tab's own browser; an empty list if it has exited."""
+        assert self._own, "other tabs use this browser, too: pass own_browser"
+        return self._own.processes()
 
     def kill(self) -> None:
-        """Kill all processes of the browser, to simulate a crash."""
+        """Kill all processes of the tab's own browser, to simulate a crash."""
         for each in self.processes():
             with contextlib.suppress(psutil.NoSuchProcess):
                 each.kill()
-        self._process.wait(60)
-        with contextlib.suppress(ConnectionClosed):
-            self._stack.close()
-        self._folder.cleanup()
+        self.close()
 
-    def _connect(self) -> contextlib.AbstractContextManager[ClientConnection]:
-        file = Path(self._folder.name, "DevToolsActivePort")
 
-        def has_started() -> bool:
-            assert self._process.poll() is None, "chromium has ended"
-            return file.exists() and len(file.read_text().splitlines()) == 2
-
-        wait_until(has_started, PATIENCE, "chromium does not start")
-        port, path = file.read_text().splitlines()
-        with connect(
-            f"ws://127.0.0.1:{port}{path}", max_size=None, compression=None, open_timeout=PATIENCE
-        ) as whole:
-
-            def tabs() -> list[str]:
-                whole.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
-                while (answer := json.loads(whole.recv(timeout=PATIENCE))).get("id") != 1:
-                    pass
-                found = answer["result"]["targetInfos"]
-                return [each["targetId"] for each in found if each["type"] == "page"]
-
-            tab = wait_until(tabs, PATIENCE, "chromium opens no tab")[0]
-        return connect(
-            f"ws://127.0.0.1:{port}/devtools/page/{tab}",
-            max_size=None,
-            compression=None,
-            open_timeout=PATIENCE,
-        )
+def ask(
+    socket: ClientConnection,
+    method: str,
+    params: dict[str, Any],
+    on_event: Callable[[dict[str, Any]], object] = lambda _: None,
+) -> dict[str, Any]:
+    """Call a protocol method; return the answer, with its "result" or "error". Pass earlier events to ``on_event``."""
+    number = next(_numbers)
+    socket.send(json.dumps({"id": number, "method": method, "params": params}))
+    while True:
+        answer: dict[str, Any] = json.loads(socket.recv(timeout=PATIENCE * 2))
+        if answer.get("id") == number:
+            return answer
+        if "method" in answer:
+            on_event(answer)
 
 
 def _finding(find: str, text: str = "") -> str:

@@ -45,6 +45,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.timeout(3 * PATIENCE))
 
 
+def pytest_sessionfinish() -> None:
+    from tests.interop.browser import close_shared_browser
+
+    close_shared_browser()
+
+
 def environment(uri: str, stack: str) -> dict[str, str]:
     """Return the process environment for one of STACKS, in which its own programs and modules are found first."""
     path = str(OUR_BIN) if stack == "ours" else str(REAL_BIN)

@@ -1080,7 +1080,7 @@ def test_hostile_names_in_the_graph_are_text(
 
 def saved(page: Page, folder: Path, name: str, button: str) -> bytes:
     """Click a button; return the contents of the file that the browser saves."""
-    page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
+    page.save_downloads(folder)
     page.click("button", button)
     end = time.monotonic() + PATIENCE
     file = folder / name

@@ -59,7 +59,7 @@ def mortal() -> Iterator[Callable[[str], Page]]:
     opened: list[Page] = []
 
     def browsing(url: str) -> Page:
-        opened.append(Page(url))
+        opened.append(Page(url, own_browser=True))
         return opened[-1]
 
     yield browsing

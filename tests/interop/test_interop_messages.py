@@ -259,7 +259,8 @@ def repeated(values: list[Any], length: int) -> list[Any]:
 def field_values(type_: FieldType, lookup: Lookup, *, is_nested: bool) -> st.SearchStrategy[Any]:
     """Return a strategy for a field's values.
 
-    Printing many strings takes long, so ``is_nested``, for a field of a nested message, excludes long arrays of them.
+    Printing long arrays takes long, so ``is_nested``, for a field of a nested message, excludes them: the message's own
+    values have them.
     """
     one = (
         PRIMITIVES[type_.base]
@@ -278,7 +279,7 @@ def field_values(type_: FieldType, lookup: Lookup, *, is_nested: bool) -> st.Sea
     short = st.lists(one, max_size=3 if type_.is_primitive else 2)
     return (
         short | st.lists(one, min_size=1, max_size=2).map(lambda values: repeated(values, 300))
-        if type_.is_primitive and not (is_nested and type_.base == "string")
+        if type_.is_primitive and not is_nested
         else short
     )
 
