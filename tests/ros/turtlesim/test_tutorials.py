@@ -197,11 +197,9 @@ def launch(master: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     with ExitStack() as running:
 
-        def run(*words: str) -> None:
+        def run(*words: str, stdin: int = subprocess.DEVNULL) -> None:
             log = running.enter_context((tmp_path / "roslaunch.txt").open("w+"))
-            process = subprocess.Popen(
-                [str(BIN / "roslaunch"), *words], stdin=subprocess.DEVNULL, stdout=log, stderr=log
-            )
+            process = subprocess.Popen([str(BIN / "roslaunch"), *words], stdin=stdin, stdout=log, stderr=log)
             running.callback(finish, process, tmp_path / "roslaunch.txt")
 
         yield run
@@ -296,3 +294,24 @@ def test_second_turtle_follows_the_first(launch: Launch, tmp_path: Path, words: 
             await until(node, "turtle2/pose", lambda pose: math.dist((pose.x, pose.y), (9, 9)) < 1)
 
     asyncio.run(asyncio.wait_for(main(), SECONDS))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a terminal of the test's own")
+@pytest.mark.parametrize("package", ["turtle_tf2", "turtle_tf"])
+def test_arrow_keys_in_roslaunchs_terminal_drive_the_turtle(launch: Launch, package: str) -> None:
+    terminal, stdin = os.openpty()
+    launch(package, f"{package}_demo.launch", stdin=stdin)
+
+    async def main() -> None:
+        async with Node("test", rosout=False) as node:
+            driven = asyncio.ensure_future(until(node, "turtle1/pose", lambda pose: pose.linear_velocity > 0))
+            while not driven.done():
+                os.write(terminal, b"\x1b[A")
+                await asyncio.wait({driven}, timeout=0.2)
+            driven.result()
+
+    try:
+        asyncio.run(asyncio.wait_for(main(), SECONDS))
+    finally:
+        os.close(terminal)
+        os.close(stdin)
