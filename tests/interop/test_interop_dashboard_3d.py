@@ -484,6 +484,33 @@ def test_meshes_are_opaque_whatever_the_opacity_in_their_files(
     wait_color(page, (77, 128, 128), 3)
 
 
+def test_files_that_come_late_are_in_a_picture_that_nothing_else_asks_for(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rviz_pictures.prepare(tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    publish(served, {"/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    look_down(page)
+    page.evaluate(
+        "import('./js/link.js').then(({ Link }) => { const { asset } = Link.prototype; window.held = [];"
+        "Link.prototype.asset = async function (uri) {"
+        " await new Promise((release) => held.push({ uri, release })); return asset.call(this, uri); } })"
+    )
+    mesh = '<visual><geometry><mesh filename="package://rviz_meshes/picture.dae" scale="6 6 6"/></geometry></visual>'
+    text = f'<robot name="r"><link name="map">{mesh}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+
+    for name in ("picture.dae", "squares.png"):
+        page.wait(f"return held.length === 1 && held[0].uri.endsWith({name!r})")
+        # A picture without the mesh is none that a comparison may take.
+        assert page.evaluate("document.querySelector('canvas.stage').dataset.settled") == "false"
+        page.evaluate("held.pop().release()")
+    page.wait("return document.querySelector('canvas.stage').dataset.settled === 'true'")
+    assert is_near(colors(page), (240, 220, 40))
+
+
 def test_light_is_interpolated_between_the_vertices(
     serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,7 @@ const FIELD_OF_VIEW = (45 * Math.PI) / 180; // as in RViz
 const MAX_PITCH = Math.PI / 2 - 0.001;
 const SLOW_MS = 90;
 const FAST_MS = 30;
+const PARTIAL_SHARE = 4; // pictures while meshes load take a quarter of the time at most
 const RATIOS = [1, 0.75, 0.5];
 const MAX_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
 const LEAST_POINTS = 20_000;
@@ -79,8 +80,10 @@ export class Stage {
     frame.append(this.canvas, this.labels.element, this.corner);
 
     this.isStale = true;
+    this.loads = 0; // meshes and textures that are on their way
     this.fence = null;
     this.drawn = 0;
+    this.started = 0;
     this.milliseconds = 0; // of a picture, from its commands to its end
     this.ratio = 0;
     this.coarser = 0; // pictures that were too slow, less those that were not
@@ -127,6 +130,23 @@ export class Stage {
     this.isStale = true;
   }
 
+  /** Run work that loads what is drawn, such as a mesh: a picture with it follows, whether it succeeds or fails. */
+  async load(work) {
+    this.loads += 1;
+    this.canvas.dataset.settled = "false";
+    try {
+      return await work();
+    } finally {
+      this.loads -= 1;
+      this.invalidate();
+    }
+  }
+
+  /** Return whether a picture has to wait: one without all meshes would delay the whole one by as long as it takes. */
+  isEarly() {
+    return this.loads > 0 && performance.now() - this.started < PARTIAL_SHARE * this.milliseconds;
+  }
+
   resize() {
     this.width = Math.max(1, this.frame.clientWidth);
     this.height = Math.max(1, this.frame.clientHeight);
@@ -141,7 +161,17 @@ export class Stage {
     this.request = requestAnimationFrame(this.tick);
     if (!this.isFinished()) return;
     this.onTick();
-    if (!this.isStale) return;
+    if (this.isStale && !this.isEarly()) this.draw();
+    this.showSettled();
+  }
+
+  /** Let the page's tests see when the picture is complete. */
+  showSettled() {
+    const isSettled = String(!this.isStale && !this.loads && !this.fence);
+    if (this.canvas.dataset.settled !== isSettled) this.canvas.dataset.settled = isSettled;
+  }
+
+  draw() {
     this.isStale = false;
     this.aim();
     this.onAim(this.camera);
