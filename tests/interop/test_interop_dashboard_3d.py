@@ -532,6 +532,23 @@ def test_light_is_interpolated_between_the_vertices(
         assert time.monotonic() < end
 
 
+def test_meshes_without_a_package_are_named_with_the_reason(serve: Serve, browse: Browse) -> None:
+    # RViz shows no such mesh: Could not load resource [package:///torso.stl]: Unable to open file "package:///torso.stl".
+    meshes = "".join(
+        f'<visual><geometry><mesh filename="package:///{name}.stl"/></geometry></visual>'
+        for name in ("torso", "leg")
+    )
+    served = serve()
+    text = f'<robot name="r"><link name="map">{meshes}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+    page = browse(address(served, "3d"))
+    status(
+        page,
+        "RobotModel",
+        "Meshes: package:///torso.stl: the name of the package is missing before the path; and 1 more",
+    )
+
+
 def test_textures_have_the_colors_of_their_pictures(
     serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1093,6 +1093,7 @@ export const GERMAN = {
     "Kein Tiefenbild: nur 16 Bit und Gleitkommazahlen werden gezeigt",
   "URDF failed Model parse: {why}": "URDF nicht lesbar: {why}",
   "URDF parsed OK": "URDF gelesen",
+  "; and {count} more": "; und {count} weitere",
   "; and {count} more links": "; und {count} weitere Glieder",
   "Transform OK": "Transformation OK",
   "No tf data": "Keine Daten von tf",

@@ -133,7 +133,9 @@ export class RobotModel extends Display {
       this.failed.push(error.message);
     }
     this.isLoading -= 1;
-    if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
+    const [first, ...others] = new Set(this.failed);
+    if (first)
+      this.setStatus("Meshes", 2, first + (others.length ? t("; and {count} more", { count: others.length }) : ""));
     else if (!this.isLoading) this.clearStatus("Meshes");
   }
 
