@@ -484,6 +484,29 @@ def test_meshes_are_opaque_whatever_the_opacity_in_their_files(
     wait_color(page, (77, 128, 128), 3)
 
 
+def test_scans_compile_no_program_after_the_first(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    scan = robot_scene.everything()["/scan"]
+    send = publish(served, {"/scan": scan, "/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    status(page, "LaserScan /scan", "Messages received")
+    page.wait("return document.querySelector('canvas.stage').dataset.settled === 'true'")
+    page.evaluate(
+        "{ const kind = WebGL2RenderingContext.prototype, { linkProgram, bufferData } = kind;"
+        "window.linked = window.uploaded = 0;"
+        "kind.linkProgram = function (...parts) { linked += 1; return linkProgram.apply(this, parts); };"
+        "kind.bufferData = function (...parts) { uploaded += 1; return bufferData.apply(this, parts); }; }"
+    )
+    for count in range(3):
+        scan.ranges = [1.0 + count] * len(scan.ranges)
+        before = page.evaluate("uploaded")
+        send("/scan", scan)
+        page.wait(
+            f"return uploaded > {before} && document.querySelector('canvas.stage').dataset.settled === 'true'"
+        )
+    assert page.evaluate("linked") == 0
+
+
 def test_files_that_come_late_are_in_a_picture_that_nothing_else_asks_for(
     serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

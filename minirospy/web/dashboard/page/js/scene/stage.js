@@ -28,6 +28,7 @@ const MAX_PITCH = Math.PI / 2 - 0.001;
 const SLOW_MS = 90;
 const FAST_MS = 30;
 const PARTIAL_SHARE = 4; // pictures while meshes load take a quarter of the time at most
+const MAX_RELEASED = 1000; // materials
 const RATIOS = [1, 0.75, 0.5];
 const MAX_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
 const LEAST_POINTS = 20_000;
@@ -81,6 +82,7 @@ export class Stage {
 
     this.isStale = true;
     this.loads = 0; // meshes and textures that are on their way
+    this.released = []; // materials that are disposed of after the next picture
     this.fence = null;
     this.drawn = 0;
     this.started = 0;
@@ -102,6 +104,7 @@ export class Stage {
   close() {
     cancelAnimationFrame(this.request);
     this.observer.disconnect();
+    this.disposeReleased();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.canvas.remove();
@@ -130,7 +133,7 @@ export class Stage {
     this.isStale = true;
   }
 
-  /** Run work that loads what is drawn, such as a mesh: a picture with it follows, whether it succeeds or fails. */
+  /** Run work that loads what is drawn, such as a mesh. A picture follows, whether it succeeds or fails. */
   async load(work) {
     this.loads += 1;
     this.canvas.dataset.settled = "false";
@@ -142,7 +145,20 @@ export class Stage {
     }
   }
 
-  /** Return whether a picture has to wait: one without all meshes would delay the whole one by as long as it takes. */
+  /**
+   * Dispose of a material after the next picture: a program that no material uses is deleted, and would be compiled
+   * again for the next message.
+   */
+  release(material) {
+    this.released.push(material);
+    if (this.released.length > MAX_RELEASED) this.disposeReleased(); // a hidden tab draws no pictures
+  }
+
+  disposeReleased() {
+    for (const material of this.released.splice(0)) material.dispose();
+  }
+
+  /** Return whether a picture has to wait: one without all meshes would delay the complete one. */
   isEarly() {
     return this.loads > 0 && performance.now() - this.started < PARTIAL_SHARE * this.milliseconds;
   }
@@ -180,6 +196,7 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
+    this.disposeReleased();
     this.labels.draw(this);
     this.drawn += 1;
     this.canvas.dataset.drawn = String(this.drawn);
@@ -242,12 +259,14 @@ export class Stage {
     if (this.milliseconds > SLOW_MS) this.coarser += 1;
     else if (this.milliseconds < FAST_MS) this.coarser -= 0.25;
     this.coarser = Math.max(-40, Math.min(this.coarser, 8));
+    const before = this.ratio;
     if (this.coarser >= 8 && this.ratio < RATIOS.length - 1) this.ratio += 1;
     else if (this.coarser >= 8) this.mostPoints = Math.max(LEAST_POINTS, Math.round(this.mostPoints / 2));
     else if (this.coarser <= -40 && this.ratio > 0) this.ratio -= 1;
     else return;
     this.coarser = 0;
-    this.resize();
+    // Only another size needs another buffer.
+    if (this.ratio !== before) this.resize();
   }
 
   // --- the view
