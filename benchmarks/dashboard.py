@@ -1,7 +1,12 @@
-"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients] [soak]`: the page's frame rate, and the cost of its server.
+"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [scene] [clients] [soak]`: the page's frame rate, and its server's cost.
 
 page: headless chromium shows a layout with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and
 the topics with the scan open; measures frames per second with requestAnimationFrame.
+
+scene: headless chromium shows an arm whose joints move at 50 Hz and a scan of 720 readings at 10 Hz in the 3D view, while the
+camera turns, so that each animation frame needs a picture; measures the time of the page's JavaScript for a picture, draw calls,
+triangles and the bytes uploaded to the graphics card. Chromium draws in software by default; with --gpu it draws on the
+graphics card, and the frames per second are those of a user.
 
 clients: ten programs use the page's protocol on 50 topics at a raised rate; measures the memory of the server and of a client
 over the run, and the server's CPU time for each MB that it sends.
@@ -28,6 +33,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import psutil
@@ -36,6 +42,9 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from tests.conftest import free_port
+
+if TYPE_CHECKING:
+    from tests.interop.browser import Page
 
 BIN = Path(sys.executable).parent
 
@@ -100,6 +109,74 @@ while not rospy.is_shutdown():
     if count % 10 == 0:
         rospy.loginfo("step %d", count)
     rate.sleep()
+"""
+
+ARM = """
+import math
+from pathlib import Path
+import rospy, xacro
+from geometry_msgs.msg import Quaternion, TransformStamped
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+import minirospy.ros
+from minirospy.core.urdf.poses import quaternion_from_rpy
+from minirospy.core.urdf.read import parse_robot
+rospy.init_node("arm")
+text = xacro.process_file(str(Path(minirospy.ros.__file__).parent / "six_joint_arm/urdf/arm.xacro")).toxml()
+rospy.set_param("/robot_description", text)
+robot = parse_robot(text, "arm")
+frames = rospy.Publisher("/tf", TFMessage, queue_size=10)
+scans = rospy.Publisher("/scan", LaserScan, queue_size=10)
+rate, count = rospy.Rate(50), 0
+while not rospy.is_shutdown():
+    count += 1
+    found = []
+    for joint in robot.joints.values():
+        moved = TransformStamped(child_frame_id=joint.child)
+        moved.header.frame_id, moved.header.stamp = joint.parent, rospy.Time.now()
+        place = moved.transform.translation
+        place.x, place.y, place.z = joint.origin.xyz
+        roll, pitch, yaw = joint.origin.rpy
+        turn = 0.3 * math.sin(count / 50) if joint.type != "fixed" else 0.0
+        moved.transform.rotation = Quaternion(*quaternion_from_rpy(roll, pitch, yaw + turn))
+        found.append(moved)
+    frames.publish(TFMessage(found))
+    if count % 5 == 0:
+        scan = LaserScan(angle_increment=math.pi / 360, range_max=9)
+        scan.ranges = [3 + math.sin(count / 50 + beam / 30) for beam in range(720)]
+        scan.header.frame_id, scan.header.stamp = robot.root, rospy.Time.now()
+        scans.publish(scan)
+    rate.sleep()
+"""
+
+# Counts what is uploaded while a picture is drawn, and turns the camera before each of them.
+COUNTED = """
+import("./js/scene/stage.js").then(({ Stage }) => {
+  window.pictures = [];
+  let bytes = 0, programs = 0;
+  const size = (...parts) => {
+    const data = parts.find(part => part?.byteLength || part?.width);
+    return data?.byteLength ?? (data ? data.width * data.height * 4 : 0);
+  };
+  for (const name of ["bufferData", "bufferSubData", "texImage2D", "texSubImage2D"]) {
+    const call = WebGL2RenderingContext.prototype[name];
+    WebGL2RenderingContext.prototype[name] = function (...parts) { bytes += size(...parts); return call.apply(this, parts); };
+  }
+  const { linkProgram } = WebGL2RenderingContext.prototype;
+  WebGL2RenderingContext.prototype.linkProgram = function (program) { programs += 1; return linkProgram.call(this, program); };
+  const { tick } = Stage.prototype;
+  Stage.prototype.tick = function (now) {
+    window.stage = this;
+    const { drawn } = this;
+    bytes = programs = 0;
+    const started = performance.now();
+    if (window.areTurned && !this.fence) this.rotate(1, 0);
+    tick.call(this, now);
+    if (this.drawn === drawn) return;
+    const { calls, triangles } = this.renderer.info.render;
+    pictures.push({ ms: performance.now() - started, at: started, calls, triangles, bytes, programs });
+  };
+})
 """
 
 MAX_GROWTH = 0.05  # of the size between two thirds of a soak: more is no noise of the garbage collector
@@ -190,6 +267,62 @@ def measure_page(seconds: float) -> None:
         f"page: {found['fps']:.1f} frames a second, 99 % within {found['p99']:.0f} ms, longest {found['longest']:.0f} ms; "
         f"heap {found['heap'] / 1e6:.0f} MB; server {share:.0f} % CPU; image {drawn}"
     )
+
+
+def metrics(page: Page) -> dict[str, float]:
+    """Return chromium's counters of the page's main thread: seconds of CPU time of scripts and of all tasks."""
+    found = page.call("Performance.getMetrics")["metrics"]
+    return {each["name"]: each["value"] for each in found}
+
+
+def measure_scene(pictures: int, *, has_gpu: bool) -> None:
+    """Print what a picture of the 3D view with an arm and a scan costs."""
+    from tests.interop.browser import Page
+
+    flags = (
+        *GC_FLAGS,
+        *(("--enable-gpu", "--ignore-gpu-blocklist", "--use-angle=gl-egl") if has_gpu else ()),
+    )
+    with graph() as (_, port), contextlib.ExitStack() as stack:
+        start(stack, sys.executable, "-c", ARM)
+        page = Page(f"http://localhost:{port}/#/topics", width=1280, height=800, flags=flags)
+        stack.callback(page.close)
+        page.evaluate(COUNTED)
+        page.evaluate("location.hash = '#/3d'")
+        page.wait(
+            "return document.querySelectorAll('.display[data-level=ok]').length >= 4 && pictures.length > 20"
+        )
+        page.call("Performance.setTimeDomain", timeDomain="threadTicks")
+        page.call("Performance.enable")
+        page.evaluate("window.areTurned = true; pictures.length = 0")
+        page.wait("return pictures.length > 20")
+        heap, memory = page.evaluate(HEAP), page.evaluate("({ ...stage.renderer.info.memory })")
+        before = metrics(page)
+        page.evaluate("pictures.length = 0")
+        page.wait(f"return pictures.length >= {pictures}")
+        found, after = page.evaluate("pictures"), metrics(page)
+        grown = (page.evaluate(HEAP) - heap) / 1e6
+        renderer = page.evaluate("stage.rendererName")
+        held = page.evaluate("({ ...stage.renderer.info.memory })")
+    times = sorted(each["ms"] for each in found)
+    seconds = (found[-1]["at"] - found[0]["at"]) / 1000
+    scripts, tasks = (
+        (after[name] - before[name]) / len(found) * 1000 for name in ("ScriptDuration", "TaskDuration")
+    )
+    uploads = sorted(each["bytes"] for each in found)
+    print(f"scene: {renderer}: {(len(found) - 1) / seconds:.1f} pictures a second, {len(found)} pictures")
+    print(
+        f"scene: JavaScript of a picture: median {times[len(times) // 2]:.1f} ms, "
+        f"95 % within {times[int(len(times) * 0.95)]:.1f} ms; CPU time of all scripts: {scripts:.1f} ms a picture, "
+        f"of all tasks of the main thread: {tasks:.1f} ms"
+    )
+    print(
+        f"scene: {found[-1]['calls']} draw calls, {found[-1]['triangles']} triangles; uploaded for a picture: "
+        f"median {uploads[len(uploads) // 2]} bytes, 95 % within {uploads[int(len(uploads) * 0.95)]} bytes"
+    )
+    programs = sum(each["programs"] for each in found)
+    print(f"scene: {programs} shader programs compiled during {len(found)} pictures")
+    print(f"scene: heap {grown:+.2f} MB over the run; geometries and textures: {memory} -> {held}")
 
 
 def columns(plots: str) -> str:
@@ -349,8 +482,12 @@ def memory_of(process: psutil.Process) -> float:
 def main() -> None:
     """Run the measurements that the arguments select, by default all."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients", "soak"])
+    parser.add_argument(
+        "what", nargs="*", default=["page", "clients"], choices=["page", "scene", "clients", "soak"]
+    )
     parser.add_argument("--seconds", type=float, default=10.0, help="of the measurement")
+    parser.add_argument("--pictures", type=int, default=300, metavar="N", help="of the scene")
+    parser.add_argument("--gpu", action="store_true", help="draw the scene on the graphics card")
     parser.add_argument("--hours", type=float, default=1.0, help="of the soak, in slow motion")
     parser.add_argument("--clients", type=int, default=10, metavar="N", help="of the soak, at least one")
     parser.add_argument(
@@ -360,6 +497,8 @@ def main() -> None:
     words = parser.parse_args()
     if "page" in words.what:
         measure_page(words.seconds)
+    if "scene" in words.what:
+        measure_scene(words.pictures, has_gpu=words.gpu)
     if "clients" in words.what:
         measure_clients(words.seconds, words.rate)
     if "soak" in words.what:

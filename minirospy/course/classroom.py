@@ -21,7 +21,7 @@ from minirospy.base.errors import DeserializationError, RpcRefused
 from minirospy.core.idl.load import message_class
 from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
-from minirospy.course.results import CLASS_PARAMETER, MAX_KEY, MAX_NAME, SECONDS, Result, result_of
+from minirospy.course.results import CLASS_PARAMETER, MAX_KEY, MAX_NAME, SECONDS, Result, printable, result_of
 from minirospy.introspect.messages import Received
 from minirospy.introspect.streams import ToolNode
 from minirospy.runtime.rpc.master_proxy import MasterProxy
@@ -122,7 +122,7 @@ def read_shared(text: str) -> Shared | None:
     if not isinstance(key, str) or not _NAME.fullmatch(key):
         return None
     student = found.get("student")
-    name = _printable(student) if isinstance(student, str) else ""
+    name = printable(student, MAX_NAME) if isinstance(student, str) else ""
     return Shared(key, name, dict(_results(found.get("exercises"))[:MAX_EXERCISES]))
 
 
@@ -156,7 +156,7 @@ def merge(parameters: object, shared: Iterable[tuple[str, Shared]]) -> list[Stud
         is_shown = isinstance(own_name, str) or results or _has_any(_NOW, value.get("now"))
         if is_shown and (student := row(key, key)):
             if isinstance(own_name, str):
-                student.name = _printable(own_name)
+                student.name = printable(own_name, MAX_NAME)
             add(student, results)
 
     with_topics: dict[str, str] = {}  # the row's name -> its topic
@@ -167,7 +167,7 @@ def merge(parameters: object, shared: Iterable[tuple[str, Shared]]) -> list[Stud
         name = found.key if is_known else f"{robot}/{found.key}"
         if student := row(name, found.key):
             with_topics[name] = topic
-            student.robot = _printable(robot)
+            student.robot = printable(robot, MAX_NAME)
             student.name = found.student or student.name
             add(student, found.results.items())
     in_order = sorted(rows, key=lambda name: (_letters(rows[name].name), rows[name].robot, name))
@@ -241,11 +241,6 @@ def _letters(name: str) -> str:
     """Return a name's letters for sorting: in upper case, without accents."""
     parts = unicodedata.normalize("NFKD", name)
     return "".join(each for each in parts if not unicodedata.category(each).startswith("M")).upper()
-
-
-def _printable(text: str) -> str:
-    """Return the beginning of a name, without the halves of characters that JSON may contain."""
-    return text[:MAX_NAME].encode("utf-8", "replace").decode("utf-8")
 
 
 def _refuse(constant: str) -> object:

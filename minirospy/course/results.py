@@ -37,6 +37,7 @@ __all__ = [
     "Result",
     "class_master",
     "join",
+    "printable",
     "publish",
     "result_of",
 ]
@@ -226,8 +227,13 @@ def result_of(found: Mapping[str, object]) -> Result:
         passed,
         _time_of(found.get("time")),
         passed or found.get("ever") is True,
-        tuple(each[:_MAX_LETTERS] for each in texts[:_MAX_FAILURES]),
+        tuple(printable(each, _MAX_LETTERS) for each in texts[:_MAX_FAILURES]),
     )
+
+
+def printable(text: str, limit: int) -> str:
+    """Return the first ``limit`` characters of a text, with "?" for each half of a character, which JSON may contain."""
+    return text[:limit].encode("utf-8", "replace").decode("utf-8")
 
 
 def _time_of(found: object) -> float:

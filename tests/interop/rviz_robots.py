@@ -167,6 +167,11 @@ def compare(name: str, text: str, folder: Path, packages: Packages) -> tuple[flo
         page = Page(f"http://127.0.0.1:{served.port}/#/3d?file=1&token={TOKEN}", width=1100, height=700)
         stack.callback(page.close)
         rviz_pictures.enlarge(page, are_all_well=False)
+        # A software renderer needs seconds for each picture while RViz draws, too.
+        page.wait(
+            "return document.querySelector('canvas.stage').dataset.settled === 'true' "
+            "&& [...document.querySelectorAll('.displays .display')].some(e => e.dataset.level !== 'warn')"
+        )
         end = time.monotonic() + _SECONDS
         while True:
             theirs, ours = rviz.settled(2.0), rviz_pictures.our_picture(page)

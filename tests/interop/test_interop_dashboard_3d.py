@@ -484,6 +484,56 @@ def test_meshes_are_opaque_whatever_the_opacity_in_their_files(
     wait_color(page, (77, 128, 128), 3)
 
 
+def test_scans_compile_no_program_after_the_first(serve: Serve, browse: Browse) -> None:
+    served = serve()
+    scan = robot_scene.everything()["/scan"]
+    send = publish(served, {"/scan": scan, "/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    status(page, "LaserScan /scan", "Messages received")
+    page.wait("return document.querySelector('canvas.stage').dataset.settled === 'true'")
+    page.evaluate(
+        "{ const kind = WebGL2RenderingContext.prototype, { linkProgram, bufferData } = kind;"
+        "window.linked = window.uploaded = 0;"
+        "kind.linkProgram = function (...parts) { linked += 1; return linkProgram.apply(this, parts); };"
+        "kind.bufferData = function (...parts) { uploaded += 1; return bufferData.apply(this, parts); }; }"
+    )
+    for count in range(3):
+        scan.ranges = [1.0 + count] * len(scan.ranges)
+        before = page.evaluate("uploaded")
+        send("/scan", scan)
+        page.wait(
+            f"return uploaded > {before} && document.querySelector('canvas.stage').dataset.settled === 'true'"
+        )
+    assert page.evaluate("linked") == 0
+
+
+def test_files_that_come_late_are_in_a_picture_that_nothing_else_asks_for(
+    serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rviz_pictures.prepare(tmp_path)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    served = serve()
+    publish(served, {"/tf_static": robot_scene.frames()})
+    page = browse(address(served, "3d"))
+    look_down(page)
+    page.evaluate(
+        "import('./js/link.js').then(({ Link }) => { const { asset } = Link.prototype; window.held = [];"
+        "Link.prototype.asset = async function (uri) {"
+        " await new Promise((release) => held.push({ uri, release })); return asset.call(this, uri); } })"
+    )
+    mesh = '<visual><geometry><mesh filename="package://rviz_meshes/picture.dae" scale="6 6 6"/></geometry></visual>'
+    text = f'<robot name="r"><link name="map">{mesh}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+
+    for name in ("picture.dae", "squares.png"):
+        page.wait(f"return held.length === 1 && held[0].uri.endsWith({name!r})")
+        # A picture without the mesh is none that a comparison may take.
+        assert page.evaluate("document.querySelector('canvas.stage').dataset.settled") == "false"
+        page.evaluate("held.pop().release()")
+    page.wait("return document.querySelector('canvas.stage').dataset.settled === 'true'")
+    assert is_near(colors(page), (240, 220, 40))
+
+
 def test_light_is_interpolated_between_the_vertices(
     serve: Serve, browse: Browse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -503,6 +553,23 @@ def test_light_is_interpolated_between_the_vertices(
     end = time.monotonic() + PATIENCE
     while not is_near({color_at(page, 0.3 * metre, 0.3 * metre)}, (red, green, blue), 3):
         assert time.monotonic() < end
+
+
+def test_meshes_without_a_package_are_named_with_the_reason(serve: Serve, browse: Browse) -> None:
+    # RViz shows no such mesh: Could not load resource [package:///torso.stl]: Unable to open file "package:///torso.stl".
+    meshes = "".join(
+        f'<visual><geometry><mesh filename="package:///{name}.stl"/></geometry></visual>'
+        for name in ("torso", "leg")
+    )
+    served = serve()
+    text = f'<robot name="r"><link name="map">{meshes}</link></robot>'
+    served.run(served.node("setter").set_param("/robot_description", text))
+    page = browse(address(served, "3d"))
+    status(
+        page,
+        "RobotModel",
+        "Meshes: package:///torso.stl: the name of the package is missing before the path; and 1 more",
+    )
 
 
 def test_textures_have_the_colors_of_their_pictures(

@@ -67,7 +67,8 @@ def test_faults_of_a_robot_are_shown_with_advice_and_links(
     page.wait("return document.querySelector(\"tr[data-node='/dead'].bad\")")
     assert page.evaluate("document.querySelector('tr[data-node]').dataset.node") == "/dead"
     page.wait_text(".findings .problem", "/dead: nothing listens at their port")
-    page.wait_text(".findings .problem .advice", "rosnode cleanup")
+    page.wait_text(".findings .problem .advice code", "rosnode cleanup")
+    assert "`" not in page.evaluate("document.querySelector('main').textContent")
     page.wait_text(".findings .warning", "nobody publishes /cmd_vell (/motor)")
     # No scan comes: after some reports the topic is silent.
     page.wait_text(".findings .warning", "/scan is silent")

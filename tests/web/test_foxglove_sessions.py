@@ -374,6 +374,13 @@ def test_asset_is_refused_before_its_folder_is_read(uri: str, monkeypatch: pytes
     assert read == []
 
 
+def test_asset_uri_without_a_package_is_refused_with_the_reason() -> None:
+    with pytest.raises(
+        BridgeError, match=r"^package:///arm/a.stl: the name of the package is missing before the path$"
+    ):
+        Assets(Packages()).open("package:///arm/a.stl")
+
+
 def test_asset_larger_than_the_queue_limit_is_sent(
     run_bridge: Callable[..., Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

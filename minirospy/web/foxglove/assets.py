@@ -58,6 +58,9 @@ class Assets:
     def _path(self, uri: str) -> Path:
         if uri.lower().startswith("file://"):
             uri = self._package_uri(uri)
+        if uri.lower().startswith("package:///"):
+            # ROS's resource_retriever cannot load them either.
+            raise BridgeError(f"{uri[:200]}: the name of the package is missing before the path")
         if not any(each.fullmatch(uri) for each in self._allowed):
             raise BridgeError(f"Asset URI not allowed: {uri[:200]}")
         package, _, name = unquote(uri.removeprefix("package://")).partition("/")

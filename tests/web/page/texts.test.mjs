@@ -3,7 +3,19 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { csv, filterOf, lineOf, linesOf, plainText } from "../../../minirospy/web/dashboard/page/js/logs.js";
+import { codeParts } from "../../../minirospy/web/dashboard/page/js/texts.js";
 import { Axis, clockText, heights, roundStep, sizeText } from "../../../minirospy/web/dashboard/page/js/timeline.js";
+
+test("code is what two backticks enclose, and text stays text", () => {
+  assert.deepEqual(codeParts("start `roscore`, or set `<b>`"), [
+    ["start ", false],
+    ["roscore", true],
+    [", or set ", false],
+    ["<b>", true],
+  ]);
+  assert.deepEqual(codeParts("one ` alone"), [["one ` alone", false]]);
+  assert.deepEqual(codeParts(""), []);
+});
 
 test("lines of a log file are read in three forms", () => {
   const text = [

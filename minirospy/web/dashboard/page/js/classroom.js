@@ -213,7 +213,13 @@ function texts(values, most) {
     .map((each) => cut(each, MAX_TEXT));
 }
 
-/** Return the beginning of a text. Whole characters are counted, as in Python: an emoji is one. */
+/**
+ * Return the beginning of a text, with "?" for each half of a character, as in Python. Whole characters are counted: an
+ * emoji is one.
+ */
 function cut(text, most) {
-  return [...text.slice(0, 2 * most)].slice(0, most).join("");
+  return [...text.slice(0, 2 * most)]
+    .slice(0, most)
+    .join("")
+    .replace(/\p{Cs}/gu, "?");
 }

@@ -3,7 +3,7 @@
 // setText, by t().
 
 import { isList } from "./ros1.js";
-import { t } from "./texts.js";
+import { codeParts, t } from "./texts.js";
 
 const SPOKEN = new Set(["title", "aria-label", "placeholder", "label"]);
 const WORDED = new Set(["button", "label", "option", "h2", "h3", "legend", "strong", "p", "summary"]);
@@ -48,6 +48,9 @@ export function breakable(name) {
     .split(/(?<=[/_])(?=[^/_])/)
     .flatMap((part, index) => (index ? [h("wbr"), part] : [part]));
 }
+
+/** Return a text as children, with <code> for what is between backticks. */
+export const withCode = (text) => codeParts(text).map(([part, isCode]) => (isCode ? h("code", {}, part) : part));
 
 /** Replace what is in an element. */
 export function fill(element, ...children) {

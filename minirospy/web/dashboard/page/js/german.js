@@ -427,7 +427,7 @@ export const GERMAN = {
     "Rad: zoomen · ziehen: schieben · Doppelklick: den Werten folgen",
   "Chart: left and right pan, plus and minus zoom, Escape follows":
     "Diagramm: links und rechts schieben, Plus und Minus zoomen, Escape folgt",
-  "/topic/field, /topic/array[0:5]": "/topic/feld, /topic/array[0:5]",
+  "/topic/field, /topic/a[0:5]": "/topic/feld, /topic/a[0:5]",
   '"{rest}" is not a field, nor an index, nor a filter as {id==1}':
     "„{rest}“ ist kein Feld, kein Index und kein Filter wie {id==1}",
   "a path behind its topic has at most {most} characters": "ein Pfad hat hinter seinem Topic höchstens {most} Zeichen",
@@ -1093,6 +1093,7 @@ export const GERMAN = {
     "Kein Tiefenbild: nur 16 Bit und Gleitkommazahlen werden gezeigt",
   "URDF failed Model parse: {why}": "URDF nicht lesbar: {why}",
   "URDF parsed OK": "URDF gelesen",
+  "; and {count} more": "; und {count} weitere",
   "; and {count} more links": "; und {count} weitere Glieder",
   "Transform OK": "Transformation OK",
   "No tf data": "Keine Daten von tf",

@@ -27,6 +27,12 @@ export function chooseLanguage(wanted, offered = []) {
 /** Return the text of an error; a TextError's is translated. */
 export const errorText = ({ message, text, values }) => (text === undefined ? message : t(text, values));
 
+/** Return the parts of a text as [part, isCode]: code is what is between two backticks. */
+export function codeParts(text) {
+  const parts = String(text).split(/`([^`]+)`/);
+  return parts.map((part, index) => [part, index % 2 === 1]).filter(([part]) => part !== "");
+}
+
 const missing = new Set();
 const made = new Set();
 let isWatched = false;

@@ -336,15 +336,18 @@ export function ellipse(covariance, width = 6) {
   return ball;
 }
 
-/** Remove an object with all that the graphics card keeps of it. */
-export function discard(object) {
+/**
+ * Remove an object with all that the graphics card keeps of it. `release` disposes of a material: Stage.release does so
+ * after the next picture, so that the next message's material uses the same compiled program.
+ */
+export function discard(object, release = (material) => material.dispose()) {
   object.removeFromParent();
   object.traverse((each) => {
     if (each.geometry && !SHARED.has(each.geometry)) each.geometry.dispose();
     for (const material of [each.material ?? []].flat()) {
       if (AXES.includes(material)) continue;
       material.map?.dispose();
-      material.dispose();
+      release(material);
     }
     if (each.isInstancedMesh) each.dispose();
   });

@@ -27,6 +27,8 @@ const FIELD_OF_VIEW = (45 * Math.PI) / 180; // as in RViz
 const MAX_PITCH = Math.PI / 2 - 0.001;
 const SLOW_MS = 90;
 const FAST_MS = 30;
+const PARTIAL_SHARE = 4; // pictures while meshes load take a quarter of the time at most
+const MAX_RELEASED = 1000; // materials
 const RATIOS = [1, 0.75, 0.5];
 const MAX_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
 const LEAST_POINTS = 20_000;
@@ -79,8 +81,11 @@ export class Stage {
     frame.append(this.canvas, this.labels.element, this.corner);
 
     this.isStale = true;
+    this.loads = 0; // meshes and textures that are on their way
+    this.released = []; // materials that are disposed of after the next picture
     this.fence = null;
     this.drawn = 0;
+    this.started = 0;
     this.milliseconds = 0; // of a picture, from its commands to its end
     this.ratio = 0;
     this.coarser = 0; // pictures that were too slow, less those that were not
@@ -99,6 +104,7 @@ export class Stage {
   close() {
     cancelAnimationFrame(this.request);
     this.observer.disconnect();
+    this.disposeReleased();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.canvas.remove();
@@ -127,6 +133,36 @@ export class Stage {
     this.isStale = true;
   }
 
+  /** Run work that loads what is drawn, such as a mesh. A picture follows, whether it succeeds or fails. */
+  async load(work) {
+    this.loads += 1;
+    this.canvas.dataset.settled = "false";
+    try {
+      return await work();
+    } finally {
+      this.loads -= 1;
+      this.invalidate();
+    }
+  }
+
+  /**
+   * Dispose of a material after the next picture: a program that no material uses is deleted, and would be compiled
+   * again for the next message.
+   */
+  release(material) {
+    this.released.push(material);
+    if (this.released.length > MAX_RELEASED) this.disposeReleased(); // a hidden tab draws no pictures
+  }
+
+  disposeReleased() {
+    for (const material of this.released.splice(0)) material.dispose();
+  }
+
+  /** Return whether a picture has to wait: one without all meshes would delay the complete one. */
+  isEarly() {
+    return this.loads > 0 && performance.now() - this.started < PARTIAL_SHARE * this.milliseconds;
+  }
+
   resize() {
     this.width = Math.max(1, this.frame.clientWidth);
     this.height = Math.max(1, this.frame.clientHeight);
@@ -141,7 +177,17 @@ export class Stage {
     this.request = requestAnimationFrame(this.tick);
     if (!this.isFinished()) return;
     this.onTick();
-    if (!this.isStale) return;
+    if (this.isStale && !this.isEarly()) this.draw();
+    this.showSettled();
+  }
+
+  /** Let the page's tests see when the picture is complete. */
+  showSettled() {
+    const isSettled = String(!this.isStale && !this.loads && !this.fence);
+    if (this.canvas.dataset.settled !== isSettled) this.canvas.dataset.settled = isSettled;
+  }
+
+  draw() {
     this.isStale = false;
     this.aim();
     this.onAim(this.camera);
@@ -150,6 +196,7 @@ export class Stage {
     this.renderer.render(this.scene, this.camera);
     this.fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
+    this.disposeReleased();
     this.labels.draw(this);
     this.drawn += 1;
     this.canvas.dataset.drawn = String(this.drawn);
@@ -212,12 +259,14 @@ export class Stage {
     if (this.milliseconds > SLOW_MS) this.coarser += 1;
     else if (this.milliseconds < FAST_MS) this.coarser -= 0.25;
     this.coarser = Math.max(-40, Math.min(this.coarser, 8));
+    const before = this.ratio;
     if (this.coarser >= 8 && this.ratio < RATIOS.length - 1) this.ratio += 1;
     else if (this.coarser >= 8) this.mostPoints = Math.max(LEAST_POINTS, Math.round(this.mostPoints / 2));
     else if (this.coarser <= -40 && this.ratio > 0) this.ratio -= 1;
     else return;
     this.coarser = 0;
-    this.resize();
+    // Only another size needs another buffer.
+    if (this.ratio !== before) this.resize();
   }
 
   // --- the view

@@ -2,7 +2,7 @@
 
 import { fragmentOf } from "../address.js";
 import { BoardStrip } from "../board_strip.js";
-import { bandwidth, fill, h, refill, setText } from "../dom.js";
+import { bandwidth, fill, h, refill, setText, withCode } from "../dom.js";
 import { translated } from "../findings.js";
 import { TopicHealth, linesToShow, nodesOf, signatureOf, verdictOf, viewOf } from "../health.js";
 import { NAMES, linesOf, timeText } from "../logs.js";
@@ -192,7 +192,9 @@ export class Overview {
     } else if (this.nodes) text = t("checking …");
     this.verdict.dataset.level = level;
     setText(this.verdict, text);
-    setText(this.about, state === "open" && this.findings ? t("as `minirospy doctor` finds") : "");
+    const about = state === "open" && this.findings ? t("as `minirospy doctor` finds") : "";
+    if (about !== this.shownAbout) fill(this.about, withCode(about));
+    this.shownAbout = about;
   }
 
   showAdvice() {
@@ -207,8 +209,8 @@ export class Overview {
           "li",
           { class: status },
           h("strong", {}, check, ": "),
-          h("span", {}, translated(text)),
-          advice ? h("p", { class: "advice" }, "→ ", translated(advice)) : null,
+          h("span", {}, withCode(translated(text))),
+          advice ? h("p", { class: "advice" }, h("span", {}, "→ ", withCode(translated(advice)))) : null,
           view ? h("p", { class: "advice" }, h("a", { href: fragmentOf(...view) }, t("Show more"))) : null,
         ),
       ),

@@ -63,7 +63,7 @@ export class Plot {
     this.input = h("input", {
       class: "grow",
       list: this.known.id,
-      placeholder: "/topic/field, /topic/array[0:5]",
+      placeholder: "/topic/field, /topic/a[0:5]",
       "aria-label": "What to plot",
       autocomplete: "off",
     });

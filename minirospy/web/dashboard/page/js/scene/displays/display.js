@@ -89,7 +89,7 @@ export class Display {
 
   remove(item) {
     this.items.delete(item);
-    discard(item.object);
+    discard(item.object, (material) => this.context.stage.release(material));
     this.context.stage.invalidate();
   }
 

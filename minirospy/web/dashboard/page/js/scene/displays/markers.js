@@ -277,13 +277,10 @@ function makeMesh({ mesh_resource: uri, mesh_use_embedded_materials: isOwn, scal
   const paint = isOwn
     ? { tint: isUnset ? null : rgbOf(color), alpha: isUnset ? 1 : color.a, rgb: isUnset ? WHITE : rgbOf(color) }
     : { rgb: rgbOf(color), alpha: color.a, isForced: true };
-  loadMesh(display.context.link, uri, paint).then(
-    (mesh) => {
-      holder.add(mesh);
-      display.context.stage.invalidate();
-    },
-    (error) => display.setStatus("Message", 2, error.message),
-  );
+  const { link, stage } = display.context;
+  stage
+    .load(async () => holder.add(await loadMesh(link, uri, paint)))
+    .catch((error) => display.setStatus("Message", 2, error.message));
   return holder;
 }
 

@@ -128,13 +128,14 @@ export class RobotModel extends Display {
   async load(work) {
     this.isLoading += 1;
     try {
-      await work();
+      await this.context.stage.load(work);
     } catch (error) {
       this.failed.push(error.message);
     }
     this.isLoading -= 1;
-    this.context.stage.invalidate();
-    if (this.failed.length) this.setStatus("Meshes", 2, this.failed.slice(0, 3).join("; "));
+    const [first, ...others] = new Set(this.failed);
+    if (first)
+      this.setStatus("Meshes", 2, first + (others.length ? t("; and {count} more", { count: others.length }) : ""));
     else if (!this.isLoading) this.clearStatus("Meshes");
   }
 

@@ -74,15 +74,17 @@ export class World extends Markers {
 
   /** Cover a shape with a picture, as soon as it has come. */
   async paint(object, uri) {
+    const { link, stage } = this.context;
     try {
-      const texture = await loadTexture(this.context.link, uri);
-      object.traverse((each) => {
-        if (!each.isMesh) return;
-        each.material.map = texture;
-        each.material.color.setRGB(1, 1, 1);
-        each.material.needsUpdate = true;
+      await stage.load(async () => {
+        const texture = await loadTexture(link, uri);
+        object.traverse((each) => {
+          if (!each.isMesh) return;
+          each.material.map = texture;
+          each.material.color.setRGB(1, 1, 1);
+          each.material.needsUpdate = true;
+        });
       });
-      this.context.stage.invalidate();
     } catch (error) {
       this.setStatus("Texture", 1, t("{name}: {why}", { name: uri, why: error.message }));
     }
