@@ -149,7 +149,7 @@ while not rospy.is_shutdown():
     rate.sleep()
 """
 
-# Counts what is uploaded while a picture is drawn, and turns the camera before each of them.
+# Count what is uploaded while a picture is drawn, and turn the camera in each animation frame.
 COUNTED = """
 import("./js/scene/stage.js").then(({ Stage }) => {
   window.pictures = [];
@@ -170,7 +170,7 @@ import("./js/scene/stage.js").then(({ Stage }) => {
     const { drawn } = this;
     bytes = programs = 0;
     const started = performance.now();
-    if (window.areTurned && !this.fence) this.rotate(1, 0);
+    if (window.areTurned) this.rotate(1, 0);
     tick.call(this, now);
     if (this.drawn === drawn) return;
     const { calls, triangles } = this.renderer.info.render;
@@ -292,6 +292,10 @@ def measure_scene(pictures: int, *, has_gpu: bool) -> None:
         page.wait(
             "return document.querySelectorAll('.display[data-level=ok]').length >= 4 && pictures.length > 20"
         )
+        if has_gpu and page.evaluate("stage.isSoftware"):
+            raise SystemExit(
+                f"scene: --gpu: chromium draws in software: {page.evaluate('stage.rendererName')}"
+            )
         page.call("Performance.setTimeDomain", timeDomain="threadTicks")
         page.call("Performance.enable")
         page.evaluate("window.areTurned = true; pictures.length = 0")
@@ -480,7 +484,7 @@ def memory_of(process: psutil.Process) -> float:
 
 
 def main() -> None:
-    """Run the measurements that the arguments select, by default all."""
+    """Run the measurements that the arguments select, by default page and clients."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "what", nargs="*", default=["page", "clients"], choices=["page", "scene", "clients", "soak"]

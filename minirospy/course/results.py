@@ -232,7 +232,7 @@ def result_of(found: Mapping[str, object]) -> Result:
 
 
 def printable(text: str, limit: int) -> str:
-    """Return the first ``limit`` characters of a text, with "?" for each half of a character, which JSON may contain."""
+    """Return the first ``limit`` characters of a text. Replace each unpaired surrogate, which JSON can contain, by "?"."""
     return text[:limit].encode("utf-8", "replace").decode("utf-8")
 
 

@@ -78,8 +78,10 @@ class Browser:
     def __init__(self, *flags: str) -> None:
         assert CHROMIUM
         self._folder = tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True)
+        # Chromium ignores --enable-gpu after --disable-gpu.
+        common = [each for each in _FLAGS if each != "--disable-gpu" or "--enable-gpu" not in flags]
         self.process = subprocess.Popen(
-            [CHROMIUM, *_FLAGS, *flags, f"--user-data-dir={self._folder.name}", "about:blank"],
+            [CHROMIUM, *common, *flags, f"--user-data-dir={self._folder.name}", "about:blank"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )

@@ -527,7 +527,7 @@ def test_files_that_come_late_are_in_a_picture_that_nothing_else_asks_for(
 
     for name in ("picture.dae", "squares.png"):
         page.wait(f"return held.length === 1 && held[0].uri.endsWith({name!r})")
-        # A picture without the mesh is none that a comparison may take.
+        # Comparisons must not use a picture without the mesh.
         assert page.evaluate("document.querySelector('canvas.stage').dataset.settled") == "false"
         page.evaluate("held.pop().release()")
     page.wait("return document.querySelector('canvas.stage').dataset.settled === 'true'")

@@ -59,7 +59,7 @@ class Assets:
         if uri.lower().startswith("file://"):
             uri = self._package_uri(uri)
         if uri.lower().startswith("package:///"):
-            # ROS's resource_retriever cannot load them either.
+            # ROS's resource_retriever cannot load a URI without a package either.
             raise BridgeError(f"{uri[:200]}: the name of the package is missing before the path")
         if not any(each.fullmatch(uri) for each in self._allowed):
             raise BridgeError(f"Asset URI not allowed: {uri[:200]}")

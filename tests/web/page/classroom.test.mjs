@@ -196,3 +196,9 @@ for (const { about, parameters, topics, students, unreadable = [] } of CASES) {
     assert.deepEqual(rows, students);
   });
 }
+
+test("the length of a message is counted in characters, as in Python", () => {
+  const message = (count) => JSON.stringify({ key: "eve", student: "😀".repeat(count) });
+  assert.equal(readShared(message(149_000))?.key, "eve");
+  assert.equal(readShared(message(150_000)), null);
+});

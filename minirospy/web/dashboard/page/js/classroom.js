@@ -30,7 +30,8 @@ export function classTopics(channels) {
  * @param {string} text
  */
 export function readShared(text) {
-  if (text.length > MAX_MESSAGE) return null;
+  // Python counts characters, JavaScript the units of UTF-16, of which a character has one or two.
+  if (text.length > 2 * MAX_MESSAGE || [...text].length > MAX_MESSAGE) return null;
   try {
     const { key, student, now, exercises } = JSON.parse(text);
     if (typeof key !== "string" || !NAME.test(key)) return null;
@@ -214,8 +215,8 @@ function texts(values, most) {
 }
 
 /**
- * Return the beginning of a text, with "?" for each half of a character, as in Python. Whole characters are counted: an
- * emoji is one.
+ * Return the beginning of a text. Replace each unpaired surrogate by "?", as in Python. Whole characters are counted:
+ * an emoji is one.
  */
 function cut(text, most) {
   return [...text.slice(0, 2 * most)]

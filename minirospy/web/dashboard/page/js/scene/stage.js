@@ -1,7 +1,6 @@
 // The picture: WebGL, cameras as RViz's views have them, labels, and drawing only what has changed. z is up, as in ROS.
-// A picture is drawn when the one before is finished, so a slow (software) renderer delays pictures and not the page;
-// where they take
-// long, they get coarser.
+// A picture is drawn when the one before is finished, so a slow (software) renderer delays pictures and not the page.
+// If pictures take long, they get coarser.
 
 import {
   Color,
@@ -27,8 +26,10 @@ const FIELD_OF_VIEW = (45 * Math.PI) / 180; // as in RViz
 const MAX_PITCH = Math.PI / 2 - 0.001;
 const SLOW_MS = 90;
 const FAST_MS = 30;
-const PARTIAL_SHARE = 4; // pictures while meshes load take a quarter of the time at most
-const MAX_RELEASED = 1000; // materials
+const MAX_PICTURE_MS = 2000; // after which a picture counts as finished: a hidden tab may never see the end
+const PARTIAL_PAUSE = 3; // while meshes load, pause this many times as long as the last picture took
+const MAX_PAUSE_MS = 1000;
+const MAX_RELEASED = 100; // materials
 const RATIOS = [1, 0.75, 0.5];
 const MAX_POINTS = { software: 150_000, hardware: 3_000_000 }; // of one cloud
 const LEAST_POINTS = 20_000;
@@ -81,6 +82,7 @@ export class Stage {
     frame.append(this.canvas, this.labels.element, this.corner);
 
     this.isStale = true;
+    this.isCleared = true; // whether the canvas is empty
     this.loads = 0; // meshes and textures that are on their way
     this.released = []; // materials that are disposed of after the next picture
     this.fence = null;
@@ -131,12 +133,13 @@ export class Stage {
 
   invalidate() {
     this.isStale = true;
+    this.showSettled();
   }
 
-  /** Run work that loads what is drawn, such as a mesh. A picture follows, whether it succeeds or fails. */
+  /** Run an async function that loads a mesh or a texture, then redraw, even if it fails. */
   async load(work) {
     this.loads += 1;
-    this.canvas.dataset.settled = "false";
+    this.showSettled();
     try {
       return await work();
     } finally {
@@ -147,20 +150,21 @@ export class Stage {
 
   /**
    * Dispose of a material after the next picture: a program that no material uses is deleted, and would be compiled
-   * again for the next message.
+   * again for the next message. A hidden tab draws no picture, so dispose of it at once.
    */
   release(material) {
     this.released.push(material);
-    if (this.released.length > MAX_RELEASED) this.disposeReleased(); // a hidden tab draws no pictures
+    if (document.hidden || this.released.length > MAX_RELEASED) this.disposeReleased();
   }
 
   disposeReleased() {
     for (const material of this.released.splice(0)) material.dispose();
   }
 
-  /** Return whether a picture has to wait: one without all meshes would delay the complete one. */
+  /** Return whether to postpone drawing: while meshes load, slow pictures of a part of the scene delay the rest. */
   isEarly() {
-    return this.loads > 0 && performance.now() - this.started < PARTIAL_SHARE * this.milliseconds;
+    const pause = Math.min(PARTIAL_PAUSE * this.milliseconds, MAX_PAUSE_MS);
+    return this.loads > 0 && !this.isCleared && performance.now() - this.started < this.milliseconds + pause;
   }
 
   resize() {
@@ -168,6 +172,7 @@ export class Stage {
     this.height = Math.max(1, this.frame.clientHeight);
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, this.isSoftware ? 1 : 2) * RATIOS[this.ratio]);
     this.renderer.setSize(this.width, this.height);
+    this.isCleared = true;
     this.invalidate();
   }
 
@@ -188,7 +193,7 @@ export class Stage {
   }
 
   draw() {
-    this.isStale = false;
+    this.isStale = this.isCleared = false;
     this.aim();
     this.onAim(this.camera);
     this.started = performance.now();
@@ -246,10 +251,10 @@ export class Stage {
   isFinished() {
     if (!this.fence) return true;
     const state = this.gl.clientWaitSync(this.fence, 0, 0);
-    if (state === this.gl.TIMEOUT_EXPIRED && performance.now() - this.started < 2000) return false;
+    if (state === this.gl.TIMEOUT_EXPIRED && performance.now() - this.started < MAX_PICTURE_MS) return false;
     this.gl.deleteSync(this.fence);
     this.fence = null;
-    this.milliseconds = performance.now() - this.started;
+    this.milliseconds = Math.min(performance.now() - this.started, MAX_PICTURE_MS);
     this.adapt();
     return true;
   }
@@ -265,7 +270,7 @@ export class Stage {
     else if (this.coarser <= -40 && this.ratio > 0) this.ratio -= 1;
     else return;
     this.coarser = 0;
-    // Only another size needs another buffer.
+    // Resizing clears the canvas, so resize only if the ratio has changed.
     if (this.ratio !== before) this.resize();
   }
 

@@ -160,7 +160,8 @@ export class Shown {
   empty() {
     for (const { label } of this.labels) this.display.context.stage.labels.remove(label);
     this.labels = [];
-    for (const child of [...this.object.children]) discard(child);
+    const { stage } = this.display.context;
+    for (const child of [...this.object.children]) discard(child, (material) => stage.release(material));
     this.controls = [];
   }
 

@@ -45,6 +45,8 @@ export class RobotModel extends Display {
     const text = this.context.link.parameters.get(key) ?? null;
     if (text === this.text) return;
     this.text = text;
+    this.loading = { count: 0, failed: [] };
+    this.clearStatus("Meshes");
     for (const item of [...this.items]) this.remove(item);
     this.links.clear();
     this.robot = null;
@@ -61,8 +63,6 @@ export class RobotModel extends Display {
     const { notes } = this.robot;
     this.setStatus("URDF", notes.length ? 1 : 0, [t("URDF parsed OK"), ...notes].join("; "));
     this.poses = null;
-    this.isLoading = 0;
-    this.failed = [];
     for (const link of this.robot.links.values())
       this.links.set(link.name, this.add(this.build(link), this.frameOf(link.name), 0, true));
     this.context.received(this);
@@ -121,22 +121,24 @@ export class RobotModel extends Display {
 
   /** Return whether all that can be shown of the robot is at its place. */
   isPlaced() {
-    return Boolean(this.robot) && !this.isLoading && [...this.links.values()].some(({ object }) => object.visible);
+    return Boolean(this.robot) && !this.loading.count && [...this.links.values()].some(({ object }) => object.visible);
   }
 
   /** Load a mesh or a texture; a failure is the status of the display. */
   async load(work) {
-    this.isLoading += 1;
+    const { loading } = this;
+    loading.count += 1;
     try {
       await this.context.stage.load(work);
     } catch (error) {
-      this.failed.push(error.message);
+      loading.failed.push(error.message);
     }
-    this.isLoading -= 1;
-    const [first, ...others] = new Set(this.failed);
+    loading.count -= 1;
+    if (loading !== this.loading) return; // the description was replaced
+    const [first, ...others] = new Set(loading.failed);
     if (first)
       this.setStatus("Meshes", 2, first + (others.length ? t("; and {count} more", { count: others.length }) : ""));
-    else if (!this.isLoading) this.clearStatus("Meshes");
+    else if (!loading.count) this.clearStatus("Meshes");
   }
 
   update() {
