@@ -294,7 +294,7 @@ def _port_range(text: str) -> range | None:
 def _user_folder() -> str:
     """Return the user's home folder, or one that does not exist if the user has none, as in containers with any user id."""
     folder = os.path.expanduser("~")
-    # A folder named "~" in the working folder would be deleted by accident, or with it the real home folder.
+    # Do not create a folder named "~": `rm -r ~` would then delete the real home folder.
     return _NO_FOLDER if folder == "~" else folder
 
 

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import ClassVar
 
-__all__ = ["LOOK_SECONDS", "Keys", "has_own_terminal"]
+__all__ = [
+    "LOOK_SECONDS",
+    "Keys",
+    "has_own_terminal",
+    "is_in_background",
+    "kept_terminal",
+    "may_read_stdin",
+    "read_without_waiting",
+]
 
 LOOK_SECONDS = 0.05  # seconds for which Keys.next waits for a key
 
@@ -35,6 +44,7 @@ class Keys:
             try:
                 self._before = termios.tcgetattr(sys.stdin)
                 tty.setcbreak(sys.stdin)
+                read_without_waiting(sys.stdin.fileno())
             except termios.error:
                 # The terminal window has been closed.
                 self._is_closed = True
@@ -70,13 +80,16 @@ class Keys:
         ready, _, _ = select.select([sys.stdin], [], [], LOOK_SECONDS)
         if not ready:
             return ""
-        # Bypass Python's buffer, which select does not see. A read that returns no bytes means that the terminal is closed.
+        # Bypass Python's buffer, which select does not see.
         try:
             key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
         except OSError:
             return self._end
+        if not key:
+            # Another process has read the key, or the terminal is closed.
+            return "" if sys.stdin.isatty() else self._end
         if key != "\x1b":
-            return key or self._end
+            return key
         # Read the rest of the key without waiting: the bytes of a key arrive together.
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
@@ -86,8 +99,8 @@ class Keys:
 def has_own_terminal(argv: Sequence[str]) -> bool:
     """Return whether stdin and stdout are terminals, and a program with the command line ``argv`` may draw on them.
 
-    A node of roslaunch has roslaunch's terminal, which other nodes use, too. Such a node has a ``__log:=`` argument, and the
-    terminal does not control its session, unless a launch-prefix such as ``xterm -e`` opens another one.
+    A node of roslaunch shares roslaunch's terminal with other nodes. It is recognised by its ``__log:=`` argument, and by a
+    stdin that is not its controlling terminal. With a launch-prefix such as ``xterm -e``, the node has its own terminal.
     """
     if any(stream is None or not stream.isatty() for stream in (sys.stdin, sys.stdout)):
         return False
@@ -98,3 +111,62 @@ def has_own_terminal(argv: Sequence[str]) -> bool:
     except OSError:
         return False
     return True
+
+
+def is_in_background(number: int) -> bool:
+    """Return whether the system would suspend this process if it read from the terminal ``number``.
+
+    Return False for a process outside of the terminal's session, such as a node of roslaunch: the system never suspends it.
+    Raise OSError if the terminal is closed.
+    """
+    if sys.platform == "win32":
+        return False
+    try:
+        return os.tcgetpgrp(number) != os.getpgrp()
+    except OSError as error:
+        if error.errno == errno.ENOTTY:
+            return False
+        raise
+
+
+def may_read_stdin() -> bool:
+    """Return whether child processes may read this process's stdin: not if it belongs to a shell that started this with `&`."""
+    # Without a stdin, the first file that this process opened may have its descriptor.
+    if sys.__stdin__ is None:
+        return False
+    try:
+        return not (os.isatty(0) and is_in_background(0))
+    except OSError:
+        return False
+
+
+def read_without_waiting(number: int) -> None:
+    """Make reads from the terminal ``number``, in single-key mode, return no bytes if there are none.
+
+    Otherwise, of two processes that read one terminal, the one that comes too late would wait for the next key.
+    """
+    if sys.platform != "win32":
+        import termios
+
+        mode = termios.tcgetattr(number)
+        mode[6][termios.VMIN] = mode[6][termios.VTIME] = 0
+        termios.tcsetattr(number, termios.TCSANOW, mode)
+
+
+@contextlib.contextmanager
+def kept_terminal() -> Iterator[None]:
+    """At the end, restore the settings that stdin's terminal has now: programs that were killed have left theirs."""
+    if sys.platform == "win32" or sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
+        yield
+        return
+    import termios
+
+    number = sys.stdin.fileno()
+    before = termios.tcgetattr(number)
+    try:
+        yield
+    finally:
+        # The terminal's window may be closed, and only a process in the foreground may change the settings.
+        with contextlib.suppress(OSError, termios.error):
+            if not is_in_background(number):
+                termios.tcsetattr(number, termios.TCSADRAIN, before)

@@ -35,6 +35,9 @@ _NAMED_OTHERWISE = {
     "urdfdom_py": ("urdf_parser_py",),
 }
 """ROS packages whose Python module is not named after the package."""
+_LAZY = {"genpy"}
+"""Packages that every message module imports: their submodules are imported when they are first used."""
+
 _INTERNAL = {
     "PyKDL": "frames functions vectors",
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
@@ -186,6 +189,9 @@ def _text(name: str, source: Path) -> str:
     is_package = source.name == "__init__.py" and name not in _ALSO
     later = {**(_submodules(name) if is_package else {}), **passed_on}
     assert not (later and "__getattr__" in names_here), f"{where}: overlay/ needs a __getattr__ of its own"
+    typed = [bound for bound, origin in names_here.items() if name in _LAZY and origin == Origin(name, bound)]
+    for bound in typed:
+        del names_here[bound]
     for bound, (module, imported) in names_here.items():
         if imported:
             by_module.setdefault(module, []).append(f"{imported} as {bound}")
@@ -209,7 +215,7 @@ def _text(name: str, source: Path) -> str:
             *_wrapped(f'"{each}"' for each in passed_on),
             "]",
         ]
-        lines += _text_of_later(name, later, starred if passed_on else [])
+        lines += _text_of_later(name, later, starred if passed_on else [], typed)
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -252,12 +258,14 @@ def _submodules(package: str) -> dict[str, str]:
     return {name: f"{package}.{name}" for name in sorted(names)}
 
 
-def _text_of_later(module: str, names: dict[str, str], starred: list[str]) -> list[str]:
-    """Return source lines that import these names on first use. Type checkers and editors do not see these lines."""
+def _text_of_later(module: str, names: dict[str, str], starred: list[str], typed: list[str]) -> list[str]:
+    """Return source lines that import these names on first use. Type checkers and editors see only the submodules ``typed``."""
+    shown = [f"    from {module} import {', '.join(f'{each} as {each}' for each in typed)}", ""]
     return [
         "",
         "import typing as _typing",
         "",
+        *(["if _typing.TYPE_CHECKING:", *shown] if typed else []),
         "if not _typing.TYPE_CHECKING:",
         "    from minirospy.ros.submodules import import_passed_on as _import_passed_on",
         "",

@@ -146,7 +146,11 @@ class Browser:
 
     def _open(self, path: str) -> contextlib.AbstractContextManager[ClientConnection]:
         return connect(
-            f"ws://127.0.0.1:{self._port}{path}", max_size=None, compression=None, open_timeout=PATIENCE
+            f"ws://127.0.0.1:{self._port}{path}",
+            max_size=None,
+            compression=None,
+            open_timeout=PATIENCE,
+            ping_interval=None,  # a busy machine may answer late
         )
 
 

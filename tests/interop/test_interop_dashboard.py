@@ -160,10 +160,12 @@ def browse() -> Iterator[Callable[..., Page]]:
 
     yield browsing
     errors = []
-    for page in opened:
-        page.evaluate("1")  # after this call, errors logged before it have arrived
-        errors += [each for each in page.errors if not any(text in each for text in CONNECTION_ERRORS)]
-        page.close()
+    with contextlib.ExitStack() as stack:
+        for page in opened:
+            stack.callback(page.close)
+        for page in opened:
+            page.evaluate("1")  # after this call, errors logged before it have arrived
+            errors += [each for each in page.errors if not any(text in each for text in CONNECTION_ERRORS)]
     assert errors == []
 
 

@@ -37,7 +37,7 @@ class LogFileHandler(RotatingFileHandler):
         self._has_warned = False
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - logging's
-        """Warn once, in one line, if the file cannot be written; logging prints a traceback for each record."""
+        """Warn once, in one line, if the file cannot be written; the base class prints a traceback for each record."""
         error = sys.exc_info()[1]
         if not isinstance(error, OSError):
             super().handleError(record)

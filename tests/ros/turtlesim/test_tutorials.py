@@ -296,7 +296,7 @@ def test_second_turtle_follows_the_first(launch: Launch, tmp_path: Path, words: 
     asyncio.run(asyncio.wait_for(main(), SECONDS))
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a terminal of the test's own")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 @pytest.mark.parametrize("package", ["turtle_tf2", "turtle_tf"])
 def test_arrow_keys_in_roslaunchs_terminal_drive_the_turtle(launch: Launch, package: str) -> None:
     terminal, stdin = os.openpty()

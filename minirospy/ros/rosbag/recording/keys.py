@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
 
 from minirospy.base.clock import SignalSafeEvent
+from minirospy.base.keyboard import is_in_background, read_without_waiting
 
 __all__ = ["read_keys"]
 
@@ -56,7 +56,7 @@ def _read_posix(on_key: Callable[[str], object], stop: threading.Event) -> None:
                 if not select.select([number], [], [], _POLL_SECONDS)[0]:
                     continue
                 data = os.read(number, 64)
-                if not data:
+                if not data and not (terminal and os.isatty(number)):
                     return
                 for key in data.decode("utf-8", "replace"):
                     on_key(key)
@@ -77,7 +77,7 @@ class _Terminal:
 
         Return False for a background process, which the system would suspend if it read from the terminal.
         """
-        if self._is_in_background():
+        if is_in_background(self._number):
             self._before = None
             return False
         if self._before is None:
@@ -87,23 +87,15 @@ class _Terminal:
             mode = termios.tcgetattr(self._number)
             mode[3] &= ~(termios.ICANON | termios.ECHO)
             termios.tcsetattr(self._number, termios.TCSANOW, mode)
+            read_without_waiting(self._number)
         return True
 
     def restore(self) -> None:
         """Restore the terminal's settings."""
-        if self._before is not None and not self._is_in_background():
+        if self._before is not None and not is_in_background(self._number):
             import termios
 
             termios.tcsetattr(self._number, termios.TCSANOW, self._before)  # type: ignore[arg-type]
-
-    def _is_in_background(self) -> bool:
-        try:
-            return os.tcgetpgrp(self._number) != os.getpgrp()
-        except OSError as error:
-            # This process does not belong to the terminal's session, like a node of roslaunch. The system never suspends it.
-            if error.errno == errno.ENOTTY:
-                return False
-            raise
 
 
 def _read_windows(on_key: Callable[[str], object], stop: threading.Event) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError
+from minirospy.base.keyboard import may_read_stdin
 from minirospy.ros.roslaunch.launcher.command import node_command, node_environment, node_folder
 from minirospy.ros.roslaunch.launcher.master import LaunchMaster
 from minirospy.ros.roslaunch.launcher.options import RunOptions
@@ -68,8 +69,7 @@ class NodeStarter:
             folder=folder,
             stdout_file=None if screen else log.with_name(f"{log.name}-stdout.log"),
             log_errors=self._options.log_errors,
-            # If this process has no stdin, its first opened file may have the descriptor 0.
-            stdin=None if self._options.inherit_stdin and sys.__stdin__ is not None else subprocess.DEVNULL,
+            stdin=None if self._options.inherit_stdin and may_read_stdin() else subprocess.DEVNULL,
             preload=self._preload,
         )
         process.node = node

@@ -16,8 +16,8 @@ class RunOptions:
     ``screen``, ``log``: send the output of all nodes to the screen or to log files, regardless of the launch file;
     ``log_errors``: also log the nodes' stderr. ``required``: treat every node as required. ``local``: skip the nodes of other
     machines. ``strict``: stop the launch if a node cannot be started. ``watch``: restart a node if its files change.
-    ``name`` is shown in the terminal's title. ``inherit_stdin``: the nodes read this process's stdin, as in ROS, for example
-    the keyboard; otherwise their stdin is empty.
+    ``name`` is shown in the terminal's title. ``inherit_stdin``: nodes inherit this process's stdin (for example the
+    keyboard), as in ROS; if False, their stdin is empty.
     """
 
     screen: bool = False

@@ -48,7 +48,8 @@ class Output:
     def title(self, text: str) -> None:
         """Set the terminal's title."""
         if self._may_title and sys.stdout.isatty():
-            print(f"\033]2;{text}\007", end="", flush=True)
+            with contextlib.suppress(OSError):
+                print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
         """Write all lines, including earlier ones, to roslaunch-HOST-PID.log in ``folder``; return the file's path.

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from minirospy.base.environment import Environment, is_own_host
 from minirospy.base.errors import LaunchError, MinirospyError
+from minirospy.base.keyboard import kept_terminal
 from minirospy.ros.roslaunch.launcher.command import node_command, node_program
 from minirospy.ros.roslaunch.launcher.master import CORE_PARAMETERS, LaunchMaster
 from minirospy.ros.roslaunch.launcher.node_start import NodeStarter
@@ -99,7 +100,7 @@ class Launcher:
         ``wait``: wait for a master instead of starting one. Raise MasterUnreachableError if the master cannot be started here,
         LaunchError if a node cannot be run.
         """
-        with self.signals():
+        with kept_terminal(), self.signals():
             try:
                 self.start(wait=wait)
                 return self.watch()

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import CallFailed, MessageException, ServiceException, UsageError
+from minirospy.base.keyboard import has_own_terminal
 from minirospy.command.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Family, HelpStatus, Verb
@@ -206,12 +207,15 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
     names = services.service_arguments(type_)
     values = parse_arguments(texts)
     by_name = len(values) == 1 and isinstance(values[0], dict)
-    if sys.stdin.isatty() and len(values) < len(names) and not by_name:
+    is_terminal = sys.stdin.isatty()
+    if len(values) < len(names) and not by_name and has_own_terminal(sys.argv):
         yield _asked_for(
             services.fill_request(type_, [dict(zip(names, values, strict=False))]), names[: len(values)]
         )
     elif texts or not names:
         yield _filled_request(type_, values)
+    elif is_terminal:
+        raise UsageError(f"please specify service arguments: {' '.join(names)}")
     else:
         found = False
         for each in message_values(parse_lines(sys.stdin, "standard input")):
