@@ -19,6 +19,7 @@ __all__ = [
     "kept_terminal",
     "may_read_stdin",
     "read_without_waiting",
+    "shares_terminal",
 ]
 
 LOOK_SECONDS = 0.05  # seconds for which Keys.next waits for a key
@@ -97,20 +98,24 @@ class Keys:
 
 
 def has_own_terminal(argv: Sequence[str]) -> bool:
-    """Return whether stdin and stdout are terminals, and a program with the command line ``argv`` may draw on them.
+    """Return whether stdin and stdout are terminals, and a program with the command line ``argv`` may draw on them."""
+    are_terminals = all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
+    return are_terminals and not shares_terminal(argv)
 
-    A node of roslaunch shares roslaunch's terminal with other nodes. It is recognised by its ``__log:=`` argument, and by a
-    stdin that is not its controlling terminal. With a launch-prefix such as ``xterm -e``, the node has its own terminal.
+
+def shares_terminal(argv: Sequence[str]) -> bool:
+    """Return whether a program whose stdin is a terminal is a node of roslaunch, which shares it with other nodes.
+
+    Such a node has a ``__log:=`` argument, and its stdin is not its controlling terminal. With a launch-prefix such as
+    ``xterm -e``, the node has its own terminal.
     """
-    if any(stream is None or not stream.isatty() for stream in (sys.stdin, sys.stdout)):
-        return False
     if sys.platform == "win32" or not any(word.startswith("__log:=") for word in argv):
-        return True
+        return False
     try:
         os.tcgetpgrp(sys.stdin.fileno())
     except OSError:
-        return False
-    return True
+        return True
+    return False
 
 
 def is_in_background(number: int) -> bool:

@@ -205,6 +205,20 @@ def test_a_terminal_asks_for_missing_values(robot: Any) -> None:
     assert err == "rosservice: ERROR: field data is not a bool ([std_srvs/SetBoolRequest] has bool data)\n"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a terminal of Unix")
+def test_a_call_in_a_launch_does_not_ask(robot: Any) -> None:
+    """A node shares roslaunch's terminal, whose keys are meant for other nodes."""
+    terminal, ours = os.openpty()
+    with open(ours, closefd=True) as stdin:
+        done = subprocess.run(
+            [str(BIN / "rosservice"), "call", "/set_led_state", "__log:=/tmp/call.log"],
+            stdin=stdin, capture_output=True, text=True, timeout=30, check=False,
+        )  # fmt: skip
+    os.close(terminal)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.endswith("please specify service arguments: data\n")
+
+
 def test_words_for_values_work_in_nested_headers() -> None:
     """In real rosservice, too, `auto` is a stamped header and `now` the current time."""
     from sensor_msgs.srv import SetCameraInfoRequest

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import CallFailed, MessageException, ServiceException, UsageError
-from minirospy.base.keyboard import has_own_terminal
+from minirospy.base.keyboard import shares_terminal
 from minirospy.command.command import NO_MASTER, RosText, WordedError, complain, hint_near, warn
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Family, HelpStatus, Verb
@@ -208,7 +208,7 @@ def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
     values = parse_arguments(texts)
     by_name = len(values) == 1 and isinstance(values[0], dict)
     is_terminal = sys.stdin.isatty()
-    if len(values) < len(names) and not by_name and has_own_terminal(sys.argv):
+    if is_terminal and len(values) < len(names) and not by_name and not shares_terminal(sys.argv):
         yield _asked_for(
             services.fill_request(type_, [dict(zip(names, values, strict=False))]), names[: len(values)]
         )
