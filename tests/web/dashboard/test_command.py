@@ -300,7 +300,7 @@ def test_browser_without_access_to_temporary_files_gets_one_in_the_home_folder(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(browser, "SNAPS", (Path(sys.executable),))
-    monkeypatch.setattr(browser.Path, "home", lambda: tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
     file = browser.LinkFile("http://127.0.0.1:1/")
     (folder,) = tmp_path.iterdir()
     assert file.path.parent == folder
