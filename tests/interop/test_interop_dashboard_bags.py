@@ -23,6 +23,7 @@ from tests.interop.test_interop_dashboard import (
     repeated,
     start,
 )
+from tests.waiting import wait_until
 from tests.web.dashboard.bags import make_bag
 from tests.web.dashboard.conftest import Served, serve
 
@@ -161,6 +162,13 @@ def test_topics_are_recorded_and_the_recording_is_opened(
         page.click(".recorder button", "Record")
         page.wait("return /walk\\.bag · \\d+:\\d\\d/.test(document.querySelector('.recording').textContent)")
         page.wait_text(".recording", " kB")
+        # The page's own subscription shows the rate; the recorder is another node.
+        wait_until(
+            lambda: any(name.startswith("/record_") for name in talking.subscribers),
+            PATIENCE,
+            "the recorder does not subscribe",
+        )
+        served.run(talking.publish(String("hello")))
         page.click(".recording button", "Stop")
         page.wait_text(".recording", "saved")
     page.choose("select[aria-label='Bag']", "walk.bag")

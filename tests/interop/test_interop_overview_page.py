@@ -108,9 +108,9 @@ def test_page_before_the_master_says_how_to_start_one(
     page = Page(link[0])
     try:
         page.wait_text(".verdict", "There is no ROS master yet.")
-        page.wait_text(".findings", "start one with `roscore`")
+        page.wait_text(".findings", "start one with roscore")
         page.click("#language")
-        page.wait_text(".findings", "mit `roscore` einen starten")
+        page.wait_text(".findings", "mit roscore einen starten")
         page.click("#language")
         port = os.environ["ROS_MASTER_URI"].rpartition(":")[2]
         programs.append(
