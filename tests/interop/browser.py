@@ -73,7 +73,7 @@ addEventListener("click", () => { window.clickedByTest = Boolean(pressed?.isConn
 
 
 class Browser:
-    """A running chromium. Each tab has a profile of its own, as a private window, and is never in the background."""
+    """A running chromium. Each tab has its own profile, like a private window, and is never in the background."""
 
     def __init__(self, *flags: str) -> None:
         assert CHROMIUM
@@ -97,7 +97,7 @@ class Browser:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the browser still runs."""
+        """Return whether the browser still runs."""
         return self.process.poll() is None
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from minirospy.ros.rosbag.recording.keys import read_keys
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no terminal sessions")
 def test_keys_are_read_from_the_terminal_of_another_session(monkeypatch: pytest.MonkeyPatch) -> None:
-    """roslaunch starts each node in a session of its own; in ROS, the space bar pauses `rosbag play` there, too."""
+    """roslaunch starts each node in its own session; in ROS, the space bar pauses `rosbag play` there, too."""
     import pty
     import termios
 
